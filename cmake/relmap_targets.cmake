@@ -16,6 +16,8 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(relmap_flags INTERFACE -Wno-stringop-overflow -Wno-array-bounds)
   endif()
   target_compile_options(relmap_flags INTERFACE -fpch-preprocess)  # ccache needs it where headers are precompiled
+else()
+  target_compile_options(relmap_flags INTERFACE -Wthread-safety)  # what a mutex guards (proto/base/mutex.h)
 endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64")
   target_compile_options(relmap_flags INTERFACE -march=x86-64-v2)

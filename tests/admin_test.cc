@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "server/map/derived.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/paths.h"

@@ -30,13 +30,13 @@ struct Part {
 
 // Folder -> what it may include. The longest folder that is a prefix of a file decides.
 const std::map<std::string, Part> kParts = {
-    {"proto/base", {{}, {}, "proto"}},
+    {"proto/base", {{}, {"json"}, "proto"}},
     {"proto/geometry", {{"proto/base"}, {"eigen"}, "proto"}},
     {"proto/calibration", {{"proto/base", "proto/geometry"}, {"eigen", "yaml"}, "proto"}},
     {"proto/keyframe", {{"proto/base", "proto/geometry", "proto/calibration"}, {"eigen"}, "proto"}},
     {"proto/linear", {{"proto"}, {"eigen", "cholmod"}}},
     {"proto/wire", {{"proto"}, {"eigen", "protobuf", "grpc", "lcm"}}},
-    {"frontend/vision", {{"proto"}, {"eigen", "opencv", "jpeg"}}},
+    {"frontend/vision", {{"proto"}, {"eigen", "opencv", "jpeg", "zlib"}}},
     {"frontend/capture", {{"proto", "frontend/vision"}, {"eigen", "opencv", "yaml"}}},
     {"frontend/capture/iidc", {{"proto", "frontend/vision", "frontend/capture"}, {"libusb"}}},
     {"frontend/capture/dc1394", {{"proto", "frontend/capture/iidc"}, {"dc1394"}}},
@@ -89,7 +89,7 @@ const std::map<std::string, Part> kParts = {
       {"eigen", "opencv", "cli11"}}},
     {"tools/terminal", {{"proto"}, {"eigen", "cli11"}}},
     {"tools/g2o", {{"proto"}, {"eigen"}}},
-    {"tools/batch", {{"proto", "client", "tools/terminal"}, {"eigen", "yaml"}}},
+    {"tools/batch", {{"proto", "client", "tools/terminal"}, {"eigen", "json"}}},
     {"tools/relmap", {{"proto", "client", "tools/batch", "tools/terminal", "tools/g2o"}, {"eigen", "cli11"}}},
     {"tools/relmap-admin",
      {{"proto", "storage", "storage/maintenance", "storage/migrate", "storage/rocksdb", "server/place", "client",
@@ -101,9 +101,10 @@ const std::set<std::string> kAnything = {"tests", "tools/bench"};
 
 // As the documents name them.
 const std::map<std::string, std::string> kNames = {
-    {"eigen", "Eigen"}, {"opencv", "OpenCV"}, {"jpeg", "libjpeg"},     {"yaml", "yaml-cpp"},   {"protobuf", "protobuf"},
-    {"grpc", "gRPC"},   {"lcm", "LCM"},       {"rocksdb", "RocksDB"},  {"zstd", "zstd"},       {"spdlog", "spdlog"},
-    {"cli11", "CLI11"}, {"libusb", "libusb"}, {"dc1394", "libdc1394"}, {"cholmod", "CHOLMOD"},
+    {"eigen", "Eigen"},        {"opencv", "OpenCV"}, {"jpeg", "libjpeg"},     {"yaml", "yaml-cpp"},
+    {"protobuf", "protobuf"},  {"grpc", "gRPC"},     {"lcm", "LCM"},          {"rocksdb", "RocksDB"},
+    {"zstd", "zstd"},          {"zlib", "zlib"},     {"spdlog", "spdlog"},    {"cli11", "CLI11"},
+    {"json", "nlohmann-json"}, {"libusb", "libusb"}, {"dc1394", "libdc1394"}, {"cholmod", "CHOLMOD"},
 };
 
 const std::vector<std::pair<std::string, std::regex>> kLibraries = {
@@ -111,10 +112,12 @@ const std::vector<std::pair<std::string, std::regex>> kLibraries = {
     {"opencv", std::regex("^opencv2/.*")},
     {"jpeg", std::regex("^j(peglib|error)\\.h$")},
     {"yaml", std::regex("^yaml-cpp/.*")},
+    {"json", std::regex("^nlohmann/.*")},
     {"protobuf", std::regex("^google/(protobuf|rpc)/.*|.*\\.pb\\.h$")},
     {"grpc", std::regex("^(grpc|grpcpp)/.*|.*\\.grpc\\.pb\\.h$")},
     {"lcm", std::regex("^(lcm|relmap_lcm)/.*")},
     {"rocksdb", std::regex("^rocksdb/.*")},
+    {"zlib", std::regex("^zlib\\.h$")},
     {"zstd", std::regex("^zstd\\.h$")},
     {"spdlog", std::regex("^(spdlog|fmt)/.*")},
     {"cli11", std::regex("^CLI/.*")},

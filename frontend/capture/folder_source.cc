@@ -10,6 +10,7 @@
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/hex.h"
 #include "proto/base/number_text.h"
 
 namespace relmap::capture {
@@ -62,8 +63,7 @@ class FolderSource : public StereoSource {
     const PicturePair& first = set_.pairs.front();
     std::ifstream in(first.left, std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(in), {}};
-    char crc[9];
-    std::snprintf(crc, sizeof crc, "%08x", crc32c({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}));
+    const std::string crc = hex(crc32c({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}));
     return "pairs from " + std::to_string(first.time_us) + " us on, the first picture of checksum " + crc;
   }
   std::uint32_t contents() const override {

@@ -15,7 +15,7 @@ constexpr std::uint32_t kVersion = 1;
 constexpr std::string_view kSync = "\xf5RLG";
 constexpr std::uint8_t kHasCycle = 1;  // flag of a head
 constexpr std::size_t kMaxName = 255;
-constexpr int kMaxSide = 16384;  // pixels
+constexpr int kMaxFrameSide = 16384;  // pixels
 
 std::string_view text_of(ByteSpan bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
@@ -109,7 +109,7 @@ Result<RawLogHeader> decode_header(const Head& head, ByteSpan body) {
   header.rate_hz = in.get<double>();
   if (!in.ok() || crc32c(body) != head.crc) return {Reason::CORRUPT, "its header is damaged"};
   const StereoLayout& layout = header.layout;
-  if (layout.width <= 0 || layout.height <= 0 || layout.width > kMaxSide || layout.height > kMaxSide ||
+  if (layout.width <= 0 || layout.height <= 0 || layout.width > kMaxFrameSide || layout.height > kMaxSide ||
       layout.bytes() > kMaxFrameBytes)
     return {Reason::BAD_SIZE,
             "frames of " + std::to_string(layout.width) + " x " + std::to_string(layout.height) + " pixels"};

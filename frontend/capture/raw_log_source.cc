@@ -6,6 +6,7 @@
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/stereo_source.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/hex.h"
 
 namespace relmap::capture {
 
@@ -144,10 +145,9 @@ Result<std::string> fingerprint_of(RawLogReader& log) {
       continue;
     }
     const auto& frame = std::get<RawLogReader::Frame>(**record);
-    char crc[9];
-    std::snprintf(crc, sizeof crc, "%08x", crc32c(frame.raw));
     log.rewind();
-    return "raw frames from " + std::to_string(frame.frame.time_us) + " us on, the first of checksum " + crc;
+    return "raw frames from " + std::to_string(frame.frame.time_us) + " us on, the first of checksum " +
+           hex(crc32c(frame.raw));
   }
   return first;
 }

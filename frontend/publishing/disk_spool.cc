@@ -15,7 +15,7 @@
 #include "proto/base/crc32c.h"
 #include "proto/keyframe/extension_codec.h"
 #include "proto/keyframe/header_extensions.h"
-#include "proto/keyframe/same_camera.h"
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap::publishing {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/keyframe/same_camera.h"
+#include "proto/keyframe/keyframe.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 

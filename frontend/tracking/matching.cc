@@ -10,7 +10,7 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr double kMinDepth = 0.2;                      // metres
+constexpr double kMinViewDepth = 0.2;                  // metres
 constexpr int kCoarseSad = 20 * vision::kPatchPixels;  // at most 20 grey levels a pixel
 constexpr float kCornerRatio = 0.85F;
 constexpr std::size_t kEnoughSightings = 48;  // for a pose to search finely from
@@ -24,7 +24,7 @@ struct Place {
 std::optional<Place> place_of(const Landmark& landmark, int level, const SE3& T_eye_keyframe,
                               const StereoCamera& camera) {
   const Vector3 p = T_eye_keyframe * landmark.point;
-  if (!(p.z() > kMinDepth)) return std::nullopt;
+  if (!(p.z() > kMinViewDepth)) return std::nullopt;
   const StereoPixel pixel = camera.project(p);
   if (!camera.in_picture(pixel.x(), pixel.y())) return std::nullopt;
   return Place{vision::to_level(static_cast<float>(pixel.x()), level),
@@ -162,7 +162,7 @@ void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyfra
   for (Sighting& s : sightings) {
     const Landmark& landmark = landmarks[s.landmark];
     const double depth = (T_camera_keyframe * landmark.point).z();
-    if (!(depth > kMinDepth)) continue;
+    if (!(depth > kMinViewDepth)) continue;
     const auto u = static_cast<float>(s.pixel.x()), v = static_cast<float>(s.pixel.y());
     const double expected = camera.f * camera.baseline / depth + offset;
     const auto found = vision::refine_stereo(left, right, u, v, landmark.level, static_cast<float>(expected));

@@ -12,7 +12,7 @@ namespace {
 constexpr double kMaxOffset = 1.0;         // pixels
 constexpr double kShare = 0.05;            // of the information: a landmark brings its error to all its steps
 constexpr double kMaxInformation = 2.5e3;  // so that it can follow a camera that warms up
-constexpr double kMinDepth = 0.2;          // metres
+constexpr double kMinUsedDepth = 0.2;      // metres
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
@@ -29,7 +29,7 @@ void StereoOffset::learn(std::span<const vision::Correspondence> correspondences
   Vector7 b = Vector7::Zero();
   for (const vision::Correspondence& c : correspondences) {
     const Vector3 p = T_camera_reference * c.point;
-    if (is_mono(c.pixel) || !(p.z() > kMinDepth) || !(c.point.z() > kMinDepth)) continue;
+    if (is_mono(c.pixel) || !(p.z() > kMinUsedDepth) || !(c.point.z() > kMinUsedDepth)) continue;
     const Matrix3 H = camera.jacobian(p);
     const Matrix3 HR = H * T_camera_reference.R;
     Eigen::Matrix<double, 3, 7> J;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "frontend/vision/sharpness.h"
+#include "proto/base/quantile.h"
 
 namespace relmap::vision {
 
@@ -40,14 +41,6 @@ Status finding(Reason reason, const Parts&... parts) {
   text.precision(3);
   (text << ... << parts);
   return {reason, text.str()};
-}
-
-// 0 of none.
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 double share_of(ImageView picture, int from, int to) {

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <random>
 
+#include "proto/base/hex.h"
+
 namespace relmap {
 
 namespace {
@@ -25,26 +27,14 @@ bool take_frame(std::string_view& text, FrameId& id) {
   return take_number(text, id.session) && id.session != 0 && take_char(text, ':') && take_number(text, id.index);
 }
 
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
 constexpr bool dash_before(std::size_t byte) { return byte == 4 || byte == 6 || byte == 8 || byte == 10; }
 
 }  // namespace
 
 std::string Uuid::to_string() const {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  text.reserve(36);
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    if (dash_before(i)) text += '-';
-    text += kDigits[bytes[i] >> 4];
-    text += kDigits[bytes[i] & 15];
-  }
+  std::string text = hex(bytes);
+  for (std::size_t byte = bytes.size(); byte-- > 0;)
+    if (dash_before(byte)) text.insert(2 * byte, 1, '-');
   return text;
 }
 

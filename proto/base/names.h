@@ -13,4 +13,8 @@ inline constexpr std::size_t kMaxNameBytes = 64;
 // `what` begins the message: "robot", "label".
 Status check_name(std::string_view what, std::string_view text);
 
+// The robot of a recording that names none. Many such recordings may be taken in at a time, so two of this name are
+// never taken for the same robot.
+inline constexpr char kUsualRobot[] = "batch";
+
 }  // namespace relmap

@@ -18,7 +18,6 @@ class [[nodiscard]] Status {
   // `message` says what exactly is wrong, with the numbers: "cx -12 outside the picture (0..512)".
   Status(Reason reason, std::string message) : reason_(reason), message_(std::move(message)) {}
 
-  static Status ok_status() { return {}; }
   bool ok() const { return reason_ == Reason::OK; }
   Reason reason() const { return reason_; }
   const std::string& message() const { return message_; }

@@ -56,4 +56,8 @@ struct StereoCamera {
 inline double pixel_sigma(int level) { return static_cast<double>(1 << level); }
 inline constexpr int kMaxPyramidLevel = 7;
 
+// The camera of a session that was imported without pictures, since a session must have one. Nothing is measured with
+// it.
+inline constexpr StereoCamera kNoCamera{500, 320, 240, 0.1, 640, 480};
+
 }  // namespace relmap

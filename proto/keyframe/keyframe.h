@@ -49,6 +49,12 @@ struct SessionHeader {
   bool operator==(const SessionHeader&) const = default;
 };
 
+// Whether a session that was begun with one header may go on with another; else CALIBRATION_CHANGED. Camera and flags
+// must be the same, and the raw calibration where both have one: an older front-end does not send it.
+inline bool same_camera(const SessionHeader& begun, const SessionHeader& now) {
+  return begun.camera == now.camera && begun.oneway == now.oneway && (!begun.raw || !now.raw || *begun.raw == *now.raw);
+}
+
 // Where the motion since the previous keyframe comes from.
 enum class MotionSource : std::uint8_t {
   kStart = 0,  // first keyframe: there is no step

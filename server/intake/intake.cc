@@ -7,7 +7,7 @@
 
 #include "proto/base/clock.h"
 #include "proto/base/crc32c.h"
-#include "proto/keyframe/usual_robot.h"
+#include "proto/base/names.h"
 
 namespace relmap::intake {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "proto/keyframe/same_camera.h"
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap::intake {
 

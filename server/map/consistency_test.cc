@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/map/testing/counting_graph.h"
-#include "server/place/hand_made_graph.h"
+#include "server/place/testing/hand_made_graph.h"
 
 namespace relmap::map {
 namespace {

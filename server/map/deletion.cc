@@ -428,7 +428,8 @@ void Deletion::unlink() {
     for (const storage::Landmark& landmark : hot->landmarks)
       for (const storage::AliasClaim& claim : landmark.claims) let_go(claim.closure);
   }
-  for (const auto& [closure, frames] : bound) {
+  for (const auto& [closure, bound_frames] : bound) {
+    const std::set<FrameId>& frames = bound_frames;
     const auto edge = goes(closure) ? std::nullopt : storage::find_edge(map_, closure);
     if (!edge) continue;
     std::erase_if(map_.edit_hot(closure.frame).edge(closure)->bound_frames,

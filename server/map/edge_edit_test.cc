@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "server/map/testing/two_laps.h"
-#include "server/place/hand_made_graph.h"
+#include "server/place/testing/hand_made_graph.h"
 #include "storage/map/draft.h"
 
 namespace relmap::map {

@@ -11,6 +11,7 @@
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"
 #include "server/place/same_place.h"
+#include "server/place/trials.h"
 #include "server/place/uniqueness.h"
 #include "server/place/verify.h"
 #include "storage/graph/compounded_chain.h"
@@ -169,40 +170,33 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
   const place::PlaceAnswer answer =
       place::metric_answer(places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance), places, cold->words,
                            view, {&own_past, 1}, cold->appearance);
-  const std::uint64_t seed = ransac_seed(view, frame);
-  std::vector<place::PlaceTrial> trials;
-  const auto probability_of = [&](FrameId match) {
-    for (const place::PlaceCandidate& candidate : answer.candidates)
-      if (candidate.frame == match) return candidate.probability;
-    return 0.0;
-  };
-  std::vector<double> probabilities;
-  const auto try_some = [&](const std::vector<place::PlaceCandidate>& candidates, double least) {
-    const std::size_t most = trials.size() + kMaxVerified;
-    for (const place::PlaceCandidate& candidate : candidates) {
-      if (candidate.probability < least || trials.size() == most) break;
-      if (place::is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
-      trials.push_back(place::try_place(view, query, candidate.frame, seed));
-      probabilities.push_back(probability_of(candidate.frame));
-    }
-  };
-  try_some(answer.candidates, kWorthVerifying);
+  const place::Proceed proceed = [] { return Status(); };
+  place::Trials trials(view, query, ransac_seed(view, frame), proceed);
+  // A mono session is a place, but gives no transform.
+  place::TrialLimits limits{.max_trials = kMaxVerified, .min_probability = kWorthVerifying, .skip_mono = true};
+  (void)trials.run(answer.candidates, limits);
   const std::size_t answers = trials.size();
   // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
-  if (const auto best = place::best_of(trials))
-    try_some(place::look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
-  if (const place::PlaceTrial* trial = place::contradiction(std::span(trials).first(answers)))
+  if (const auto best = trials.best()) {
+    limits.min_probability = 0;
+    (void)trials.run(place::look_alikes(view, places, trials.all()[*best].frame, {&own_past, 1}), limits);
+  }
+  if (const place::PlaceTrial* trial = place::contradiction(std::span(trials.all()).first(answers)))
     return {{}, CameraContradiction{trial->frame.session, trial->verified.status()}};
-  auto standing = place::weigh(view, query, trials, answers, seed, [&](const place::VerifiedPlace& place) {
+  auto standing = trials.weigh(answers, [&](const place::VerifiedPlace& place) {
     const place::Standpoint standpoint{place.match, place.T_match_query, place.covariance};
     return place::changes(place::reobserve(view, pictures, frame, {&standpoint, 1}, recent).sought, query.camera);
   });
   if (standing) {
-    if (standing->runner_up)
-      standing->uniqueness.runner_up_probability = static_cast<float>(probabilities[*standing->runner_up]);
+    const auto probability_of = [&](std::size_t trial) {
+      for (const place::PlaceCandidate& candidate : answer.candidates)
+        if (candidate.frame == trials.candidate(trial).frame) return static_cast<float>(candidate.probability);
+      return 0.0F;
+    };
+    if (standing->runner_up) standing->uniqueness.runner_up_probability = probability_of(*standing->runner_up);
     storage::ClosureProposalRecord proposal =
-        proposal_of(view, pictures, query, frame, *trials[standing->best].verified, standing->uniqueness, recent);
-    proposal.probability = static_cast<float>(probabilities[standing->best]);
+        proposal_of(view, pictures, query, frame, *trials.all()[standing->best].verified, standing->uniqueness, recent);
+    proposal.probability = probability_of(standing->best);
     return {{std::move(proposal)}, {}};
   }
 

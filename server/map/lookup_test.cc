@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "server/place/hand_made_graph.h"
-#include "server/place/random_vocabulary.h"
-#include "server/place/synthetic_street.h"
+#include "server/place/testing/hand_made_graph.h"
+#include "server/place/testing/random_vocabulary.h"
+#include "server/place/testing/synthetic_street.h"
 
 namespace relmap::map {
 namespace {

@@ -9,7 +9,7 @@
 #include "server/map/closures.h"
 #include "server/map/edge_changes.h"
 #include "server/rba/rba.h"
-#include "storage/graph/word_function.h"
+#include "storage/graph/frame.h"
 #include "storage/journal/journal_record.h"
 #include "storage/map/map.h"
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "proto/base/number_text.h"
-#include "proto/calibration/no_camera.h"
+#include "proto/geometry/camera.h"
 #include "server/map/closures.h"
 #include "server/map/lookup.h"
 #include "server/place/place_neighbours.h"

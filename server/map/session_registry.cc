@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "proto/keyframe/extension_codec.h"
-#include "proto/keyframe/same_camera.h"
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap::map {
 

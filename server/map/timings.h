@@ -1,9 +1,10 @@
 // Durations of the last few thousand relaxations, for percentiles.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <vector>
+
+#include "proto/base/quantile.h"
 
 namespace relmap::map {
 
@@ -16,13 +17,7 @@ class Timings {
       microseconds_[next_++ % kKept] = seconds * 1e6;
   }
   // q in 0..1; 0 if there are none.
-  double quantile(double q) const {
-    if (microseconds_.empty()) return 0;
-    std::vector<double> sorted = microseconds_;
-    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(sorted.size() - 1));
-    std::nth_element(sorted.begin(), at, sorted.end());
-    return *at;
-  }
+  double quantile(double q) const { return relmap::quantile(microseconds_, q); }
 
  private:
   static constexpr std::size_t kKept = 10000;

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "proto/base/clock.h"
+#include "proto/base/hex.h"
 #include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
@@ -26,13 +27,6 @@ namespace {
 
 constexpr std::chrono::seconds kPatience{5};  // for running calls, at stop
 constexpr std::chrono::minutes kReportInterval{1};
-
-std::string hex(const BootId& id) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  for (const std::uint8_t byte : id) text += {kDigits[byte >> 4], kDigits[byte & 15]};
-  return text;
-}
 
 rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
   rpc::IngestFacts facts;
@@ -171,19 +165,19 @@ Status Daemon::Impl::serve() {
   facts.pid = static_cast<std::uint64_t>(getpid());
   facts.started_us = started_us;
   core = std::make_unique<rpc::Core>(*mapper, facts, config.rpc);
-  core->ingest = [this] {
+  core->intake.facts = [this] {
     const std::lock_guard lock(lcm_mutex);
     return facts_of(ingest->stats(), lcm_refusal);
   };
-  core->intake = ingest.get();
+  core->intake.server = ingest.get();
   core->process = [] { return rpc::ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
-  core->routes = std::make_unique<route::RouteIndex>(
+  core->routes.index = std::make_unique<route::RouteIndex>(
       route::RouteIndexOptions{config.data, 2 * low_water, config.route_metrics()}, [this] { return mapper->view(); },
       budget);
   mapper->watch_edits([this](std::uint64_t version, std::span<const storage::ChunkId> chunks) {
-    core->routes->changed(version, chunks);
+    core->routes.index->changed(version, chunks);
   });
-  core->routes->start();
+  core->routes.index->start();
 
   auto where = parse_host_port(config.listen);
   if (!where.ok()) return where.status();
@@ -249,13 +243,13 @@ Status Daemon::Impl::stop() {
     server->stop(kPatience);
     remove_endpoint(config.data);
   }
-  if (core && core->routes) core->routes->stop();
+  if (core && core->routes.index) core->routes.index->stop();
   const Status stopped_in_order = mapper ? mapper->stop() : Status();
-  if (core && core->routes) {
+  if (core && core->routes.index) {
     mapper->watch_edits({});
-    const Status saved = stopped_in_order.ok() ? core->routes->save() : Status();
+    const Status saved = stopped_in_order.ok() ? core->routes.index->save() : Status();
     if (!saved.ok()) spdlog::warn("cells of routes will be made anew: {}", saved.to_string());
-    core->routes.reset();
+    core->routes.index.reset();
   }
   return stopped_in_order;
 }
@@ -287,7 +281,7 @@ const std::string& Daemon::address() const { return impl_->address; }
 void Daemon::tick() {
   const auto now = std::chrono::steady_clock::now();
   impl_->core->views.expire();
-  impl_->core->found_routes.expire();
+  impl_->core->routes.found.expire();
   give_back_free_memory();
   if (now - impl_->reported >= kReportInterval) {
     impl_->reported = now;

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <random>
 
-#include "server/place/hand_made_graph.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/hand_made_graph.h"
+#include "server/place/testing/random_vocabulary.h"
 
 namespace relmap::place {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "server/place/block_scores.h"
 #include "server/place/place_block.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 
 namespace relmap::place {
 namespace {

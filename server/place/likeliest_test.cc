@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/place/hand_made_graph.h"
+#include "server/place/testing/hand_made_graph.h"
 
 namespace relmap::place {
 namespace {

@@ -23,11 +23,6 @@ constexpr std::uint32_t kPriorStride = 4;  // every so many edges one candidate:
 constexpr std::size_t kPriorCandidates = 8;
 constexpr std::uint32_t kSure = 2 * kMinInliers;  // inliers with which no further candidate is tried
 
-struct Candidate {
-  FrameId frame;
-  double probability = 0;
-};
-
 // The same picture asks RANSAC for the same numbers.
 std::uint64_t seed_of(std::span<const AppearanceFeature> features) {
   std::uint32_t crc = 0;
@@ -43,15 +38,15 @@ Status check_question(const PlaceKnowledge& map, const PlaceQuestion& question) 
   return {};
 }
 
-Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId prior,
-                                          std::span<const storage::FrameRange> masked, const Proceed& proceed) {
+Result<std::vector<PlaceCandidate>> near_prior(const PlaceKnowledge& map, FrameId prior,
+                                               std::span<const storage::FrameRange> masked, const Proceed& proceed) {
   const route::WorkLimit work{.max_frames = storage::kTreeFrames, .proceed = [&](std::size_t) { return proceed(); }};
   const auto tree = route::search_breadth_first(
       map.graph, prior, work, [&](const storage::PathTree&, const storage::PathNode& node, const storage::Edge&) {
         return node.depth < kPriorDepth ? route::Visit::kExpand : route::Visit::kLeaf;
       });
   if (!tree.ok()) return tree.status();
-  std::vector<Candidate> candidates;
+  std::vector<PlaceCandidate> candidates;
   for (const storage::PathNode& node : tree->nodes)
     if (node.depth % kPriorStride == 0 && candidates.size() < kPriorCandidates && !storage::within(node.frame, masked))
       candidates.push_back({node.frame, 0});
@@ -91,84 +86,67 @@ Status contradiction_of(std::span<const PlaceTrial> trials) {
               "; name the camera that took it, or ask for one picture without a camera: then its lens is estimated"};
 }
 
-// Geometry over one candidate after the other: which of them explains the picture best?
-class Trials {
+// Localises one picture: geometry over candidates until one is beyond doubt.
+class Search {
  public:
-  Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Proceed& proceed)
-      : map_(map), query_(question.picture()), seed_(seed_of(question.features)), proceed_(proceed) {}
+  Search(const PlaceKnowledge& map, const PlaceQuestion& question, const Proceed& proceed)
+      : map_(map),
+        query_(question.picture()),
+        seed_(seed_of(question.features)),
+        trials_(map.graph, query_, seed_, proceed) {}
 
   // Until one is beyond doubt. DEADLINE, while none has been confirmed.
-  Status run(std::span<const Candidate> candidates) {
-    for (const Candidate& candidate : candidates) {
-      if (best_ && best_->place.inliers >= kSure) break;
-      if (Status status = proceed_(); !status.ok()) return best_ ? Status() : status;
-      auto trial = try_place(map_.graph, query_, candidate.frame, seed_);
-      auto& verified = trial.verified;
-      ++tried_;
-      if (verified.ok() && !storage::is_metric(verified->verification))
-        verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
-      if (!verified.ok()) {
-        if (refusal_.ok() || verified.reason() == Reason::NOT_STEREO) refusal_ = verified.status();
-        if (is_contradicted(trial)) contradicted_.push_back(std::move(trial));
-        continue;
-      }
-      if (!best_ || best_->place.inliers < verified->inliers)
-        best_ = Localisation{*verified, candidate.probability, 1, false, 0};
-      trials_.push_back(std::move(trial));
-    }
-    return {};
+  Status run(std::span<const PlaceCandidate> candidates) {
+    Status status = trials_.run(candidates, {.sure_inliers = kSure, .needs_metres = true});
+    return trials_.best() ? Status() : status;
   }
 
   // WRONG_CALIBRATION or NOT_STEREO: more fits where the camera is contradicted than where anything is confirmed.
-  Status contradiction() const {
-    std::vector<PlaceTrial> all = trials_;
-    all.insert(all.end(), contradicted_.begin(), contradicted_.end());
-    return contradiction_of(all);
-  }
+  Status contradiction() const { return contradiction_of(trials_.all()); }
 
-  Status check_not_mirrored() const { return place::check_not_mirrored(map_.graph, query_, best_->place, seed_); }
-
-  // Whether what looks like the best elsewhere explains the picture about as well. DEADLINE.
-  Status check_unique() {
-    std::vector<PlaceTrial> trials = trials_;
-    for (const PlaceCandidate& alike : look_alikes(map_.graph, map_.places, best_->place.match, query_.masked)) {
-      if (trials.size() >= trials_.size() + kVerified) break;
-      if (is_mono_session(map_.graph, alike.frame.session)) continue;
-      if (Status status = proceed_(); !status.ok()) return status;
-      trials.push_back(try_place(map_.graph, query_, alike.frame, seed_));
-      ++tried_;
-    }
-    if (Status status = contradiction_of(trials); !status.ok()) return status;
-    const auto standing = weigh(map_.graph, query_, trials, trials_.size(), seed_);
-    return standing && is_ambiguous(standing->uniqueness, best_->place.inliers) ? ambiguous(trials, *standing)
-                                                                                : Status();
-  }
-
-  // What came of all of them.
+  // The place where most fits, of those that are confirmed.
   std::optional<Localisation> best() const {
-    auto best = best_;
-    if (best) best->verified_candidates = tried_;
-    return best;
+    const auto best = trials_.best();
+    if (!best) return std::nullopt;
+    return Localisation{*trials_.all()[*best].verified, trials_.candidate(*best).probability, 1, false,
+                        static_cast<std::uint32_t>(trials_.tried())};
   }
   // Of the first that was refused; before it, that something was confirmed where there are no metres.
-  const Status& refusal() const { return refusal_; }
+  Status refusal() const {
+    Status first;
+    for (const PlaceTrial& trial : trials_.all())
+      if (!trial.verified.ok() && (first.ok() || trial.verified.reason() == Reason::NOT_STEREO))
+        first = trial.verified.status();
+    return first;
+  }
+
+  Status check_not_mirrored(const Localisation& found) const {
+    return place::check_not_mirrored(map_.graph, query_, found.place, seed_);
+  }
+
+  // Whether what looks like the place elsewhere explains the picture about as well. DEADLINE.
+  Status check_unique(const Localisation& found) {
+    trials_.keep_confirmed();
+    const std::size_t answers = trials_.size();
+    const auto alike = look_alikes(map_.graph, map_.places, found.place.match, query_.masked);
+    if (Status status = trials_.run(alike, {.max_trials = kVerified, .skip_mono = true}); !status.ok()) return status;
+    if (Status status = contradiction(); !status.ok()) return status;
+    const auto standing = trials_.weigh(answers);
+    return standing && is_ambiguous(standing->uniqueness, found.place.inliers) ? ambiguous(trials_.all(), *standing)
+                                                                               : Status();
+  }
 
  private:
   const PlaceKnowledge& map_;
   const QueryPicture query_;
   const std::uint64_t seed_;
-  const Proceed& proceed_;
-  std::optional<Localisation> best_;
-  std::vector<PlaceTrial> trials_;  // that were confirmed
-  std::vector<PlaceTrial> contradicted_;
-  Status refusal_;
-  std::uint32_t tried_ = 0;
+  Trials trials_;
 };
 
 // The most probable in metres, before those of mono sessions, which can only tell that there are none.
-std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAnswer& answer,
-                                       const PlaceAnswer& metric) {
-  std::vector<Candidate> candidates;
+std::vector<PlaceCandidate> worth_verifying(const PlaceKnowledge& map, const PlaceAnswer& answer,
+                                            const PlaceAnswer& metric) {
+  std::vector<PlaceCandidate> candidates;
   for (const PlaceCandidate& place : metric.candidates) candidates.push_back({place.frame, place.probability});
   for (const PlaceCandidate& place : answer.candidates)
     if (is_mono_session(map.graph, place.frame.session)) candidates.push_back({place.frame, place.probability});
@@ -185,47 +163,42 @@ Status check_named(const PlaceQuestion& question) {
 // What geometry says of candidates, and of what looks like the best of them elsewhere; and which of those that it
 // confirms is the place.
 Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
-                           std::vector<PlaceCandidate> candidates, const Proceed& proceed) {
+                           std::span<const PlaceCandidate> candidates, const Proceed& proceed) {
   const QueryPicture query = question.picture();
   const std::uint64_t seed = seed_of(question.features);
-  std::vector<PlaceTrial> trials;
-  const auto try_all = [&](std::span<const PlaceCandidate> places) -> Status {
-    for (const PlaceCandidate& place : places) {
-      if (Status status = proceed(); !status.ok()) return status;
-      trials.push_back(try_place(map.graph, query, place.frame, seed));
-    }
-    return {};
-  };
-  if (Status status = try_all(candidates); !status.ok()) return status;
-  PlaceMatches matches;
-  matches.nothing_verified = trials.front().verified.ok() ? Status() : trials.front().verified.status();
+  Trials trials(map.graph, query, seed, proceed);
+  if (Status status = trials.run(candidates, {}); !status.ok()) return status;
   const std::size_t asked = trials.size();
-  if (const auto best = best_of(trials)) {
-    const std::size_t most = asked + std::max(asked, kVerified);
-    for (const auto& alike : look_alikes(map.graph, map.places, trials[*best].frame, question.masked))
-      if (candidates.size() < most) candidates.push_back({alike.frame, 0});  // this question's words say nothing of it
-    if (Status status = try_all(std::span(candidates).subspan(asked)); !status.ok()) return status;
+  PlaceMatches matches;
+  if (const Result<VerifiedPlace>& first = trials.all().front().verified; !first.ok())
+    matches.nothing_verified = first.status();
+  if (const auto best = trials.best()) {
+    auto alike = look_alikes(map.graph, map.places, trials.all()[*best].frame, question.masked);
+    for (PlaceCandidate& other : alike) other.probability = 0;  // this question's words say nothing of it
+    if (Status status = trials.run(alike, {.max_trials = std::max(asked, kVerified)}); !status.ok()) return status;
   }
-  const auto standing = weigh(map.graph, query, trials, trials.size(), seed);
-  if (standing)
-    matches.nothing_verified = is_ambiguous(standing->uniqueness, trials[standing->best].verified->inliers)
-                                   ? ambiguous(trials, *standing)
-                                   : Status();
-  if (standing && matches.nothing_verified.ok())
-    matches.nothing_verified = check_not_mirrored(map.graph, query, *trials[standing->best].verified, seed);
-  if (Status status = contradiction_of(trials); !status.ok()) matches.nothing_verified = std::move(status);
+  const auto standing = trials.weigh(trials.size());
+  if (standing) {
+    const VerifiedPlace& best = *trials.all()[standing->best].verified;
+    matches.nothing_verified = is_ambiguous(standing->uniqueness, best.inliers)
+                                   ? ambiguous(trials.all(), *standing)
+                                   : check_not_mirrored(map.graph, query, best, seed);
+  }
+  if (Status status = contradiction_of(trials.all()); !status.ok()) matches.nothing_verified = std::move(status);
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    PlaceMatch match{candidates[i].frame, candidates[i].probability, {}, {}, {}};
-    if (!trials[i].verified.ok()) {
-      match.unverified = trials[i].verified.status();
+    const PlaceTrial& trial = trials.all()[i];
+    PlaceMatch match{trials.candidate(i).frame, trials.candidate(i).probability, {}, {}, {}};
+    if (!trial.verified.ok()) {
+      match.unverified = trial.verified.status();
       if (i >= asked) continue;
     } else if (matches.nothing_verified.ok() && standing->at_best[i]) {
-      match.verified = std::move(trials[i].verified).value();
+      match.verified = *trial.verified;
     } else {
-      match.unverified = matches.nothing_verified.ok()
-                             ? Status(Reason::AMBIGUOUS_PLACE, "more fits at " + place_text(trials[standing->best]))
-                             : matches.nothing_verified;
-      match.doubted = std::move(trials[i].verified).value();
+      match.unverified =
+          matches.nothing_verified.ok()
+              ? Status(Reason::AMBIGUOUS_PLACE, "more fits at " + place_text(trials.all()[standing->best]))
+              : matches.nothing_verified;
+      match.doubted = *trial.verified;
     }
     matches.places.push_back(std::move(match));
   }
@@ -254,27 +227,27 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
   if (Status status = check_named(question); !status.ok()) return status;
   if (Status status = check_question(map, question); !status.ok()) return status;
 
-  Trials trials(map, question, proceed);
+  Search search(map, question, proceed);
   if (question.prior) {
     const auto near = near_prior(map, *question.prior, question.masked, proceed);
     if (!near.ok()) return near.status();
-    if (Status status = trials.run(*near); !status.ok()) return status;
-    if (auto found = trials.best(); found && trials.contradiction().ok()) {
-      if (Status status = trials.check_not_mirrored(); !status.ok()) return status;
+    if (Status status = search.run(*near); !status.ok()) return status;
+    if (auto found = search.best(); found && search.contradiction().ok()) {
+      if (Status status = search.check_not_mirrored(*found); !status.ok()) return status;
       found->near_prior = true;
       return *std::move(found);
     }
   }
   const auto words = map.vocabulary.words(question.features);
   const PlaceAnswer answer = map.places.query(words, map.graph, question.masked, {}, question.features);
-  const std::vector<Candidate> candidates = worth_verifying(
+  const std::vector<PlaceCandidate> candidates = worth_verifying(
       map, answer, metric_answer(answer, map.places, words, map.graph, question.masked, question.features));
-  if (Status status = trials.run(candidates); !status.ok()) return status;
-  if (Status status = trials.contradiction(); !status.ok()) return status;
-  auto found = trials.best();
-  if (!found) return why_nowhere(map.graph, answer, trials.refusal());
-  if (Status status = trials.check_not_mirrored(); !status.ok()) return status;
-  if (Status status = trials.check_unique(); !status.ok()) return status;
+  if (Status status = search.run(candidates); !status.ok()) return status;
+  if (Status status = search.contradiction(); !status.ok()) return status;
+  auto found = search.best();
+  if (!found) return why_nowhere(map.graph, answer, search.refusal());
+  if (Status status = search.check_not_mirrored(*found); !status.ok()) return status;
+  if (Status status = search.check_unique(*found); !status.ok()) return status;
   found->new_place = answer.new_place;
   return *std::move(found);
 }
@@ -291,7 +264,7 @@ Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuesti
   matches.new_place = answer.new_place;
   const auto untried = answer.candidates.begin() + static_cast<std::ptrdiff_t>(tried);
   if (tried > 0) {
-    auto judged = judge(map, question, {answer.candidates.begin(), untried}, proceed);
+    auto judged = judge(map, question, std::span(answer.candidates).first(tried), proceed);
     if (!judged.ok()) return judged.status();
     matches.places = std::move(judged->places);
     matches.nothing_verified = std::move(judged->nothing_verified);

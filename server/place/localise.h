@@ -1,23 +1,19 @@
 // Where in the map was this seen? Appearance proposes places, geometry decides (docs/method.md, 7).
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "proto/keyframe/keyframe.h"
 #include "server/place/place_index.h"
+#include "server/place/trials.h"
 #include "server/place/verify.h"
 #include "server/place/vocabulary.h"
 #include "storage/graph/frame_range.h"
 #include "storage/graph/graph.h"
 
 namespace relmap::place {
-
-// Must not be empty. Asked before each candidate that geometry is tried on, and now and then while frames around the
-// prior are gathered: not ok (DEADLINE, SHUTTING_DOWN) ends the search with it.
-using Proceed = std::function<Status()>;
 
 struct PlaceKnowledge {
   const storage::Graph& graph;

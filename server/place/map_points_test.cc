@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 
 #include "server/place/descriptor_match.h"
-#include "server/place/synthetic_street.h"
+#include "server/place/testing/synthetic_street.h"
 
 namespace relmap::place {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "frontend/vision/appearance.h"
 #include "frontend/vision/textures_for_test.h"
-#include "server/place/synthetic_street.h"
+#include "server/place/testing/synthetic_street.h"
 
 namespace relmap::place {
 namespace {

@@ -1,6 +1,6 @@
 // Any bytes as a block of places: what is accepted can be evaluated.
 #include "server/place/block_scores.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 
 namespace {
 

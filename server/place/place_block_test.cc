@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 
 namespace relmap::place {
 namespace {

@@ -10,8 +10,8 @@
 #include <random>
 #include <thread>
 
-#include "server/place/hand_made_graph.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/hand_made_graph.h"
+#include "server/place/testing/random_vocabulary.h"
 #include "storage/testing/temporary_folder.h"
 
 namespace relmap::place {

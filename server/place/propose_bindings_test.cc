@@ -3,7 +3,7 @@
 #include <map>
 #include <set>
 
-#include "server/place/synthetic_street.h"
+#include "server/place/testing/synthetic_street.h"
 #include "server/place/verify.h"
 
 namespace relmap::place {

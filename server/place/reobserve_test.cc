@@ -9,7 +9,7 @@
 
 #include "frontend/vision/encoded_picture.h"
 #include "frontend/vision/textures_for_test.h"
-#include "server/place/hand_made_graph.h"
+#include "server/place/testing/hand_made_graph.h"
 
 namespace relmap::place {
 namespace {

@@ -6,8 +6,8 @@
 #include <numeric>
 
 #include "server/place/differs.h"
-#include "server/place/random_vocabulary.h"
-#include "server/place/synthetic_street.h"
+#include "server/place/testing/random_vocabulary.h"
+#include "server/place/testing/synthetic_street.h"
 
 namespace relmap::place {
 namespace {

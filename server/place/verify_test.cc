@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-#include "server/place/synthetic_street.h"
+#include "server/place/testing/synthetic_street.h"
 
 namespace relmap::place {
 namespace {

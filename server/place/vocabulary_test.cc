@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "proto/base/crc32c.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 
 namespace relmap::place {
 namespace {

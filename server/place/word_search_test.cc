@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 
 namespace relmap::place {
 namespace {

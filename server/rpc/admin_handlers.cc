@@ -15,9 +15,9 @@ namespace {
 constexpr int kFindingsPerMessage = 200;
 
 template <typename Reply>
-Result<Producer<Reply>> start(Core& core, const std::string& method, const Deadline& deadline,
+Result<Producer<Reply>> start(MaintenanceTurn& maintenance, const std::string& method, const Deadline& deadline,
                               std::function<Status(JobStream<Reply>&)> job) {
-  auto turn = core.maintenance.take(method);
+  auto turn = maintenance.take(method);
   if (!turn.ok()) return turn.status();
   const auto stream = std::make_shared<JobStream<Reply>>(*std::move(turn), deadline, std::move(job));
   return Producer<Reply>([stream] { return stream->take(); });
@@ -91,14 +91,14 @@ class VerifyReport {
   v1::VerifyReply unsent_;
 };
 
-Status verify_map(Core& core, const storage::VerifyOptions& options, JobStream<v1::VerifyReply>& stream) {
-  storage::Budget& budget = core.mapper.budget();
+Status verify_map(map::Mapper& mapper, const storage::VerifyOptions& options, JobStream<v1::VerifyReply>& stream) {
+  storage::Budget& budget = mapper.budget();
   storage::VerifyOptions within = options;
   within.memory_bytes = std::min(options.memory_bytes, budget.allowance(storage::Share::kReplies) / 2);
   Charge charge(budget, storage::Share::kReplies);
   if (Status charged = charge.grow_to(within.memory_bytes); !charged.ok()) return charged;
   VerifyReport report(stream);
-  const storage::Engine& engine = core.mapper.engine();
+  const storage::Engine& engine = mapper.engine();
   const auto map = storage::verify(*engine.snapshot(), within, report.on_finding(), report.on_progress());
   if (!map.ok()) return map.status();
   if (!map->complete) return stream.check();
@@ -117,8 +117,8 @@ std::uint64_t bytes_in(const std::string& folder) {
   return sum;
 }
 
-Status only_without_a_daemon(const Core& core, const std::string& done, const std::string& command) {
-  const std::string& folder = core.facts.data_folder;
+Status only_without_a_daemon(const DaemonFacts& facts, const std::string& done, const std::string& command) {
+  const std::string& folder = facts.data_folder;
   return {Reason::FOLDER_LOCKED, "this daemon owns " + folder + ", and a map is " + done +
                                      " while none works on it: stop the daemon and run `relmap-admin " + command + " " +
                                      folder + "`"};
@@ -126,35 +126,36 @@ Status only_without_a_daemon(const Core& core, const std::string& done, const st
 
 }  // namespace
 
-Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyRequest& request,
-                                                 const Deadline& deadline) {
+Result<Producer<v1::VerifyReply>> verify_request(const v1::VerifyRequest& request, const Deadline& deadline,
+                                                 map::Mapper& mapper, MaintenanceTurn& maintenance) {
   storage::VerifyOptions options;
   options.sessions.assign(request.sessions().begin(), request.sessions().end());
-  const auto view = core.mapper.view();
+  const auto view = mapper.view();
   for (const SessionNumber session : options.sessions)
     if (const auto known = view->session(session); !known || storage::is_deleted(*known))
       return Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(session));
-  return start<v1::VerifyReply>(core, "Admin.Verify", deadline, [&core, options](JobStream<v1::VerifyReply>& stream) {
-    return verify_map(core, options, stream);
-  });
+  return start<v1::VerifyReply>(
+      maintenance, "Admin.Verify", deadline,
+      [&mapper, options](JobStream<v1::VerifyReply>& stream) { return verify_map(mapper, options, stream); });
 }
 
-Result<Producer<v1::VerifyReply>> repair_request(Core& core, const v1::RepairRequest&, const Deadline&) {
-  return only_without_a_daemon(core, "mended", "repair");
+Result<Producer<v1::VerifyReply>> repair_request(const v1::RepairRequest&, const Deadline&, const DaemonFacts& facts) {
+  return only_without_a_daemon(facts, "mended", "repair");
 }
 
-Result<Producer<v1::Progress>> reindex_request(Core& core, const v1::ReindexRequest&, const Deadline&) {
-  return only_without_a_daemon(core, "reindexed", "reindex");
+Result<Producer<v1::Progress>> reindex_request(const v1::ReindexRequest&, const Deadline&, const DaemonFacts& facts) {
+  return only_without_a_daemon(facts, "reindexed", "reindex");
 }
 
-Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& request, const Deadline& deadline) {
+Result<Producer<v1::Progress>> backup(const v1::BackupRequest& request, const Deadline& deadline, map::Mapper& mapper,
+                                      MaintenanceTurn& maintenance) {
   const std::string folder = request.folder();
   if (!std::filesystem::path(folder).is_absolute())
     return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is no absolute path on the daemon's machine");
   return start<v1::Progress>(
-      core, "Admin.Backup", deadline, [&core, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
-        storage::Engine& engine = core.mapper.engine();
-        (void)core.mapper.commit(deadline.at);  // if it fails, the journal has what the map has not
+      maintenance, "Admin.Backup", deadline, [&mapper, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
+        storage::Engine& engine = mapper.engine();
+        (void)mapper.commit(deadline.at);  // if it fails, the journal has what the map has not
         const std::uint64_t durable = engine.last_journal_sequence();
         if (Status made = engine.checkpoint(folder, engine_progress(stream, "backing up")); !made.ok()) return made;
         const std::uint64_t bytes = bytes_in(folder);
@@ -167,11 +168,12 @@ Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& reque
       });
 }
 
-Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest&, const Deadline& deadline) {
+Result<Producer<v1::Progress>> compact(const v1::CompactRequest&, const Deadline& deadline, map::Mapper& mapper,
+                                       MaintenanceTurn& maintenance) {
   return start<v1::Progress>(
-      core, "Admin.Compact", deadline, [&core, deadline](JobStream<v1::Progress>& stream) -> Status {
-        storage::Engine& engine = core.mapper.engine();
-        if (const auto committed = core.mapper.commit(deadline.at); !committed.ok()) return committed.status();
+      maintenance, "Admin.Compact", deadline, [&mapper, deadline](JobStream<v1::Progress>& stream) -> Status {
+        storage::Engine& engine = mapper.engine();
+        if (const auto committed = mapper.commit(deadline.at); !committed.ok()) return committed.status();
         const auto before = engine.stats();
         if (!before.ok()) return before.status();
         if (Status done = engine.compact(engine_progress(stream, "compacting")); !done.ok()) return done;
@@ -185,10 +187,12 @@ Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest&, co
       });
 }
 
-Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest&, const Deadline& deadline) {
-  const auto stats = core.mapper.engine().stats();
+Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest&, const Deadline& deadline, map::Mapper& mapper,
+                                    const DaemonFacts& facts, const Routes& routes, const Intake& intake,
+                                    const ProcessProbe& process, const Metrics& metrics) {
+  const auto stats = mapper.engine().stats();
   if (!stats.ok()) return stats.status();
-  auto status = get_status(core, v1::GetStatusRequest(), deadline);
+  auto status = get_status(v1::GetStatusRequest(), deadline, mapper, facts, routes, intake, process, metrics);
   if (!status.ok()) return status.status();
   v1::GetStatsReply reply;
   *reply.mutable_status() = std::move(status).value();
@@ -207,8 +211,8 @@ Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest&, cons
   return reply;
 }
 
-Result<v1::CommitReply> commit(Core& core, const v1::CommitRequest&, const Deadline& deadline) {
-  const auto applied = core.mapper.commit(deadline.at);
+Result<v1::CommitReply> commit(const v1::CommitRequest&, const Deadline& deadline, map::Mapper& mapper) {
+  const auto applied = mapper.commit(deadline.at);
   if (!applied.ok()) return applied.status();
   v1::CommitReply reply;
   reply.set_applied_sequence(*applied);

@@ -30,8 +30,8 @@ class AdminHandlers : public testing::Test {
 };
 
 TEST_F(AdminHandlers, VerifyReadsAllOfASoundMap) {
-  ASSERT_TRUE(commit(*map_.core, {}, deadline_).ok());
-  const auto replies = read(verify_request(*map_.core, {}, deadline_));
+  ASSERT_TRUE(call(*map_.core, commit, {}, deadline_).ok());
+  const auto replies = read(call(*map_.core, verify_request, {}, deadline_));
   ASSERT_FALSE(replies.empty());
   const v1::VerifySummary& summary = replies.back().summary();
   EXPECT_EQ(summary.sessions(), 2u);
@@ -47,13 +47,13 @@ TEST_F(AdminHandlers, VerifyReadsAllOfASoundMap) {
 TEST_F(AdminHandlers, VerifyOfASessionThatIsNotThereIsRefused) {
   v1::VerifyRequest request;
   request.add_sessions(7);
-  EXPECT_EQ(verify_request(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+  EXPECT_EQ(call(*map_.core, verify_request, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
 }
 
 TEST_F(AdminHandlers, LongWorkEndsWithItsCaller) {
   Deadline gone;
   gone.interrupted = [] { return Status(Reason::DEADLINE, "the caller has gone"); };
-  auto stream = verify_request(*map_.core, {}, gone).or_throw();
+  auto stream = call(*map_.core, verify_request, {}, gone).or_throw();
   Status end;
   while (end.ok()) {
     const auto message = stream();
@@ -65,19 +65,19 @@ TEST_F(AdminHandlers, LongWorkEndsWithItsCaller) {
 
 TEST_F(AdminHandlers, OneLongWorkAtATime) {
   const auto held = map_.core->maintenance.take("Admin.Compact");
-  const auto refused = verify_request(*map_.core, {}, deadline_);
+  const auto refused = call(*map_.core, verify_request, {}, deadline_);
   EXPECT_EQ(refused.reason(), Reason::BUDGET_EXCEEDED);
   EXPECT_THAT(refused.status().message(), HasSubstr("Admin.Compact"));
 }
 
 TEST_F(AdminHandlers, RepairSaysWhatToDoInstead) {
-  const auto refused = repair_request(*map_.core, {}, deadline_);
+  const auto refused = call(*map_.core, repair_request, {}, deadline_);
   EXPECT_EQ(refused.reason(), Reason::FOLDER_LOCKED);
   EXPECT_THAT(refused.status().message(), HasSubstr("relmap-admin repair /data"));
 }
 
 TEST_F(AdminHandlers, ReindexSaysWhatToDoInstead) {
-  const auto refused = reindex_request(*map_.core, {}, deadline_);
+  const auto refused = call(*map_.core, reindex_request, {}, deadline_);
   EXPECT_EQ(refused.reason(), Reason::FOLDER_LOCKED);
   EXPECT_THAT(refused.status().message(), HasSubstr("relmap-admin reindex /data"));
 }
@@ -85,26 +85,26 @@ TEST_F(AdminHandlers, ReindexSaysWhatToDoInstead) {
 TEST_F(AdminHandlers, BackupNeedsAnAbsolutePathAndAnEngineThatCan) {
   v1::BackupRequest request;
   request.set_folder("copy");
-  EXPECT_EQ(backup(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(call(*map_.core, backup, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
   request.set_folder("/tmp/copy");
-  auto stream = backup(*map_.core, request, deadline_).or_throw();
+  auto stream = call(*map_.core, backup, request, deadline_).or_throw();
   Result<std::optional<v1::Progress>> message = stream();
   while (message.ok() && message->has_value()) message = stream();
   EXPECT_EQ(message.reason(), Reason::UNSUPPORTED);
 }
 
 TEST_F(AdminHandlers, CompactSaysWhatItGained) {
-  const auto replies = read(compact(*map_.core, {}, deadline_));
+  const auto replies = read(call(*map_.core, compact, {}, deadline_));
   ASSERT_FALSE(replies.empty());
   EXPECT_GT(replies.back().compact().bytes_before(), 0u);
   EXPECT_EQ(replies.back().compact().bytes_after(), replies.back().compact().bytes_before());
 }
 
 TEST_F(AdminHandlers, CommitLeavesNothingInTheJournal) {
-  const auto applied = commit(*map_.core, {}, deadline_);
+  const auto applied = call(*map_.core, commit, {}, deadline_);
   ASSERT_TRUE(applied.ok()) << applied.status().to_string();
   EXPECT_EQ(applied->applied_sequence(), map_.mapper->stats().applied_sequence);
-  const auto stats = get_stats(*map_.core, {}, deadline_);
+  const auto stats = call(*map_.core, get_stats, {}, deadline_);
   ASSERT_TRUE(stats.ok());
   EXPECT_EQ(stats->journal_records(), 0u);
   EXPECT_EQ(stats->status().frames(), ServedMap::kFrames + ServedMap::kElsewhere);

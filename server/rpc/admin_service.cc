@@ -49,18 +49,18 @@ class AdminService final : public v1::Admin::CallbackService {
   }
 
  private:
-  template <typename Request, typename Reply>
+  template <typename Request, typename Reply, typename... Parts>
   Unary* unary(Context* context, const char* method, const Request* request, Reply* reply,
-               Result<Reply> (*handler)(Core&, const Request&, const Deadline&)) {
+               Result<Reply> (*handler)(const Request&, const Deadline&, Parts...)) {
     return gateway_.unary(context, method, Lane::kGeneral, request, reply,
-                          [this, handler](const Request& r, const Deadline& d) { return handler(core_, r, d); });
+                          [this, handler](const Request& r, const Deadline& d) { return call(core_, handler, r, d); });
   }
-  template <typename Reply, typename Request>
+  template <typename Reply, typename Request, typename... Parts>
   Stream<Reply>* stream(Context* context, const char* method, const Request* request,
-                        Result<Producer<Reply>> (*handler)(Core&, const Request&, const Deadline&)) {
+                        Result<Producer<Reply>> (*handler)(const Request&, const Deadline&, Parts...)) {
     return gateway_.stream<Reply>(
         context, method, Lane::kMaintenance, request,
-        [this, handler](const Request& r, const Deadline& d) { return handler(core_, r, d); });
+        [this, handler](const Request& r, const Deadline& d) { return call(core_, handler, r, d); });
   }
 
   Core& core_;

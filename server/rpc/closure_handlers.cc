@@ -20,8 +20,8 @@ namespace {
 // Edits of a view that nobody else sees, and what they would change.
 class DryRun {
  public:
-  DryRun(Core& core, const storage::MapView& view, const Deadline& deadline)
-      : work_(core, deadline),
+  DryRun(storage::Budget& budget, const RpcLimits& limits, const storage::MapView& view, const Deadline& deadline)
+      : work_(budget, limits.max_search_frames, deadline),
         draft_(view, view.state(), work_.limit().proceed),
         recorder_(draft_),
         sequence_(view.state().applied_sequence) {}
@@ -78,38 +78,38 @@ std::optional<storage::Edge> edited_near(const storage::Graph& graph, FrameId a,
   return std::nullopt;
 }
 
-Status write_proposal(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request, const Deadline& deadline,
-                      std::uint64_t& sequence) {
+Status write_proposal(map::Mapper& mapper, EditLog& edits, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request,
+                      const Deadline& deadline, std::uint64_t& sequence) {
   place::PictureCache pictures;
   const auto proposed =
-      core.edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&]() -> Result<std::uint64_t> {
-        auto proposal = map::propose_closure(*core.mapper.view(), core.mapper.places(), pictures, a, b);
+      edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&]() -> Result<std::uint64_t> {
+        auto proposal = map::propose_closure(*mapper.view(), mapper.places(), pictures, a, b);
         if (!proposal.ok()) return proposal.status();
         const FrameId query = proposal->query, match = proposal->match;
-        const auto written = core.mapper.submit_and_wait(std::move(proposal).value());
+        const auto written = mapper.submit_and_wait(std::move(proposal).value());
         if (!written.ok()) return written.status();
-        if (Status applied = core.mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;
-        const auto view = core.mapper.view();
+        if (Status applied = mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;
+        const auto view = mapper.view();
         const auto edge = map::closure_between(*view, query, match);
         if (!edge || edge->history.front().journal_sequence != *written) return overtaken();
         if (!request.accept()) return *written;
         const storage::SetEdgeStateRecord accept = map::edit_record(edge->id, map::EdgeAction::kAccept, request.note());
         if (Status possible = map::check_edge_edit(*view, accept); !possible.ok())
           return {possible.reason(), "proposed as " + edge->id.to_string() + ", but: " + possible.message()};
-        return core.mapper.submit_and_wait(accept);
+        return mapper.submit_and_wait(accept);
       });
   if (!proposed.ok()) return proposed.status();
   sequence = *proposed;
-  return core.mapper.wait_applied(sequence, deadline.at);
+  return mapper.wait_applied(sequence, deadline.at);
 }
 
-Result<v1::ProposeEdgeReply> propose_dry(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request,
-                                         const Deadline& deadline) {
-  const auto view = core.mapper.view();
+Result<v1::ProposeEdgeReply> propose_dry(map::Mapper& mapper, const RpcLimits& limits, FrameId a, FrameId b,
+                                         const v1::ProposeEdgeRequest& request, const Deadline& deadline) {
+  const auto view = mapper.view();
   place::PictureCache pictures;
-  const auto proposal = map::propose_closure(*view, core.mapper.places(), pictures, a, b);
+  const auto proposal = map::propose_closure(*view, mapper.places(), pictures, a, b);
   if (!proposal.ok()) return proposal.status();
-  DryRun run(core, *view, deadline);
+  DryRun run(mapper.budget(), limits, *view, deadline);
   const EdgeId id = run.propose(*proposal);
   if (request.accept())
     if (Status status = run.edit(map::edit_record(id, map::EdgeAction::kAccept, request.note())); !status.ok())
@@ -123,8 +123,8 @@ Result<v1::ProposeEdgeReply> propose_dry(Core& core, FrameId a, FrameId b, const
 
 }  // namespace
 
-Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateRequest& request,
-                                             const Deadline& deadline) {
+Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& request, const Deadline& deadline,
+                                             map::Mapper& mapper, EditLog& edits, const RpcLimits& limits) {
   if (!request.has_edge()) return {Reason::INVALID_ARGUMENT, "edge is missing"};
   const auto id = from_wire(request.edge());
   if (!id.ok()) return id.status();
@@ -141,8 +141,8 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
 
   v1::SetEdgeStateReply reply;
   if (request.dry_run()) {
-    const auto view = core.mapper.view();
-    DryRun run(core, *view, deadline);
+    const auto view = mapper.view();
+    DryRun run(mapper.budget(), limits, *view, deadline);
     if (removes_all) reply.set_shown(run.removal(*id));
     if (Status status = run.edit(record); !status.ok()) return status;
     *reply.mutable_edge() = run.edge(*id);
@@ -152,18 +152,18 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
   }
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
-      core, request.idempotency_key(), request.SerializeAsString(), deadline,
+      mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,
       [&]() -> Result<storage::JournalRecord> {
-        if (Status possible = map::check_edge_edit(*core.mapper.view(), record); !possible.ok()) return possible;
+        if (Status possible = map::check_edge_edit(*mapper.view(), record); !possible.ok()) return possible;
         return storage::JournalRecord(record);
       },
       sequence);
   if (!status.ok()) return status;
 
-  const auto view = core.mapper.view();
+  const auto view = mapper.view();
   const auto edge = storage::find_edge(*view, *id);
   if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + id->to_string()};
-  if (const auto changes = core.mapper.edge_changes(sequence)) {
+  if (const auto changes = mapper.edge_changes(sequence)) {
     if (changes->empty()) return overtaken();
     add_effect(*id, *changes, reply);
   }
@@ -173,26 +173,26 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
   return reply;
 }
 
-Result<v1::ProposeEdgeReply> propose_edge(Core& core, const v1::ProposeEdgeRequest& request, const Deadline& deadline) {
-  const auto a = existing_frame(*core.mapper.view(), request.has_a(), request.a(), "a");
+Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request, const Deadline& deadline,
+                                          map::Mapper& mapper, EditLog& edits, const RpcLimits& limits) {
+  const auto a = existing_frame(*mapper.view(), request.has_a(), request.a(), "a");
   if (!a.ok()) return a.status();
-  const auto b = existing_frame(*core.mapper.view(), request.has_b(), request.b(), "b");
+  const auto b = existing_frame(*mapper.view(), request.has_b(), request.b(), "b");
   if (!b.ok()) return b.status();
   if (Status status = check_note(request.note()); !status.ok()) return status;
-  if (request.dry_run()) return propose_dry(core, *a, *b, request, deadline);
+  if (request.dry_run()) return propose_dry(mapper, limits, *a, *b, request, deadline);
 
   std::uint64_t sequence = 0;
-  if (Status status = write_proposal(core, *a, *b, request, deadline, sequence); !status.ok()) return status;
-  const auto view = core.mapper.view();
+  if (Status status = write_proposal(mapper, edits, *a, *b, request, deadline, sequence); !status.ok()) return status;
+  const auto view = mapper.view();
   const auto edge = edited_near(*view, *a, *b, sequence);
   if (!edge) return overtaken();
   v1::ProposeEdgeReply reply;
   *reply.mutable_edge() = edge_message(*edge);
   const std::uint64_t first = edge->history.front().journal_sequence;
-  if (auto changes = core.mapper.edge_changes(first)) {
+  if (auto changes = mapper.edge_changes(first)) {
     if (first != sequence)
-      changes =
-          combined(*std::move(changes), core.mapper.edge_changes(sequence).value_or(std::vector<map::EdgeChange>()));
+      changes = combined(*std::move(changes), mapper.edge_changes(sequence).value_or(std::vector<map::EdgeChange>()));
     *reply.mutable_effect() = effect_message(*changes);
   }
   reply.set_journal_sequence(sequence);

@@ -35,18 +35,18 @@ class ClosureHandlers : public testing::Test {
     return request;
   }
   Result<v1::ProposeEdgeReply> propose(const v1::ProposeEdgeRequest& request) {
-    return propose_edge(*map_.core, request, deadline_);
+    return call(*map_.core, propose_edge, request, deadline_);
   }
   // A dry run first: it tells what is done then, and changes nothing.
   v1::SetEdgeStateReply set(v1::SetEdgeStateRequest request) {
     EXPECT_TRUE(map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50)).ok());
     const std::uint64_t version = map_.mapper->view()->version();
     request.set_dry_run(true);
-    const auto dry = set_edge_state(*map_.core, request, deadline_).or_throw();
+    const auto dry = call(*map_.core, set_edge_state, request, deadline_).or_throw();
     EXPECT_EQ(dry.journal_sequence(), 0u);
     EXPECT_EQ(map_.mapper->view()->version(), version);
     request.set_dry_run(false);
-    auto done = set_edge_state(*map_.core, request, deadline_).or_throw();
+    auto done = call(*map_.core, set_edge_state, request, deadline_).or_throw();
     EXPECT_GT(done.journal_sequence(), 0u);
     EXPECT_EQ(done.effect().SerializeAsString(), dry.effect().SerializeAsString());
     EXPECT_EQ(done.edge().state(), dry.edge().state());
@@ -149,8 +149,9 @@ TEST_F(ClosureHandlers, EachEditTellsWhatItChangesAndCanBeUndone) {
   EXPECT_EQ(restored.edge().reason(), v1::REASON_ACCEPTED_BY_OPERATOR) << "as it was";
   const auto withdrawn = set(edit(id, v1::EDGE_STATE_CANDIDATE));
   EXPECT_EQ(withdrawn.edge().reason(), v1::REASON_LONE);
-  EXPECT_EQ(set_edge_state(*map_.core, edit(id, v1::EDGE_STATE_CANDIDATE), deadline_).reason(), Reason::WRONG_STATE);
-  EXPECT_EQ(set_edge_state(*map_.core, edit(id, v1::EDGE_STATE_REMOVED, true), deadline_).reason(),
+  EXPECT_EQ(call(*map_.core, set_edge_state, edit(id, v1::EDGE_STATE_CANDIDATE), deadline_).reason(),
+            Reason::WRONG_STATE);
+  EXPECT_EQ(call(*map_.core, set_edge_state, edit(id, v1::EDGE_STATE_REMOVED, true), deadline_).reason(),
             Reason::UNSUPPORTED);
 }
 
@@ -160,35 +161,35 @@ TEST_F(ClosureHandlers, ARemovalIsBoundToWhatItsDryRunShowed) {
   ASSERT_EQ(propose(between({1, 6}, {1, 46})).or_throw().edge().state(), v1::EDGE_STATE_ACCEPTED);
   v1::SetEdgeStateRequest request = edit(id, v1::EDGE_STATE_REMOVED);
   request.set_dry_run(true);
-  const auto looked = set_edge_state(*map_.core, request, deadline_).or_throw();
+  const auto looked = call(*map_.core, set_edge_state, request, deadline_).or_throw();
   EXPECT_NE(looked.shown(), 0u);
   ASSERT_EQ(propose(between({1, 8}, {1, 48})).or_throw().edge().state(), v1::EDGE_STATE_ACCEPTED);
   const std::uint64_t before = sequence();
 
   request.set_dry_run(false);
   request.set_shown(looked.shown());
-  const Status refused = set_edge_state(*map_.core, request, deadline_).status();
+  const Status refused = call(*map_.core, set_edge_state, request, deadline_).status();
   EXPECT_EQ(refused.reason(), Reason::WRONG_STATE);
   EXPECT_THAT(refused.message(), HasSubstr("look again"));
   EXPECT_EQ(sequence(), before) << "nothing is written";
 
   request.set_dry_run(true);
   request.set_shown(0);
-  const auto again = set_edge_state(*map_.core, request, deadline_).or_throw();
+  const auto again = call(*map_.core, set_edge_state, request, deadline_).or_throw();
   EXPECT_EQ(again.effect().closures_size(), 3);
   request.set_dry_run(false);
   request.set_shown(again.shown());
-  const auto done = set_edge_state(*map_.core, request, deadline_).or_throw();
+  const auto done = call(*map_.core, set_edge_state, request, deadline_).or_throw();
   EXPECT_EQ(done.effect().SerializeAsString(), again.effect().SerializeAsString());
   EXPECT_EQ(done.shown(), 0u);
 
   v1::SetEdgeStateRequest other = edit(id, v1::EDGE_STATE_ACCEPTED);
   other.set_shown(again.shown());
-  EXPECT_EQ(set_edge_state(*map_.core, other, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(call(*map_.core, set_edge_state, other, deadline_).reason(), Reason::INVALID_ARGUMENT);
   other = edit(id, v1::EDGE_STATE_REMOVED);
   other.set_alone(true);
   other.set_shown(again.shown());
-  EXPECT_EQ(set_edge_state(*map_.core, other, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(call(*map_.core, set_edge_state, other, deadline_).reason(), Reason::INVALID_ARGUMENT);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What the handlers stand on.
+// What the RPC services share, and how a handler gets the parts of it that it uses.
 #pragma once
 
 #include <atomic>
@@ -8,10 +8,14 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
 
 #include "server/intake/ingest_server.h"
 #include "server/map/mapper.h"
 #include "server/route/overlay/route_index.h"
+#include "server/rpc/deadline.h"
 #include "server/rpc/edit_log.h"
 #include "server/rpc/found_route.h"
 #include "server/rpc/limits.h"
@@ -46,25 +50,56 @@ struct IngestFacts {
 struct ProcessFacts {
   std::size_t resident_bytes = 0, peak_resident_bytes = 0;
 };
+using ProcessProbe = std::function<ProcessFacts()>;
 
+// The way in for keyframes.
+struct Intake {
+  intake::IngestServer* server = nullptr;  // null: this daemon takes no keyframes in
+  std::function<IngestFacts()> facts;      // empty: nothing is counted
+};
+
+// Where FindRoute searches, and what it has found.
+struct Routes {
+  explicit Routes(std::string_view boot_id) : found(boot_id, "route", 64) {}
+
+  std::unique_ptr<route::RouteIndex> index;  // null: routes are searched frame by frame
+  TokenKeeper<FoundRoute> found;             // those whose streams may be resumed
+  std::atomic<std::uint64_t> searched = 0;
+};
+
+// Held while a piece of a graph is imported, which is judged by what the map holds.
+struct ImportTurn {
+  std::mutex mutex;
+};
+
+// Owns what the handlers work on. A handler does not see it: it declares the parts that it uses as its last parameters,
+// and call() passes them.
 struct Core {
   Core(map::Mapper& m, DaemonFacts f, RpcLimits l = {})
-      : mapper(m), facts(std::move(f)), limits(l), views(facts.boot_id), found_routes(facts.boot_id, "route", 64) {}
+      : mapper(m), facts(std::move(f)), limits(l), routes(facts.boot_id), views(facts.boot_id) {}
+
+  auto parts() {
+    return std::tie(mapper, facts, limits, intake, process, routes, metrics, views, edits, imports, maintenance);
+  }
 
   map::Mapper& mapper;
-  const DaemonFacts facts;
-  const RpcLimits limits;
-  std::function<IngestFacts()> ingest;        // empty: there is none
-  intake::IngestServer* intake = nullptr;     // null: nothing is taken in
-  std::function<ProcessFacts()> process;      // empty: not known
-  std::unique_ptr<route::RouteIndex> routes;  // null: routes are searched frame by frame
+  DaemonFacts facts;
+  RpcLimits limits;
+  Intake intake;
+  ProcessProbe process;  // empty: not known
+  Routes routes;
   Metrics metrics;
   ViewKeeper views;
-  TokenKeeper<FoundRoute> found_routes;
-  std::atomic<std::uint64_t> routes_searched = 0;
   EditLog edits;
-  std::mutex imports;  // a piece of a graph at a time
+  ImportTurn imports;
   MaintenanceTurn maintenance;
 };
+
+// Calls `handler` with the parts of `core` whose types it names.
+template <typename Reply, typename Request, typename... Parts>
+Result<Reply> call(Core& core, Result<Reply> (*handler)(const Request&, const Deadline&, Parts...),
+                   const std::type_identity_t<Request>& request, const Deadline& deadline) {
+  return handler(request, deadline, std::get<std::remove_cvref_t<Parts>&>(core.parts())...);
+}
 
 }  // namespace relmap::rpc

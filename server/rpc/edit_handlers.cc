@@ -19,16 +19,17 @@ constexpr std::chrono::milliseconds kLookEach{100};  // at how far a deletion ha
 
 }  // namespace
 
-Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline) {
+Result<v1::SetLabelReply> set_label(const v1::SetLabelRequest& request, const Deadline& deadline, map::Mapper& mapper,
+                                    EditLog& edits) {
   const Status named = check_name("label", request.label());
   if (!named.ok() && !request.remove()) return named;  // what was a name once can be taken off
-  const auto frame = existing_frame(*core.mapper.view(), request.has_frame(), request.frame(), "frame");
+  const auto frame = existing_frame(*mapper.view(), request.has_frame(), request.frame(), "frame");
   if (!frame.ok()) return frame.status();
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
-      core, request.idempotency_key(), request.SerializeAsString(), deadline,
+      mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,
       [&]() -> Result<storage::JournalRecord> {
-        const auto map = core.mapper.view();
+        const auto map = mapper.view();
         const auto hot = map->hot(*frame);
         if (!hot) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
         if (map::is_going(*map, *frame))
@@ -45,7 +46,7 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
       sequence);
   if (!status.ok()) return status;
 
-  const auto view = core.mapper.view();
+  const auto view = mapper.view();
   v1::SetLabelReply reply;
   if (const auto hot = view->hot(*frame))
     for (const std::string& label : hot->labels) reply.add_labels(label);
@@ -54,13 +55,13 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
   return reply;
 }
 
-Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessionRequest& request,
-                                              const Deadline& deadline) {
+Result<v1::FreezeSessionReply> freeze_session(const v1::FreezeSessionRequest& request, const Deadline& deadline,
+                                              map::Mapper& mapper, EditLog& edits) {
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
-      core, request.idempotency_key(), request.SerializeAsString(), deadline,
+      mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,
       [&]() -> Result<storage::JournalRecord> {
-        const auto session = core.mapper.view()->session(request.session());
+        const auto session = mapper.view()->session(request.session());
         if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
         if (storage::is_going(*session))
           return {Reason::SESSION_DELETED, "session " + session->display_name + " is being deleted"};
@@ -74,15 +75,15 @@ Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessio
       sequence);
   if (!status.ok()) return status;
   v1::FreezeSessionReply reply;
-  reply.set_map_version(core.mapper.view()->version());
+  reply.set_map_version(mapper.view()->version());
   return reply;
 }
 
-Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessionRequest& request,
-                                              const Deadline& deadline) {
+Result<Producer<v1::Progress>> delete_session(const v1::DeleteSessionRequest& request, const Deadline& deadline,
+                                              map::Mapper& mapper, EditLog& edits) {
   const SessionNumber number = request.session();
   std::uint64_t sequence = 0;
-  const auto before = core.mapper.view()->session(number);
+  const auto before = mapper.view()->session(number);
   if (!before) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
   const std::string uuid = before->header.uuid.to_string();
   if (request.uuid() != uuid)
@@ -90,7 +91,7 @@ Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessio
                                           "': was another one meant?"};
   if (!storage::is_going(*before)) {
     const Status status = write_and_wait(
-        core, request.idempotency_key(), request.SerializeAsString(), deadline,
+        mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,
         [&] {
           return storage::JournalRecord(storage::SetSessionStateRecord{number, storage::SessionState::kDeleting});
         },
@@ -99,14 +100,14 @@ Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessio
   }
   const std::uint64_t total = before->frames;
   return Producer<v1::Progress>(
-      [&core, number, total, deadline, ended = false]() mutable -> Result<std::optional<v1::Progress>> {
+      [&mapper, number, total, deadline, ended = false]() mutable -> Result<std::optional<v1::Progress>> {
         if (ended) return std::optional<v1::Progress>();
         if (Status status = deadline.check(); !status.ok()) return status;
-        auto left = core.mapper.view()->session(number)->frames;
+        auto left = mapper.view()->session(number)->frames;
         if (left > 0) {
-          if (const Status storage = core.mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
+          if (const Status storage = mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
           std::this_thread::sleep_for(kLookEach);
-          left = core.mapper.view()->session(number)->frames;
+          left = mapper.view()->session(number)->frames;
         }
         ended = left == 0;
         v1::Progress progress;

@@ -30,9 +30,13 @@ struct ExportContents {
 
 class ExportStream {
  public:
-  ExportStream(Core& core, std::shared_ptr<const storage::MapView> view, ExportContents contents,
+  ExportStream(ViewKeeper& views, std::shared_ptr<const storage::MapView> view, ExportContents contents,
                std::vector<storage::Session> sessions, const Deadline& deadline)
-      : core_(core), view_(std::move(view)), contents_(contents), sessions_(std::move(sessions)), deadline_(deadline) {
+      : views_(views),
+        view_(std::move(view)),
+        contents_(contents),
+        sessions_(std::move(sessions)),
+        deadline_(deadline) {
     for (const storage::Session& session : sessions_) total_ += session.frames;
   }
 
@@ -96,7 +100,7 @@ class ExportStream {
     reply.set_session(session.number);
     reply.set_frames_done(done_);
     reply.set_frames_total(total_);
-    reply.set_resume_token(core_.views.token(view_, std::to_string(session.number) + ":" + std::to_string(frames_)));
+    reply.set_resume_token(views_.token(view_, std::to_string(session.number) + ":" + std::to_string(frames_)));
     return true;
   }
 
@@ -125,7 +129,7 @@ class ExportStream {
     return frame.ByteSizeLong();
   }
 
-  Core& core_;
+  ViewKeeper& views_;
   const std::shared_ptr<const storage::MapView> view_;
   const ExportContents contents_;
   const std::vector<storage::Session> sessions_;
@@ -163,8 +167,8 @@ Result<std::vector<storage::Session>> chosen_sessions(const storage::MapView& vi
 
 }  // namespace
 
-Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::ExportRequest& request,
-                                                      const Deadline& deadline) {
+Result<Producer<v1::ExportReply>> export_trajectories(const v1::ExportRequest& request, const Deadline& deadline,
+                                                      map::Mapper& mapper, ViewKeeper& views) {
   ExportContents contents;
   switch (request.format()) {
     case v1::EXPORT_FORMAT_TUM:
@@ -179,12 +183,12 @@ Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::Expo
     default:
       return {Reason::INVALID_ARGUMENT, "export needs a format: TUM, KITTI or FRAMES"};
   }
-  const auto opened = core.views.open(request.resume_token(), core.mapper.view());
+  const auto opened = views.open(request.resume_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   auto sessions = chosen_sessions(*opened->kept, request);
   if (!sessions.ok()) return sessions.status();
   const auto stream =
-      std::make_shared<ExportStream>(core, opened->kept, contents, std::move(sessions).value(), deadline);
+      std::make_shared<ExportStream>(views, opened->kept, contents, std::move(sessions).value(), deadline);
   if (!opened->position.empty()) {
     const auto position = FrameId::parse(opened->position);
     if (!position) return {Reason::INVALID_ARGUMENT, "the resume token is not one of an export"};

@@ -7,6 +7,7 @@
 #include <new>
 #include <random>
 
+#include "proto/base/hex.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/roles.h"
 
@@ -27,9 +28,7 @@ std::string choose_request_id(const grpc::CallbackServerContext& context) {
     if (!id.empty() && id.size() <= kMaxRequestId && std::all_of(id.begin(), id.end(), printable)) return id;
   }
   thread_local std::mt19937_64 random{std::random_device{}()};
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(random()));
-  return text;
+  return hex(std::uint64_t{random()});
 }
 
 // Without TLS nobody can be told from anybody: whoever reaches the port, which is loopback unless --insecure says

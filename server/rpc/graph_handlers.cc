@@ -22,14 +22,15 @@ constexpr std::size_t kBytesPerLandmark = 32;
 
 }  // namespace
 
-Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::TransformBetweenRequest& request,
-                                                    const Deadline& deadline) {
-  const auto view = core.mapper.view();
+Result<v1::TransformBetweenReply> transform_between(const v1::TransformBetweenRequest& request,
+                                                    const Deadline& deadline, map::Mapper& mapper,
+                                                    const RpcLimits& limits) {
+  const auto view = mapper.view();
   const auto a = existing_frame(*view, request.has_a(), request.a(), "a");
   if (!a.ok()) return a.status();
   const auto b = existing_frame(*view, request.has_b(), request.b(), "b");
   if (!b.ok()) return b.status();
-  SearchWork work(core, deadline);
+  SearchWork work(mapper.budget(), limits.max_search_frames, deadline);
   const auto found = route::transform_between(*view, *a, *b, work.limit());
   if (!found.ok()) return found.status();
   v1::TransformBetweenReply reply;
@@ -44,20 +45,22 @@ Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::Transf
   return reply;
 }
 
-Result<v1::GetNeighbourhoodReply> get_neighbourhood(Core& core, const v1::GetNeighbourhoodRequest& request,
-                                                    const Deadline& deadline) {
-  const auto view = core.mapper.view();
+Result<v1::GetNeighbourhoodReply> get_neighbourhood(const v1::GetNeighbourhoodRequest& request,
+                                                    const Deadline& deadline, map::Mapper& mapper,
+                                                    const RpcLimits& limits) {
+  const auto view = mapper.view();
   const auto root = existing_frame(*view, request.has_root(), request.root(), "root");
   if (!root.ok()) return root.status();
   if (!std::isfinite(request.max_metres()) || request.max_metres() < 0)
     return {Reason::INVALID_ARGUMENT, "max_metres must be 0 (no limit) or more"};
 
-  route::NeighbourhoodLimits limits;
-  limits.edges = request.max_edges() == 0 ? kDefaultDepth : request.max_edges();
-  if (request.max_metres() > 0) limits.metres = request.max_metres();
-  SearchWork work(core, deadline);
-  const std::uint32_t most = request.max_frames() == 0 ? kDefaultFrames : std::min(kMaxFrames, request.max_frames());
-  const auto found = route::neighbourhood(*view, *root, limits, work.limit(most));
+  route::NeighbourhoodLimits within;
+  within.edges = request.max_edges() == 0 ? kDefaultDepth : request.max_edges();
+  if (request.max_metres() > 0) within.metres = request.max_metres();
+  const std::uint64_t max_frames =
+      request.max_frames() == 0 ? kDefaultFrames : std::min(kMaxFrames, request.max_frames());
+  SearchWork work(mapper.budget(), std::min(limits.max_search_frames, max_frames), deadline);
+  const auto found = route::neighbourhood(*view, *root, within, work.limit());
   if (!found.ok()) return found.status();
 
   v1::GetNeighbourhoodReply reply;
@@ -90,8 +93,8 @@ Result<v1::GetNeighbourhoodReply> get_neighbourhood(Core& core, const v1::GetNei
   return reply;
 }
 
-Result<v1::GetFrameReply> get_frame(Core& core, const v1::GetFrameRequest& request, const Deadline&) {
-  const auto view = core.mapper.view();
+Result<v1::GetFrameReply> get_frame(const v1::GetFrameRequest& request, const Deadline&, map::Mapper& mapper) {
+  const auto view = mapper.view();
   const auto id = existing_frame(*view, request.has_frame(), request.frame(), "frame");
   if (!id.ok()) return id.status();
   auto frame = frame_message(*view, *id,

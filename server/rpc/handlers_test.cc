@@ -23,9 +23,9 @@ using testing::HasSubstr;
 
 class Handlers : public testing::Test {
  protected:
-  template <typename Request, typename Reply>
-  Result<Reply> ask(Result<Reply> (*handler)(Core&, const Request&, const Deadline&), const Request& request) {
-    return handler(*map_.core, request, deadline_);
+  template <typename Request, typename Reply, typename... Parts>
+  Result<Reply> ask(Result<Reply> (*handler)(const Request&, const Deadline&, Parts...), const Request& request) {
+    return call(*map_.core, handler, request, deadline_);
   }
   static v1::FrameId wire(FrameId id) { return to_wire(id); }
 
@@ -46,7 +46,7 @@ class Handlers : public testing::Test {
 
   std::vector<v1::RouteStep> steps_of(const v1::FindRouteRequest& request, v1::RouteSummary* summary = nullptr) {
     std::vector<v1::RouteStep> steps;
-    auto stream = find_route(*map_.core, request, deadline_).or_throw();
+    auto stream = call(*map_.core, find_route, request, deadline_).or_throw();
     for (bool first = true;; first = false) {
       auto message = stream().or_throw();
       if (!message) break;
@@ -289,7 +289,7 @@ TEST_F(Handlers, RoutesLeadFromAPictureToALabel) {
 
 TEST_F(Handlers, RoutesThatCannotBeSayWhy) {
   const auto reason = [&](const v1::FindRouteRequest& request) {
-    return find_route(*map_.core, request, deadline_).status();
+    return call(*map_.core, find_route, request, deadline_).status();
   };
   v1::FindRouteRequest request;
   EXPECT_EQ(reason(request).reason(), Reason::INVALID_ARGUMENT);
@@ -336,10 +336,10 @@ TEST_F(Handlers, RoutesByWeightsAndWithKnownPrecision) {
   EXPECT_LT((from_wire(steps.front().start_from_this()).or_throw().t).norm(), 1e-12);
 
   request.set_by(v1::ROUTE_BY_TIME);
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "both";
+  EXPECT_EQ(call(*map_.core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "both";
   request.clear_by();
   request.mutable_weights()->set_metre(-1);
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(call(*map_.core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
 }
 
 TEST_F(Handlers, RoutesHaveAlternativesAtEitherEnd) {
@@ -354,7 +354,8 @@ TEST_F(Handlers, RoutesHaveAlternativesAtEitherEnd) {
   EXPECT_EQ(summary.from().index(), 12u);
   EXPECT_EQ(summary.to().index(), 10u);
   request.add_or_to();
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "an end that is none";
+  EXPECT_EQ(call(*map_.core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT)
+      << "an end that is none";
 }
 
 TEST_F(Handlers, RoutesLeadToWhereARobotIs) {
@@ -366,12 +367,12 @@ TEST_F(Handlers, RoutesLeadToWhereARobotIs) {
   steps_of(request, &summary);
   EXPECT_EQ(summary.to().index(), session.last);
   request.mutable_to()->set_robot("nobody");
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+  EXPECT_EQ(call(*map_.core, find_route, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
 }
 
 TEST_F(Handlers, RoutesKeepToTheirFilter) {
   const auto reason = [&](const v1::FindRouteRequest& request) {
-    return find_route(*map_.core, request, deadline_).reason();
+    return call(*map_.core, find_route, request, deadline_).reason();
   };
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire({1, 3});
@@ -410,7 +411,7 @@ TEST_F(Handlers, RoutesKeepToTheirFilter) {
   request.mutable_filter()->add_sessions(2);
   EXPECT_EQ(reason(request), Reason::NOT_CONNECTED);
   request.mutable_filter()->add_sessions(1);
-  EXPECT_TRUE(find_route(*map_.core, request, deadline_).ok());
+  EXPECT_TRUE(call(*map_.core, find_route, request, deadline_).ok());
   request.mutable_filter()->add_sessions(77);
   EXPECT_EQ(reason(request), Reason::NO_SUCH_SESSION);
   request.mutable_filter()->clear_sessions();
@@ -430,7 +431,7 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   request.set_covariance(true);
   const auto whole = steps_of(request);
   ASSERT_GT(whole.size(), 10u);
-  auto broken = find_route(core, request, deadline_).or_throw();
+  auto broken = call(core, find_route, request, deadline_).or_throw();
   const auto first = broken().or_throw();
   ASSERT_TRUE(first.has_value());
   ASSERT_EQ(first->steps_size(), 5);
@@ -439,7 +440,7 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   const v1::RouteEnd from = request.from(), to = request.to();
   request.clear_from();  // the token knows
   request.clear_to();
-  auto stream = find_route(core, request, deadline_).or_throw();
+  auto stream = call(core, find_route, request, deadline_).or_throw();
   std::size_t at = 5;
   for (auto rest = stream().or_throw(); rest; rest = stream().or_throw()) {
     EXPECT_FALSE(rest->has_summary());
@@ -452,19 +453,19 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   const std::size_t position = token.rfind('-');
   for (const char* wrong : {"4711,1", "5", "0,1", "5,", "x,1"}) {
     request.set_resume_token(token.substr(0, position + 1) + wrong);
-    EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << wrong;
+    EXPECT_EQ(call(core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << wrong;
   }
   request.set_resume_token(token);
-  EXPECT_TRUE(find_route(core, request, deadline_).ok());
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::VIEW_EXPIRED) << "it has not found this";
+  EXPECT_TRUE(call(core, find_route, request, deadline_).ok());
+  EXPECT_EQ(call(*map_.core, find_route, request, deadline_).reason(), Reason::VIEW_EXPIRED) << "it has not found this";
   *request.mutable_from() = from;
   *request.mutable_to() = to;
-  EXPECT_TRUE(find_route(core, request, deadline_).ok());
+  EXPECT_TRUE(call(core, find_route, request, deadline_).ok());
   *request.add_or_to() = from;
-  EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "other ends";
+  EXPECT_EQ(call(core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "other ends";
   request.clear_or_to();
   request.mutable_weights()->set_metre(2);
-  EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
+  EXPECT_EQ(call(core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
 }
 
 TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
@@ -481,11 +482,11 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
   const route::Route by_edges = route::find_route(*view, from, to).or_throw();
   std::vector<FrameId> expected;
   for (route::RouteWalk walk(*view, by_edges); const auto step = walk.next();) expected.push_back(step->frame);
-  map_.core->routes = std::make_unique<route::RouteIndex>(
+  map_.core->routes.index = std::make_unique<route::RouteIndex>(
       route::RouteIndexOptions{}, [this] { return map_.mapper->view(); },
       std::make_shared<storage::Budget>(std::size_t{64} << 20));
-  map_.core->routes->start();
-  ASSERT_TRUE(map_.core->routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+  map_.core->routes.index->start();
+  ASSERT_TRUE(map_.core->routes.index->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
   const auto found = steps_of(request, &by_cells);
   EXPECT_EQ(by_cells.frame_by_frame(), "");
   EXPECT_NEAR(by_cells.cost(), by_edges.cost, 1e-9 * by_edges.cost);
@@ -510,12 +511,12 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
   EXPECT_EQ(ask_why(), "");
   request.clear_filter();
   *request.mutable_to()->mutable_frame() = wire(ServedMap::kUnconnected);
-  const auto alone = find_route(*map_.core, request, deadline_);
+  const auto alone = call(*map_.core, find_route, request, deadline_);
   EXPECT_EQ(alone.reason(), Reason::NOT_CONNECTED);
   EXPECT_THAT(alone.status().message(), HasSubstr("2 (elsewhere)"));
   // Cells say so for what there are no costs of, too.
   request.mutable_weights()->set_metre(2);
-  const auto weighed = find_route(*map_.core, request, deadline_);
+  const auto weighed = call(*map_.core, find_route, request, deadline_);
   EXPECT_EQ(weighed.reason(), Reason::NOT_CONNECTED);
   EXPECT_EQ(weighed.status().message(), alone.status().message());
 
@@ -724,7 +725,7 @@ TEST_F(Handlers, StatusCountsWhatIsThere) {
 }
 
 TEST_F(Handlers, StatusSaysWhyLcmDoesNotRun) {
-  map_.core->ingest = [] {
+  map_.core->intake.facts = [] {
     IngestFacts facts;
     facts.lcm = Status(Reason::NO_MULTICAST_ROUTE, "no route");
     facts.not_taken[Reason::CORRUPT] = 3;
@@ -738,9 +739,9 @@ TEST_F(Handlers, StatusSaysWhyLcmDoesNotRun) {
 
 TEST_F(Handlers, ExportsTrajectoriesAndGoesOnWhereAStreamBroke) {
   v1::ExportRequest request;
-  EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(call(*map_.core, export_trajectories, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
   request.set_format(v1::EXPORT_FORMAT_TUM);
-  auto stream = export_trajectories(*map_.core, request, deadline_).or_throw();
+  auto stream = call(*map_.core, export_trajectories, request, deadline_).or_throw();
   const auto first = stream().or_throw();
   ASSERT_TRUE(first.has_value());
   EXPECT_EQ(first->session(), 1u);
@@ -754,11 +755,11 @@ TEST_F(Handlers, ExportsTrajectoriesAndGoesOnWhereAStreamBroke) {
   EXPECT_FALSE(stream().or_throw().has_value());
 
   request.set_resume_token(first->resume_token());
-  auto resumed = export_trajectories(*map_.core, request, deadline_).or_throw();
+  auto resumed = call(*map_.core, export_trajectories, request, deadline_).or_throw();
   EXPECT_EQ(resumed().or_throw()->SerializeAsString(), second->SerializeAsString());
 
   request.add_sessions(9);
-  EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+  EXPECT_EQ(call(*map_.core, export_trajectories, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
 }
 
 TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
@@ -767,7 +768,7 @@ TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
     v1::ExportRequest request;
     request.set_format(v1::EXPORT_FORMAT_FRAMES);
     request.set_landmarks(landmarks);
-    auto stream = export_trajectories(*map_.core, request, deadline_).or_throw();
+    auto stream = call(*map_.core, export_trajectories, request, deadline_).or_throw();
     std::uint32_t frames = 0;
     int points = 0, stored = 0;
     for (auto part = stream().or_throw(); part; part = stream().or_throw()) {
@@ -826,10 +827,10 @@ TEST_F(Handlers, AMonoSessionHasNeitherEdgesNorATrajectory) {
 
   v1::ExportRequest request;
   request.set_format(v1::EXPORT_FORMAT_TUM);
-  auto stream = export_trajectories(*map_.core, request, deadline_).or_throw();
+  auto stream = call(*map_.core, export_trajectories, request, deadline_).or_throw();
   for (auto part = stream().or_throw(); part; part = stream().or_throw()) EXPECT_NE(part->session(), mono);
   request.add_sessions(mono);
-  EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::NOT_STEREO);
+  EXPECT_EQ(call(*map_.core, export_trajectories, request, deadline_).reason(), Reason::NOT_STEREO);
 }
 
 TEST_F(Handlers, ADeadlineEndsASearch) {
@@ -837,7 +838,7 @@ TEST_F(Handlers, ADeadlineEndsASearch) {
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);
   *request.mutable_to()->mutable_frame() = wire(ServedMap::kLast);
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::DEADLINE);
+  EXPECT_EQ(call(*map_.core, find_route, request, deadline_).reason(), Reason::DEADLINE);
   v1::WaitIdleRequest idle;
   EXPECT_EQ(ask(wait_idle, idle).reason(), Reason::DEADLINE);
   deadline_ = {};

@@ -6,7 +6,7 @@
 
 #include "proto/base/crc32c.h"
 #include "proto/base/names.h"
-#include "proto/calibration/no_camera.h"
+#include "proto/geometry/camera.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "server/rpc/handlers.h"
@@ -80,7 +80,7 @@ struct Piece {
   std::vector<storage::ClosureProposalRecord> loops;
 };
 
-Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
+Result<Piece> check_piece(map::Mapper& mapper, const v1::ImportGraphRequest& request) {
   if (request.frames_size() > kMaxPerMessage || request.loops_size() > kMaxPerMessage)
     return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxPerMessage) + " frames or loops in a piece"};
   const auto header = header_of(request);
@@ -106,7 +106,7 @@ Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
     piece.loops.push_back(std::move(proposal).value());
   }
 
-  const auto sessions = core.mapper.view()->sessions();
+  const auto sessions = mapper.view()->sessions();
   const auto known = std::find_if(sessions.begin(), sessions.end(),
                                   [&](const storage::Session& session) { return session.header.uuid == header->uuid; });
   const std::uint64_t next = known == sessions.end() ? 0 : known->next_sequence;
@@ -121,7 +121,7 @@ Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
     return {Reason::TIME_BACKWARDS,
             "frame " + std::to_string(piece.frames.front().sequence) + " is no later than the last one of the map"};
 
-  const auto number = core.mapper.begin_session(*header);
+  const auto number = mapper.begin_session(*header);
   if (!number.ok()) return number.status();
   piece.session = *number;
   for (storage::ClosureProposalRecord& loop : piece.loops) loop.query.session = loop.match.session = *number;
@@ -131,14 +131,14 @@ Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
 // Records on their way into the journal, one after the other.
 class Writer {
  public:
-  Writer(Core& core, const Deadline& deadline) : core_(core), deadline_(deadline) {}
+  Writer(map::Mapper& mapper, const Deadline& deadline) : mapper_(mapper), deadline_(deadline) {}
 
   Status write(const storage::JournalRecord& record) {
     for (;;) {
       auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
       outcomes_.push_back(promise->get_future());
-      const Status queued = core_.mapper.submit(
-          record, [promise](const Result<std::uint64_t>& sequence) { promise->set_value(sequence); });
+      const Status queued =
+          mapper_.submit(record, [promise](const Result<std::uint64_t>& sequence) { promise->set_value(sequence); });
       if (queued.ok()) return {};
       outcomes_.pop_back();
       if (queued.reason() != Reason::BUDGET_EXCEEDED) return queued;
@@ -157,29 +157,30 @@ class Writer {
       last = *sequence;
     }
     if (last > 0)
-      if (Status applied = core_.mapper.wait_applied(last, deadline_.at); !applied.ok()) return applied;
+      if (Status applied = mapper_.wait_applied(last, deadline_.at); !applied.ok()) return applied;
     return last;
   }
 
  private:
-  Core& core_;
+  map::Mapper& mapper_;
   const Deadline& deadline_;
   std::vector<std::future<Result<std::uint64_t>>> outcomes_;
 };
 
 }  // namespace
 
-Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphRequest& request, const Deadline& deadline) {
+Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request, const Deadline& deadline,
+                                          map::Mapper& mapper, ImportTurn& turn) {
   // One at a time: a piece is judged by what the map holds, and pieces must not fill the threads of all other calls.
-  const std::unique_lock turn(core.imports, std::try_to_lock);
-  if (!turn.owns_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
-  const auto piece = check_piece(core, request);
+  const std::unique_lock held(turn.mutex, std::try_to_lock);
+  if (!held.owns_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
+  const auto piece = check_piece(mapper, request);
   if (!piece.ok()) return piece.status();
   v1::ImportGraphReply reply;
   reply.set_session(piece->session);
   reply.set_frames_known(static_cast<std::uint32_t>(request.frames_size()) -
                          static_cast<std::uint32_t>(piece->frames.size()));
-  Writer writer(core, deadline);
+  Writer writer(mapper, deadline);
   for (const Keyframe& keyframe : piece->frames) {
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
@@ -192,7 +193,7 @@ Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphReque
   const auto written = writer.finish();
   if (!written.ok()) return written.status();
   reply.set_journal_sequence(*written);
-  reply.set_map_version(core.mapper.view()->version());
+  reply.set_map_version(mapper.view()->version());
   return reply;
 }
 

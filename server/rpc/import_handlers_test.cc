@@ -44,21 +44,21 @@ class ImportGraph : public ::testing::Test {
     *loop.mutable_covariance() = to_wire(Matrix6(1e-4 * Matrix6::Identity()));
   }
   Result<v1::ImportGraphReply> import(const v1::ImportGraphRequest& request) {
-    return import_graph(core_, request, {});
+    return call(core_, import_graph, request, {});
   }
   // All of the stream in one message.
   static v1::FindRouteReply route(Core& core, const v1::FindRouteRequest& request) {
     v1::FindRouteReply whole;
-    auto stream = find_route(core, request, {}).or_throw();
+    auto stream = call(core, find_route, request, {}).or_throw();
     for (auto part = stream().or_throw(); part; part = stream().or_throw()) whole.MergeFrom(*part);
     return whole;
   }
   void make_cells(Core& core) const {
-    core.routes = std::make_unique<route::RouteIndex>(
+    core.routes.index = std::make_unique<route::RouteIndex>(
         route::RouteIndexOptions{}, [this] { return mapper_->view(); },
         std::make_shared<storage::Budget>(std::size_t{64} << 20));
-    core.routes->start();
-    ASSERT_TRUE(core.routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+    core.routes.index->start();
+    ASSERT_TRUE(core.routes.index->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
   }
   std::vector<storage::Edge> loops() const {
     std::vector<storage::Edge> found;
@@ -150,14 +150,14 @@ TEST_F(ImportGraph, RoutesAndTransformsSayAlongWhichStepsTheyAreAGuess) {
   v1::TransformBetweenRequest between;
   *between.mutable_a() = way.from().frame();
   *between.mutable_b() = way.to().frame();
-  expect_told(transform_between(core_, between, {}).or_throw());
+  expect_told(call(core_, transform_between, between, {}).or_throw());
   *between.mutable_b() = to_wire(FrameId{1, kDark - 1});
-  EXPECT_EQ(transform_between(core_, between, {}).or_throw().unmeasured_steps(), 0u);
+  EXPECT_EQ(call(core_, transform_between, between, {}).or_throw().unmeasured_steps(), 0u);
 
   v1::GetNeighbourhoodRequest around;
   *around.mutable_root() = to_wire(FrameId{1, kDark + 1});
   around.set_max_edges(3);
-  const v1::GetNeighbourhoodReply near = get_neighbourhood(core_, around, {}).or_throw();
+  const v1::GetNeighbourhoodReply near = call(core_, get_neighbourhood, around, {}).or_throw();
   ASSERT_EQ(near.frames_size(), 7);
   for (const v1::NeighbourhoodFrame& frame : near.frames())
     EXPECT_EQ(frame.unmeasured_steps(), frame.frame().index() < kDark ? 1u : 0u);
@@ -199,21 +199,21 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
 
   // A stream that broke goes on along it.
   Core in_pieces(*mapper_, core_.facts, {.route_steps_per_message = 1});
-  auto stream = find_route(in_pieces, way, {}).or_throw();
+  auto stream = call(in_pieces, find_route, way, {}).or_throw();
   way.set_resume_token(stream().or_throw()->resume_token());
-  auto rest = find_route(in_pieces, way, {}).or_throw();
+  auto rest = call(in_pieces, find_route, way, {}).or_throw();
   EXPECT_EQ(rest().or_throw()->steps(0).frame().index(), 50u);
   way.clear_resume_token();
 
   way.mutable_filter()->set_min_support(1);
-  EXPECT_EQ(find_route(core_, way, {}).reason(), Reason::NOT_CONNECTED);
+  EXPECT_EQ(call(core_, find_route, way, {}).reason(), Reason::NOT_CONNECTED);
   way.clear_filter();
   for (const std::uint32_t avoided : {45, 53})  // on either side of it, with the edges there
     *way.mutable_filter()->add_avoid_frames() = to_wire(FrameId{1, avoided});
   expect_by_closure(core_);
   EXPECT_TRUE(route(core_, way).summary().no_way_by_edges());
   const auto expect_refused = [&](Core& core, Reason reason, const Deadline& deadline = {}) {
-    const Status without = find_route(core, way, deadline).status();
+    const Status without = call(core, find_route, way, deadline).status();
     EXPECT_EQ(without.reason(), reason) << without.message();
     EXPECT_NE(without.message().find("closures that only bind"), std::string::npos);
   };

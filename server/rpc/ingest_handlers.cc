@@ -48,10 +48,11 @@ void put_robot(const intake::RobotStats& stats, v1::Robot& robot) {
 
 }  // namespace
 
-Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest&, const Deadline&) {
-  if (!core.intake) return kNoIntake;
-  std::vector<intake::RobotStats> robots = core.intake->robots();
-  const auto view = core.mapper.view();
+Result<v1::ListRobotsReply> list_robots(const v1::ListRobotsRequest&, const Deadline&, map::Mapper& mapper,
+                                        const Intake& intake) {
+  if (!intake.server) return kNoIntake;
+  std::vector<intake::RobotStats> robots = intake.server->robots();
+  const auto view = mapper.view();
   // Of a session that is deleted, or ended by now, nobody is missing.
   std::erase_if(robots, [&](const intake::RobotStats& robot) {
     const auto session = robot.silent ? view->session(robot.session) : std::nullopt;
@@ -67,12 +68,12 @@ Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest&
   return reply;
 }
 
-Result<v1::Acknowledgement> get_acknowledgement(Core& core, const v1::GetAcknowledgementRequest& request,
-                                                const Deadline&) {
-  if (!core.intake) return kNoIntake;
+Result<v1::Acknowledgement> get_acknowledgement(const v1::GetAcknowledgementRequest& request, const Deadline&,
+                                                const Intake& intake) {
+  if (!intake.server) return kNoIntake;
   const auto uuid = uuid_from_wire(request.session_uuid());
   if (!uuid.ok()) return uuid.status();
-  const auto ack = core.intake->acknowledgement(*uuid);
+  const auto ack = intake.server->acknowledgement(*uuid);
   if (!ack.ok()) return ack.status();
   return acknowledgement_message(*ack);
 }

@@ -12,15 +12,16 @@ class IngestService final : public v1::Ingest::CallbackService {
   IngestService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}
 
   grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply>* Stream(grpc::CallbackServerContext* context) override {
-    return new IngestStream(core_, gateway_, context);
+    return new IngestStream(core_.mapper, core_.intake, gateway_, context);
   }
 
   grpc::ServerUnaryReactor* GetAcknowledgement(grpc::CallbackServerContext* context,
                                                const v1::GetAcknowledgementRequest* request,
                                                v1::Acknowledgement* reply) override {
-    return gateway_.unary(
-        context, "Ingest.GetAcknowledgement", Lane::kGeneral, request, reply,
-        [this](const v1::GetAcknowledgementRequest& r, const Deadline& d) { return get_acknowledgement(core_, r, d); });
+    return gateway_.unary(context, "Ingest.GetAcknowledgement", Lane::kGeneral, request, reply,
+                          [this](const v1::GetAcknowledgementRequest& r, const Deadline& d) {
+                            return call(core_, get_acknowledgement, r, d);
+                          });
   }
 
  private:

@@ -18,10 +18,11 @@ constexpr std::size_t kMaxReplies = 256;    // that nobody takes; news may be lo
 constexpr std::size_t kStreamBytes = 64 * 1024;
 }  // namespace
 
-IngestStream::IngestStream(Core& core, Gateway& gateway, grpc::CallbackServerContext* context)
-    : core_(core), call_(gateway, context, "Ingest.Stream", Lane::kIngest) {
+IngestStream::IngestStream(map::Mapper& mapper, const Intake& intake, Gateway& gateway,
+                           grpc::CallbackServerContext* context)
+    : mapper_(mapper), intake_(intake.server), call_(gateway, context, "Ingest.Stream", Lane::kIngest) {
   Status admitted = call_.admit(kStreamBytes);
-  if (admitted.ok() && !core_.intake) admitted = {Reason::UNSUPPORTED, "this server takes no keyframes in"};
+  if (admitted.ok() && !intake_) admitted = {Reason::UNSUPPORTED, "this server takes no keyframes in"};
   if (admitted.ok())
     StartRead(&request_);
   else
@@ -39,7 +40,7 @@ void IngestStream::OnReadDone(bool ok) {
 
 Status IngestStream::take(v1::IngestRequest& request) {
   if (!subscription_) return begin(request);
-  intake::IngestServer& intake = *core_.intake;
+  intake::IngestServer& intake = *intake_;
   switch (request.content_case()) {
     case v1::IngestRequest::kKeyframe: {
       const v1::KeyframePayload& keyframe = request.keyframe();
@@ -80,22 +81,22 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
   if (const auto major = request.hello().protocol().major(); major != kProtocolMajor)
     return {Reason::UNKNOWN_PROTOCOL_VERSION,
             "protocol " + std::to_string(major) + "; known: " + std::to_string(kProtocolMajor)};
-  if (Status storage = core_.mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
+  if (Status storage = mapper_.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
   const std::string& robot = request.hello().robot();  // for the log: what it sends says whose it is
   who_ = (check_name("robot", robot).ok() ? "robot " + robot : "a robot without a name") + " (" + call_.peer() + ")";
   spdlog::info("{} has connected", who_);
   v1::IngestReply welcome;
-  *welcome.mutable_welcome() = welcome_message(core_.intake->identity());
+  *welcome.mutable_welcome() = welcome_message(intake_->identity());
   {
     const std::lock_guard lock(mutex_);
     replies_.push_back(std::move(welcome));
     go_on();
   }
-  subscription_ = core_.intake->subscribe({[this](const Acknowledgement& ack) { hear(ack); },
-                                           [this](const PoseNews& news) { hear(news); },
-                                           [this] {
-                                             end({Reason::SHUTTING_DOWN, "the daemon is stopping"});
-                                           }});
+  subscription_ = intake_->subscribe({[this](const Acknowledgement& ack) { hear(ack); },
+                                      [this](const PoseNews& news) { hear(news); },
+                                      [this] {
+                                        end({Reason::SHUTTING_DOWN, "the daemon is stopping"});
+                                      }});
   return {};
 }
 

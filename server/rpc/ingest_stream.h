@@ -22,7 +22,7 @@ namespace relmap::rpc {
 class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply> {
  public:
   // Deletes itself when the stream is done.
-  IngestStream(Core& core, Gateway& gateway, grpc::CallbackServerContext* context);
+  IngestStream(map::Mapper& mapper, const Intake& intake, Gateway& gateway, grpc::CallbackServerContext* context);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -38,7 +38,8 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   void end(const Status& status);
   void go_on();  // mutex_ is held
 
-  Core& core_;
+  map::Mapper& mapper_;
+  intake::IngestServer* const intake_;  // null: refused
   Call call_;
   v1::IngestRequest request_;
   std::string who_;  // robot and address, once it has said hello

@@ -44,7 +44,7 @@ class IngestStreamTest : public testing::Test {
     intake::IngestServerOptions options;
     options.map = map_.mapper->identity();
     intake_ = std::make_unique<intake::IngestServer>(*sink_, map_.mapper->budget(), BootId{4, 2}, std::move(options));
-    core_->intake = intake_.get();
+    core_->intake.server = intake_.get();
     server_ = RpcServer::start(*core_, {}).or_throw();
     stub_ = v1::Ingest::NewStub(
         grpc::CreateChannel("127.0.0.1:" + std::to_string(server_->port()), grpc::InsecureChannelCredentials()));
@@ -148,7 +148,7 @@ TEST_F(IngestStreamTest, AnotherStreamGoesOnWhereTheFirstBrokeAndOnlyTheNewestOf
   EXPECT_EQ(reason_of(stub_->GetAcknowledgement(&of_nobody, request, &ack)), Reason::NO_SUCH_SESSION);
   context.TryCancel();
 
-  v1::ListRobotsReply robots = list_robots(*core_, {}, {}).or_throw();
+  v1::ListRobotsReply robots = call(*core_, list_robots, {}, {}).or_throw();
   ASSERT_EQ(robots.robots_size(), 1);
   EXPECT_EQ(robots.robots(0).session(), 3u);
   EXPECT_EQ(robots.robots(0).next_sequence(), 12u);

@@ -26,8 +26,9 @@ const Status kForeignToken(Reason::INVALID_ARGUMENT, "the page token is not one 
 
 }  // namespace
 
-Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRequest& request, const Deadline&) {
-  const auto opened = core.views.open(request.page_token(), core.mapper.view());
+Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& request, const Deadline&,
+                                            map::Mapper& mapper, ViewKeeper& views) {
+  const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   SessionNumber after = 0;
   const std::string& position = opened->position;
@@ -41,7 +42,7 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
     if (session.number <= after || storage::is_deleted(session)) continue;
     if (static_cast<std::uint32_t>(reply.sessions_size()) == most) {
       reply.set_next_page_token(
-          core.views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
+          views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
       break;
     }
     *reply.add_sessions() = session_message(session);
@@ -49,8 +50,9 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
   return reply;
 }
 
-Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& request, const Deadline& deadline) {
-  const auto opened = core.views.open(request.page_token(), core.mapper.view());
+Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const Deadline& deadline,
+                                      map::Mapper& mapper, ViewKeeper& views, const RpcLimits& limits) {
+  const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   const storage::MapView& view = *opened->kept;
   EdgeFilter filter;
@@ -86,7 +88,7 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
   reply.set_map_version(view.version());
   std::size_t bytes = 0;
   bool more = false;
-  SearchWork work(core, deadline);
+  SearchWork work(mapper.budget(), limits.max_search_frames, deadline);
   const Status status = for_each_edge(view, filter, after, work.limit(), [&](const storage::Edge& edge) {
     more = static_cast<std::uint32_t>(reply.edges_size()) == most || bytes > kMaxPageBytes;
     if (more) return false;
@@ -96,12 +98,13 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
     return true;
   });
   if (!status.ok()) return status;
-  if (more) reply.set_next_page_token(core.views.token(opened->kept, after.to_string()));
+  if (more) reply.set_next_page_token(views.token(opened->kept, after.to_string()));
   return reply;
 }
 
-Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest& request, const Deadline& deadline) {
-  const auto opened = core.views.open(request.page_token(), core.mapper.view());
+Result<v1::FindLabelsReply> find_labels(const v1::FindLabelsRequest& request, const Deadline& deadline,
+                                        map::Mapper& mapper, ViewKeeper& views) {
+  const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   const std::string& after = opened->position;
   const std::uint32_t most = page_size(request.page_size(), kLabelsPerPage, kMaxLabelsPerPage);
@@ -114,7 +117,7 @@ Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest&
         !has_words(label, request.words()))
       continue;
     if (static_cast<std::uint32_t>(reply.labels_size()) == most || bytes > kMaxPageBytes) {
-      reply.set_next_page_token(core.views.token(opened->kept, reply.labels(reply.labels_size() - 1).label()));
+      reply.set_next_page_token(views.token(opened->kept, reply.labels(reply.labels_size() - 1).label()));
       break;
     }
     v1::LabelledFrames& added = *reply.add_labels();

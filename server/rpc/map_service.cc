@@ -24,7 +24,7 @@ class MapService final : public v1::Map::CallbackService {
   }
   Stream<v1::FindRouteReply>* FindRoute(Context* context, const v1::FindRouteRequest* request) override {
     const Lane lane = needs_picture(*request) ? Lane::kPictures : Lane::kGeneral;
-    return stream<v1::FindRouteReply>(context, "Map.FindRoute", request, find_route_of_request, lane);
+    return stream<v1::FindRouteReply>(context, "Map.FindRoute", request, find_route, lane);
   }
   Unary* GetNeighbourhood(Context* context, const v1::GetNeighbourhoodRequest* request,
                           v1::GetNeighbourhoodReply* reply) override {
@@ -32,7 +32,7 @@ class MapService final : public v1::Map::CallbackService {
   }
   Unary* TransformBetween(Context* context, const v1::TransformBetweenRequest* request,
                           v1::TransformBetweenReply* reply) override {
-    return unary(context, "Map.TransformBetween", request, reply, transform_of_request);
+    return unary(context, "Map.TransformBetween", request, reply, transform_between);
   }
   Unary* GetFrame(Context* context, const v1::GetFrameRequest* request, v1::GetFrameReply* reply) override {
     return unary(context, "Map.GetFrame", request, reply, get_frame);
@@ -72,25 +72,18 @@ class MapService final : public v1::Map::CallbackService {
   }
 
  private:
-  template <typename Request, typename Reply>
-  using Handler = Result<Reply> (*)(Core&, const Request&, const Deadline&);
-
-  // Two handlers share their names with the searches below them.
-  static constexpr Handler<v1::FindRouteRequest, Producer<v1::FindRouteReply>> find_route_of_request = find_route;
-  static constexpr Handler<v1::TransformBetweenRequest, v1::TransformBetweenReply> transform_of_request =
-      transform_between;
-
-  template <typename Request, typename Reply>
+  template <typename Request, typename Reply, typename... Parts>
   Unary* unary(Context* context, const char* method, const Request* request, Reply* reply,
-               Handler<Request, Reply> handler, Lane lane = Lane::kGeneral) {
+               Result<Reply> (*handler)(const Request&, const Deadline&, Parts...), Lane lane = Lane::kGeneral) {
     return gateway_.unary(context, method, lane, request, reply,
-                          [this, handler](const Request& r, const Deadline& d) { return handler(core_, r, d); });
+                          [this, handler](const Request& r, const Deadline& d) { return call(core_, handler, r, d); });
   }
-  template <typename Reply, typename Request>
+  template <typename Reply, typename Request, typename... Parts>
   Stream<Reply>* stream(Context* context, const char* method, const Request* request,
-                        Handler<Request, Producer<Reply>> handler, Lane lane = Lane::kGeneral) {
+                        Result<Producer<Reply>> (*handler)(const Request&, const Deadline&, Parts...),
+                        Lane lane = Lane::kGeneral) {
     return gateway_.stream<Reply>(context, method, lane, request, [this, handler](const Request& r, const Deadline& d) {
-      return handler(core_, r, d);
+      return call(core_, handler, r, d);
     });
   }
 

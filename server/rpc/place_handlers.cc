@@ -81,14 +81,14 @@ Result<std::optional<FrameId>> frame_if_given(const storage::Graph& graph, bool 
 
 }  // namespace
 
-Result<v1::LocaliseReply> localise_view(Core& core, const storage::MapView& view, const v1::View& asked,
+Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& asked,
                                         std::optional<FrameId> prior, const Deadline& deadline) {
   const auto seen = see(asked, view);
   if (!seen.ok()) return seen.status();
-  const place::PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
+  const place::PlaceKnowledge map{view, mapper.places(), mapper.vocabulary()};
   const auto found = place::localise_features(map, question_of(*seen, prior), [&] { return deadline.check(); });
   if (is_of_another_camera(asked, found.reason()))
-    return localise_view(core, view, without_camera(asked), prior, deadline);
+    return localise_view(mapper, view, without_camera(asked), prior, deadline);
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
   *reply.mutable_frame() = to_wire(found->place.match);
@@ -108,15 +108,16 @@ Result<v1::LocaliseReply> localise_view(Core& core, const storage::MapView& view
   return reply;
 }
 
-Result<v1::LocaliseReply> localise(Core& core, const v1::LocaliseRequest& request, const Deadline& deadline) {
-  const auto view = core.mapper.view();
+Result<v1::LocaliseReply> localise(const v1::LocaliseRequest& request, const Deadline& deadline, map::Mapper& mapper) {
+  const auto view = mapper.view();
   const auto prior = frame_if_given(*view, request.has_prior(), request.prior(), "prior");
   if (!prior.ok()) return prior.status();
-  return localise_view(core, *view, request.view(), *prior, deadline);
+  return localise_view(mapper, *view, request.view(), *prior, deadline);
 }
 
-Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest& request, const Deadline& deadline) {
-  const auto view = core.mapper.view();
+Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, const Deadline& deadline,
+                                        map::Mapper& mapper) {
+  const auto view = mapper.view();
   const auto near = frame_if_given(*view, request.has_near(), request.near(), "near");
   if (!near.ok()) return near.status();
   const auto seen = see(request.view(), *view);
@@ -124,13 +125,13 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const std::uint32_t most = request.max_places() == 0 ? kDefaultPlaces : request.max_places();
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
-  const place::PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
+  const place::PlaceKnowledge map{*view, mapper.places(), mapper.vocabulary()};
   const auto found = place::match_features(map, question_of(*seen, *near), verified, [&] { return deadline.check(); });
   if (!found.ok()) return found.status();
   if (is_of_another_camera(request.view(), found->nothing_verified.reason())) {
     v1::MatchImageRequest other = request;
     *other.mutable_view() = without_camera(request.view());
-    return match_image(core, other, deadline);
+    return match_image(other, deadline, mapper);
   }
   v1::MatchImageReply reply;
   reply.set_new_place(found->new_place);

@@ -4,13 +4,13 @@
 #include <optional>
 
 #include "relmap/v1/map.pb.h"
-#include "server/rpc/core.h"
+#include "server/map/mapper.h"
 #include "server/rpc/deadline.h"
 
 namespace relmap::rpc {
 
 // Reasons as of Map.Localise.
-Result<v1::LocaliseReply> localise_view(Core& core, const storage::MapView& view, const v1::View& asked,
+Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& asked,
                                         std::optional<FrameId> prior, const Deadline& deadline);
 
 }  // namespace relmap::rpc

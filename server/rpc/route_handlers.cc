@@ -59,24 +59,25 @@ struct Position {
 };
 
 // Routes whose streams nobody has resumed for the longest time make room.
-Status charge_for(Core& core, FoundRoute& found) {
+Status charge_for(TokenKeeper<FoundRoute>& others, FoundRoute& found) {
   for (;;) {
     Status charged = found.charge.grow_to(found.answer.route.path.memory_bytes());
-    if (charged.ok() || !core.found_routes.drop_oldest()) return charged;
+    if (charged.ok() || !others.drop_oldest()) return charged;
   }
 }
 
 // Reads the steps from the view as the caller takes them.
 class RouteStream {
  public:
-  RouteStream(Core& core, std::shared_ptr<const FoundRoute> found, bool covariance, const Deadline& deadline)
-      : core_(core),
+  RouteStream(Routes& routes, const RpcLimits& limits, std::shared_ptr<const FoundRoute> found, bool covariance,
+              const Deadline& deadline)
+      : routes_(routes),
         found_(std::move(found)),
         route_(found_->answer.route),
         deadline_(deadline),
         covariance_(covariance),
-        steps_per_message_(covariance ? std::min(core.limits.route_steps_per_message, kStepsWithCovariancePerMessage)
-                                      : core.limits.route_steps_per_message),
+        steps_per_message_(covariance ? std::min(limits.route_steps_per_message, kStepsWithCovariancePerMessage)
+                                      : limits.route_steps_per_message),
         walk_(*found_->view, route_, covariance_) {}
 
   // The summary, and steps that an earlier stream has brought.
@@ -105,7 +106,7 @@ class RouteStream {
     }
     if (next_ < route_.steps())
       reply.set_resume_token(
-          core_.found_routes.token(found_->number, found_, Position{next_, found_->fingerprint}.to_string()));
+          routes_.found.token(found_->number, found_, Position{next_, found_->fingerprint}.to_string()));
     return std::optional(std::move(reply));
   }
 
@@ -134,7 +135,7 @@ class RouteStream {
     return message;
   }
 
-  Core& core_;
+  Routes& routes_;
   const std::shared_ptr<const FoundRoute> found_;
   const route::Route& route_;
   const Deadline& deadline_;
@@ -145,8 +146,9 @@ class RouteStream {
   bool summarised_ = false;
 };
 
-Result<Producer<v1::FindRouteReply>> resume(Core& core, const v1::FindRouteRequest& request, const Deadline& deadline) {
-  const auto opened = core.found_routes.open(request.resume_token());
+Result<Producer<v1::FindRouteReply>> resume(Routes& routes, const RpcLimits& limits,
+                                            const v1::FindRouteRequest& request, const Deadline& deadline) {
+  const auto opened = routes.found.open(request.resume_token());
   if (!opened.ok()) return opened.status();
   const auto position = Position::parse(opened->position);
   if (!position || position->step == 0 || position->step >= opened->kept->answer.route.steps())
@@ -157,7 +159,7 @@ Result<Producer<v1::FindRouteReply>> resume(Core& core, const v1::FindRouteReque
   if (position->fingerprint != route_fingerprint(request) ||
       (has_ends && opened->kept->ends_fingerprint != route_ends_fingerprint(request)))
     return {Reason::INVALID_ARGUMENT, "the resume token is of a request for another route"};
-  const auto stream = std::make_shared<RouteStream>(core, opened->kept, request.covariance(), deadline);
+  const auto stream = std::make_shared<RouteStream>(routes, limits, opened->kept, request.covariance(), deadline);
   if (Status status = stream->skip(position->step); !status.ok()) return status;
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
 }
@@ -171,31 +173,32 @@ bool needs_picture(const v1::FindRouteRequest& request) {
          std::any_of(request.or_to().begin(), request.or_to().end(), shows_one);
 }
 
-Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteRequest& request,
-                                                const Deadline& deadline) {
-  if (!request.resume_token().empty()) return resume(core, request, deadline);
+Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& request, const Deadline& deadline,
+                                                map::Mapper& mapper, Routes& routes, const RpcLimits& limits) {
+  if (!request.resume_token().empty()) return resume(routes, limits, request, deadline);
   const route::RouteIndex::Snapshot map =
-      core.routes ? core.routes->snapshot()
-                  : route::RouteIndex::Snapshot{core.mapper.view(), nullptr, "there are none", {}, {}};
+      routes.index ? routes.index->snapshot()
+                   : route::RouteIndex::Snapshot{mapper.view(), nullptr, "there are none", {}, {}};
   const auto options = route_options(*map.view, request, deadline);
   if (!options.ok()) return options.status();
-  const auto from = route_ends(core, *map.view, request.from(), request.or_from(), "from", deadline);
+  const auto from = route_ends(mapper, *map.view, request.from(), request.or_from(), "from", deadline);
   if (!from.ok()) return from.status();
-  const auto to = route_ends(core, *map.view, request.to(), request.or_to(), "to", deadline);
+  const auto to = route_ends(mapper, *map.view, request.to(), request.or_to(), "to", deadline);
   if (!to.ok()) return to.status();
 
-  auto found = std::make_shared<FoundRoute>(core.mapper.budget(), ++core.routes_searched);
+  auto found = std::make_shared<FoundRoute>(mapper.budget(), ++routes.searched);
   found->fingerprint = route_fingerprint(request);
   found->ends_fingerprint = route_ends_fingerprint(request);
   found->view = map.view;
   auto answer = [&] {
-    SearchWork work(core, deadline);  // its memory is given back before the route's is charged
-    return route::search_route(map, from->frames, to->frames, *options, core.limits.near_route_steps, work.limit());
+    SearchWork work(mapper.budget(), limits.max_search_frames,
+                    deadline);  // its memory is given back before the route's is charged
+    return route::search_route(map, from->frames, to->frames, *options, limits.near_route_steps, work.limit());
   }();
   if (!answer.ok()) return answer.status();
   found->answer = std::move(answer).value();
-  if (Status status = charge_for(core, *found); !status.ok()) return status;
-  const auto stream = std::make_shared<RouteStream>(core, found, request.covariance(), deadline);
+  if (Status status = charge_for(routes.found, *found); !status.ok()) return status;
+  const auto stream = std::make_shared<RouteStream>(routes, limits, found, request.covariance(), deadline);
   stream->from_view = from->view_at(found->answer.route.path.from);
   stream->to_view = to->view_at(found->answer.route.path.to);
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });

@@ -38,7 +38,7 @@ Result<FrameId> newest_frame(const storage::Graph& map, const std::string& robot
   return FrameId{newest->number, newest->last};
 }
 
-Status add_end(Core& core, const storage::MapView& view, const v1::RouteEnd& end, const char* what,
+Status add_end(map::Mapper& mapper, const storage::MapView& view, const v1::RouteEnd& end, const char* what,
                const Deadline& deadline, RouteEnds& ends) {
   switch (end.end_case()) {
     case v1::RouteEnd::kFrame: {
@@ -55,7 +55,7 @@ Status add_end(Core& core, const storage::MapView& view, const v1::RouteEnd& end
     }
     case v1::RouteEnd::kView: {
       if (ends.seen.size() == kMaxPictures) return too_many("pictures at one end", kMaxPictures);
-      auto seen = localise_view(core, view, end.view(), std::nullopt, deadline);
+      auto seen = localise_view(mapper, view, end.view(), std::nullopt, deadline);
       if (!seen.ok()) return seen.status();
       const auto frame = from_wire(seen->frame());
       if (!frame.ok()) return frame.status();
@@ -130,13 +130,13 @@ Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteF
 
 }  // namespace
 
-Result<RouteEnds> route_ends(Core& core, const storage::MapView& view, const v1::RouteEnd& end,
+Result<RouteEnds> route_ends(map::Mapper& mapper, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline) {
   if (others.size() > kMaxEnds) return too_many("alternatives at one end", kMaxEnds);
   RouteEnds ends;
   const auto add = [&](const v1::RouteEnd& one) {
-    Status status = add_end(core, view, one, what, deadline, ends);
+    Status status = add_end(mapper, view, one, what, deadline, ends);
     if (status.ok()) status = deadline.check();
     return status.ok() && ends.frames.size() > kMaxFrames ? too_many("frames at one end", kMaxFrames) : status;
   };

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "relmap/v1/map.pb.h"
+#include "server/map/mapper.h"
 #include "server/route/dijkstra.h"
-#include "server/rpc/core.h"
 #include "server/rpc/deadline.h"
 
 namespace relmap::rpc {
@@ -25,7 +25,7 @@ struct RouteEnds {
 // One end with its alternatives. `what`: "from" or "to", for messages. INVALID_ARGUMENT (there is none, or too many),
 // NO_SUCH_FRAME, NO_SUCH_LABEL, NO_SUCH_SESSION (a robot without frames), and what a localisation may say, of the first
 // that is not there.
-Result<RouteEnds> route_ends(Core& core, const storage::MapView& view, const v1::RouteEnd& end,
+Result<RouteEnds> route_ends(map::Mapper& mapper, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline);
 

@@ -20,8 +20,7 @@ void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reas
   added.set_count(count);
 }
 
-void put_daemon(const Core& core, v1::GetStatusReply& reply) {
-  const DaemonFacts& facts = core.facts;
+void put_daemon(const DaemonFacts& facts, v1::GetStatusReply& reply) {
   reply.set_version(facts.version);
   reply.set_boot_id(facts.boot_id);
   reply.mutable_protocol()->set_major(kProtocolMajor);
@@ -88,10 +87,10 @@ void put_doubts(const std::vector<map::CameraDoubt>& doubts, const storage::MapV
   }
 }
 
-void put_routes(const Core& core, v1::GetStatusReply& reply) {
+void put_routes(const Routes& routes, v1::GetStatusReply& reply) {
   v1::RouteCells& cells = *reply.mutable_route_cells();
-  if (!core.routes) return cells.set_missing_because("there are none");
-  const route::RouteIndex::Snapshot map = core.routes->snapshot();
+  if (!routes.index) return cells.set_missing_because("there are none");
+  const route::RouteIndex::Snapshot map = routes.index->snapshot();
   cells.set_missing_because(map.missing_because);
   if (!map.overlay) return;
   cells.set_weights(static_cast<std::uint32_t>(map.overlay->metrics().size()));
@@ -100,8 +99,7 @@ void put_routes(const Core& core, v1::GetStatusReply& reply) {
   cells.set_outdated_cells(map.overlay->outdated());
 }
 
-void put_memory(const Core& core, v1::GetStatusReply& reply) {
-  const storage::Budget& budget = core.mapper.budget();
+void put_memory(const storage::Budget& budget, const ProcessProbe& probe, v1::GetStatusReply& reply) {
   reply.set_memory_budget(budget.limit());
   reply.set_memory_used(budget.used());
   for (std::size_t i = 0; i < storage::kShares; ++i) {
@@ -111,8 +109,8 @@ void put_memory(const Core& core, v1::GetStatusReply& reply) {
     added.set_used(budget.used(share));
     added.set_allowance(budget.allowance(share));
   }
-  if (!core.process) return;
-  const ProcessFacts process = core.process();
+  if (!probe) return;
+  const ProcessFacts process = probe();
   reply.set_resident_bytes(process.resident_bytes);
   reply.set_resident_max_bytes(process.peak_resident_bytes);
 }
@@ -149,35 +147,37 @@ void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
 
 }  // namespace
 
-Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest&, const Deadline&) {
+Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadline&, map::Mapper& mapper,
+                                      const DaemonFacts& facts, const Routes& routes, const Intake& intake,
+                                      const ProcessProbe& process, const Metrics& metrics) {
   v1::GetStatusReply reply;
-  put_daemon(core, reply);
-  const auto view = core.mapper.view();
-  put_map(core.mapper.identity(), *view, reply);
-  const map::MapperStats stats = core.mapper.stats();
+  put_daemon(facts, reply);
+  const auto view = mapper.view();
+  put_map(mapper.identity(), *view, reply);
+  const map::MapperStats stats = mapper.stats();
   put_work(stats, reply);
   put_doubts(stats.doubts, *view, reply);
-  put_memory(core, reply);
-  put_routes(core, reply);
-  const place::Vocabulary& vocabulary = core.mapper.vocabulary();
+  put_memory(mapper.budget(), process, reply);
+  put_routes(routes, reply);
+  const place::Vocabulary& vocabulary = mapper.vocabulary();
   reply.set_vocabulary_crc32c(vocabulary.crc());
   reply.set_vocabulary_words(vocabulary.size());
   reply.set_vocabulary_source(vocabulary.source());
-  if (core.ingest) put_ingest(core.ingest(), reply);
-  put_methods(core.metrics, reply);
+  if (intake.facts) put_ingest(intake.facts(), reply);
+  put_methods(metrics, reply);
   return reply;
 }
 
-Result<v1::WaitIdleReply> wait_idle(Core& core, const v1::WaitIdleRequest&, const Deadline& deadline) {
+Result<v1::WaitIdleReply> wait_idle(const v1::WaitIdleRequest&, const Deadline& deadline, map::Mapper& mapper) {
   for (;;) {
     if (Status status = deadline.check(); !status.ok()) return status;
-    const Status idle = core.mapper.wait_idle(std::min(deadline.at, std::chrono::steady_clock::now() + kWaitSlice));
+    const Status idle = mapper.wait_idle(std::min(deadline.at, std::chrono::steady_clock::now() + kWaitSlice));
     if (idle.ok()) break;
     if (idle.reason() != Reason::DEADLINE) return idle;
   }
   v1::WaitIdleReply reply;
-  reply.set_applied_sequence(core.mapper.stats().applied_sequence);
-  reply.set_map_version(core.mapper.view()->version());
+  reply.set_applied_sequence(mapper.stats().applied_sequence);
+  reply.set_map_version(mapper.view()->version());
   return reply;
 }
 

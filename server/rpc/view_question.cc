@@ -6,7 +6,7 @@
 
 #include "frontend/vision/picture.h"
 #include "proto/base/number_text.h"
-#include "proto/calibration/no_camera.h"
+#include "proto/geometry/camera.h"
 #include "proto/wire/convert.h"
 #include "server/map/lookup.h"
 #include "server/rpc/messages.h"

@@ -8,7 +8,7 @@
 #include "frontend/vision/rectify.h"
 #include "proto/calibration/calibration_samples.h"
 #include "proto/wire/convert.h"
-#include "server/place/hand_made_graph.h"
+#include "server/place/testing/hand_made_graph.h"
 
 namespace relmap::rpc {
 namespace {

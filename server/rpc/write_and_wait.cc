@@ -6,16 +6,17 @@ namespace {
 constexpr std::size_t kMaxNoteBytes = 1024;
 }  // namespace
 
-Status write_and_wait(Core& core, const std::string& key, const std::string& content, const Deadline& deadline,
-                      const std::function<Result<storage::JournalRecord>()>& make_record, std::uint64_t& sequence) {
-  const auto written = core.edits.once(key, content, deadline, [&]() -> Result<std::uint64_t> {
+Status write_and_wait(map::Mapper& mapper, EditLog& edits, const std::string& key, const std::string& content,
+                      const Deadline& deadline, const std::function<Result<storage::JournalRecord>()>& make_record,
+                      std::uint64_t& sequence) {
+  const auto written = edits.once(key, content, deadline, [&]() -> Result<std::uint64_t> {
     auto record = make_record();
     if (!record.ok()) return record.status();
-    return core.mapper.submit_and_wait(std::move(record).value());
+    return mapper.submit_and_wait(std::move(record).value());
   });
   if (!written.ok()) return written.status();
   sequence = *written;
-  return core.mapper.wait_applied(sequence, deadline.at);
+  return mapper.wait_applied(sequence, deadline.at);
 }
 
 Status check_note(const std::string& note) {

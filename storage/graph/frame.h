@@ -10,6 +10,8 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -219,6 +221,9 @@ struct Observation {
 struct FrameWarm {
   std::vector<Observation> observations;  // tracked ones in the order of Keyframe::tracks, then bound ones
 };
+
+// The word of each feature, under the map's vocabulary, which storage does not know. Thread-safe.
+using WordFunction = std::function<std::vector<std::uint32_t>(std::span<const AppearanceFeature>)>;
 
 struct FrameCold {
   std::vector<AppearanceFeature> appearance;

@@ -6,7 +6,7 @@
 
 #include "proto/base/status.h"
 #include "storage/engine/engine.h"
-#include "storage/graph/word_function.h"
+#include "storage/graph/frame.h"
 #include "storage/maintenance/finding.h"
 
 namespace relmap::storage {

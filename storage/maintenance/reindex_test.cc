@@ -8,7 +8,7 @@
 #include <set>
 
 #include "server/map/mapper.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
 #include "storage/maintenance/testing/driven_map.h"

@@ -1,9 +1,8 @@
 #include "tests/support/bench_figures.h"
 
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "tests/support/process.h"
@@ -12,20 +11,20 @@ namespace relmap::testing {
 
 namespace {
 
-// Moves `at` beyond the number.
-double read_number(const char*& at) {
-  constexpr char kNull[] = "null";
-  if (std::strncmp(at, kNull, sizeof kNull - 1) == 0) {
-    at += sizeof kNull - 1;
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  char* end = nullptr;
-  const double number = std::strtod(at, &end);
-  at = end;
-  return number;
+double number_of(const nlohmann::json& value) {
+  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }
 
 }  // namespace
+
+struct BenchFigures::Parsed {
+  nlohmann::json json;
+
+  const nlohmann::json& at(const std::string& key) const {
+    if (!json.contains(key)) throw std::runtime_error("no figure " + key);
+    return json.at(key);
+  }
+};
 
 BenchFigures::BenchFigures(const std::vector<std::string>& arguments, std::chrono::milliseconds patience) {
   std::vector<std::string> command{built_program("relmap-bench")};
@@ -33,28 +32,15 @@ BenchFigures::BenchFigures(const std::vector<std::string>& arguments, std::chron
   command.push_back("--json");
   const Finished done = run_program(command, patience);
   if (done.exit_code != 0) throw std::runtime_error("relmap-bench: " + done.standard_error);
-  json_ = done.standard_output;
-  std::printf("%s%s", done.standard_error.c_str(), json_.c_str());
+  std::printf("%s%s", done.standard_error.c_str(), done.standard_output.c_str());
+  parsed_ = std::make_shared<const Parsed>(Parsed{nlohmann::json::parse(done.standard_output)});
 }
 
-const char* BenchFigures::find(const std::string& key) const {
-  const std::string label = "\"" + key + "\": ";
-  const std::size_t at = json_.find(label);
-  if (at == std::string::npos) throw std::runtime_error("no figure " + key);
-  return json_.c_str() + at + label.size();
-}
-
-double BenchFigures::operator[](const std::string& key) const {
-  const char* at = find(key);
-  return read_number(at);
-}
+double BenchFigures::operator[](const std::string& key) const { return number_of(parsed_->at(key)); }
 
 std::vector<double> BenchFigures::series(const std::string& key) const {
   std::vector<double> numbers;
-  for (const char* at = find(key); *at == '[' || *at == ',';) {
-    at += std::strspn(at, "[, ");
-    numbers.push_back(read_number(at));
-  }
+  for (const nlohmann::json& value : parsed_->at(key)) numbers.push_back(number_of(value));
   return numbers;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,8 @@ class BenchFigures {
   std::vector<double> series(const std::string& key) const;
 
  private:
-  const char* find(const std::string& key) const;
-  std::string json_;
+  struct Parsed;
+  std::shared_ptr<const Parsed> parsed_;
 };
 
 }  // namespace relmap::testing

@@ -11,7 +11,7 @@
 #include "server/intake/ingest_server.h"
 #include "server/map/map_builder.h"
 #include "server/map/mapper.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 #include "storage/engine/memory_engine.h"
 #include "storage/maintenance/verify.h"
 #include "tools/sim/points_world.h"

@@ -1,7 +1,6 @@
 #include "tests/support/simulated_fleet.h"
 
-#include <cstdio>
-#include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "tests/support/process.h"
@@ -14,15 +13,10 @@ constexpr int kPairs = 125;
 
 // The first left camera of a recording in the world of its circuit.
 SE3 read_first_pose(const std::string& recording) {
-  const std::string text = read_text(recording + "/sim.json"), key = "\"T_world_first\": [";
-  if (text.find(key) == std::string::npos) throw std::runtime_error(recording + "/sim.json has no " + key);
-  const char* at = text.c_str() + text.find(key) + key.size();
-  Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m;
-  for (int i = 0; i < 12; ++i) {
-    char* end = nullptr;
-    m.data()[i] = std::strtod(at, &end);
-    at = end + 1;
-  }
+  const auto numbers =
+      nlohmann::json::parse(read_text(recording + "/sim.json")).at("T_world_first").get<std::vector<double>>();
+  if (numbers.size() != 12) throw std::runtime_error(recording + "/sim.json: T_world_first has not 12 numbers");
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m(numbers.data());
   return SE3{m.leftCols<3>(), m.col(3)}.normalized();
 }
 

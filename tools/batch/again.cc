@@ -1,11 +1,12 @@
 #include "tools/batch/again.h"
 
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
 #include <utility>
+
+#include "proto/base/hex.h"
 
 namespace relmap::batch {
 
@@ -26,9 +27,7 @@ std::string path_of(const std::string& folder, const std::string& map, const Rec
   std::string last;
   for (const Sequence& sequence : sequences)
     if (std::exchange(last, sequence.path) != sequence.path) command += "\n\t\t" + sequence.path;
-  char name[32];
-  std::snprintf(name, sizeof name, "again-%016llx", static_cast<unsigned long long>(hash_text(command, 0)));
-  return folder + '/' + name;
+  return folder + "/again-" + hex(std::uint64_t{hash_text(command, 0)});
 }
 
 }  // namespace

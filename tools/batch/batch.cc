@@ -6,8 +6,8 @@
 #include <map>
 #include <utility>
 
+#include "proto/base/names.h"
 #include "proto/base/number_text.h"
-#include "proto/keyframe/usual_robot.h"
 
 namespace relmap::batch {
 

@@ -4,8 +4,8 @@
 #include <map>
 #include <ostream>
 
+#include "proto/base/json.h"
 #include "proto/base/number_text.h"
-#include "tools/terminal/json.h"
 
 namespace relmap::batch {
 
@@ -115,15 +115,15 @@ void print_left_out(const Task& task, terminal::Console& console) {
     console.out() << "  and " << count_text(all.size() - kNamed) << " more, which --json names\n";
 }
 
-std::vector<terminal::Json> json_of(const std::vector<Status>& statuses) {
-  std::vector<terminal::Json> list;
+std::vector<Json> json_of(const std::vector<Status>& statuses) {
+  std::vector<Json> list;
   for (const Status& status : statuses)
-    list.push_back(terminal::Json().add("reason", reason_name(status.reason())).add("message", status.message()));
+    list.push_back(Json().add("reason", reason_name(status.reason())).add("message", status.message()));
   return list;
 }
 
-terminal::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
-  terminal::Json json;
+Json json_of(const std::map<std::string, std::uint64_t>& counts) {
+  Json json;
   for (const auto& [reason, n] : counts) json.add(reason, n);
   return json;
 }
@@ -204,11 +204,11 @@ void print_report(const std::vector<ReportRow>& rows, terminal::Console& console
 }
 
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
-  std::vector<terminal::Json> sequences;
+  std::vector<Json> sequences;
   std::uint64_t pairs = 0, keyframes = 0, failed = 0, incomplete = 0, untrusted = 0;
   for (const ReportRow& row : rows) {
     const Task& task = *row.task;
-    terminal::Json json;
+    Json json;
     json.add("path", task.sequence.path)
         .add("name", task.sequence.session)
         .add("uuid", task.sequence.uuid.to_string())
@@ -238,9 +238,8 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("gaps", task.summary.gaps);
     if (!row.doubt.empty()) json.add("calibration_in_doubt", row.doubt);
     if (!task.failure.ok())
-      json.add(
-          "error",
-          terminal::Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));
+      json.add("error",
+               Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));
     sequences.push_back(std::move(json));
     pairs += task.summary.pairs;
     keyframes += row.keyframes;
@@ -248,7 +247,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
     incomplete += row.lost() > 0;
     untrusted += row.untrusted();
   }
-  return terminal::Json()
+  return Json()
       .add("sequences", sequences)
       .add("frames", pairs)
       .add("keyframes", keyframes)

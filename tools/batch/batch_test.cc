@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "proto/base/names.h"
-#include "proto/keyframe/usual_robot.h"
 #include "tools/batch/again.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"

@@ -5,55 +5,70 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace relmap::batch {
 
 namespace {
 
+using Document = nlohmann::json;
+
 constexpr std::size_t kMaxText = std::size_t{64} << 20;  // a summary names every picture that was left out
 
 Status system_error(const std::string& what) { return {Reason::IO_ERROR, what + ": " + std::strerror(errno)}; }
 
-// JSON is YAML.
-std::optional<YAML::Node> parse(const std::string& json) try {
-  YAML::Node node = YAML::Load(json);
-  if (!node.IsMap()) return std::nullopt;
-  return node;
-} catch (const YAML::Exception&) {
-  return std::nullopt;
+// An object.
+std::optional<Document> parse(const std::string& json) {
+  Document document = Document::parse(json, nullptr, false);
+  if (!document.is_object()) return std::nullopt;
+  return document;
 }
 
-std::uint64_t number(const YAML::Node& node, const char* key) { return node[key] ? node[key].as<std::uint64_t>(0) : 0; }
-
-std::string text(const YAML::Node& node, const char* key) {
-  return node[key] && node[key].IsScalar() && node[key].Scalar() != "null" ? node[key].Scalar() : "";
+// What is missing, or of another type, is 0, empty or an empty list: an older front-end did not say it.
+const Document& member(const Document& object, const char* key) {
+  static const Document kNull;
+  const auto found = object.is_object() ? object.find(key) : object.end();
+  return found == object.end() ? kNull : *found;
 }
 
-std::map<std::string, std::uint64_t> counts(const YAML::Node& node) {
+std::uint64_t number(const Document& value) { return value.is_number_unsigned() ? value.get<std::uint64_t>() : 0; }
+std::uint64_t number(const Document& object, const char* key) { return number(member(object, key)); }
+
+std::optional<double> real_number(const Document& object, const char* key) {
+  const Document& value = member(object, key);
+  return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
+}
+
+std::string text(const Document& object, const char* key) {
+  const Document& value = member(object, key);
+  return value.is_string() ? value.get<std::string>() : "";
+}
+
+std::map<std::string, std::uint64_t> counts(const Document& object) {
   std::map<std::string, std::uint64_t> counts;
-  if (node && node.IsMap())
-    for (const auto& entry : node) counts[entry.first.Scalar()] = entry.second.as<std::uint64_t>(0);
+  if (object.is_object())
+    for (const auto& [name, count] : object.items()) counts[name] = number(count);
   return counts;
 }
 
 // Of an object that has its members.
-std::optional<RecordingIdentity> recording_of(const YAML::Node& node) {
-  if (!node || !node.IsMap() || !node["fingerprint"]) return std::nullopt;
-  return RecordingIdentity{text(node, "fingerprint"), number(node, "count"), text(node, "contents"),
-                           text(node, "calibration")};
+std::optional<RecordingIdentity> recording_of(const Document& object) {
+  if (!object.contains("fingerprint")) return std::nullopt;
+  return RecordingIdentity{text(object, "fingerprint"), number(object, "count"), text(object, "contents"),
+                           text(object, "calibration")};
 }
 
-std::vector<std::string> texts(const YAML::Node& node) {
+std::vector<std::string> texts(const Document& list) {
   std::vector<std::string> texts;
-  if (node && node.IsSequence())
-    for (const YAML::Node& entry : node) texts.push_back(entry.Scalar());
+  if (list.is_array())
+    for (const Document& entry : list)
+      if (entry.is_string()) texts.push_back(entry.get<std::string>());
   return texts;
 }
 
@@ -64,11 +79,11 @@ Reason reason_named(const std::string& name) {
 }
 
 // [{"reason": ..., "message": ...}, ...]
-std::vector<Status> statuses(const YAML::Node& node) {
+std::vector<Status> statuses(const Document& list) {
   std::vector<Status> statuses;
-  if (node && node.IsSequence())
-    for (const YAML::Node& entry : node)
-      if (entry.IsMap()) statuses.emplace_back(reason_named(text(entry, "reason")), text(entry, "message"));
+  if (list.is_array())
+    for (const Document& entry : list)
+      statuses.emplace_back(reason_named(text(entry, "reason")), text(entry, "message"));
   return statuses;
 }
 
@@ -91,7 +106,7 @@ Status failure_in(const std::string& text, const std::string& otherwise) {
 
 Result<Summary> read_summary(const std::string& json) {
   const auto node = parse(json);
-  if (!node || !(*node)["keyframes"]) return {Reason::CORRUPT, "no summary of a front-end"};
+  if (!node || !node->contains("keyframes")) return {Reason::CORRUPT, "no summary of a front-end"};
   Summary summary;
   summary.json = json;
   summary.pairs = number(*node, "pairs");
@@ -99,29 +114,27 @@ Result<Summary> read_summary(const std::string& json) {
   summary.keyframes = number(*node, "keyframes");
   summary.unsettled = number(*node, "unsettled");
   summary.gaps = number(*node, "gaps");
-  if (const auto share = (*node)["metric_share"]; share && share.IsScalar()) summary.metric_share = share.as<double>(0);
-  summary.refused = counts((*node)["refused"]);
-  summary.unreadable = counts((*node)["unreadable"]);
-  summary.stamps_refused = counts((*node)["stamps_refused"]);
-  summary.trusted = text(*node, "trusted") != "false";
+  summary.metric_share = real_number(*node, "metric_share");
+  summary.refused = counts(member(*node, "refused"));
+  summary.unreadable = counts(member(*node, "unreadable"));
+  summary.stamps_refused = counts(member(*node, "stamps_refused"));
+  summary.trusted = member(*node, "trusted") != false;
   summary.expected = number(*node, "expected");
   summary.seen = number(*node, "seen");
   summary.measured = number(*node, "measured");
-  if (const auto share = (*node)["measured_share"]; share && share.IsScalar())
-    summary.measured_share = share.as<double>(0);
-  if (const auto missing = (*node)["missing"]; missing && missing.IsMap()) {
-    summary.missing = number(missing, "count");
-    summary.missing_first = texts(missing["first"]);
-  }
-  summary.findings = statuses((*node)["findings"]);
-  summary.left_out = statuses((*node)["left_out"]);
-  summary.recording = recording_of((*node)["recording"]);
+  summary.measured_share = real_number(*node, "measured_share");
+  const Document& missing = member(*node, "missing");
+  summary.missing = number(missing, "count");
+  summary.missing_first = texts(member(missing, "first"));
+  summary.findings = statuses(member(*node, "findings"));
+  summary.left_out = statuses(member(*node, "left_out"));
+  summary.recording = recording_of(member(*node, "recording"));
   return summary;
 }
 
 std::optional<RecordingIdentity> read_recording(const std::string& json) {
   const auto node = parse(json);
-  return node ? recording_of((*node)["recording"]) : std::nullopt;
+  return node ? recording_of(member(*node, "recording")) : std::nullopt;
 }
 
 std::uint64_t Summary::refused_in_all() const {
@@ -230,7 +243,7 @@ void FrontEnd::take_lines() {
       continue;
     }
     const auto node = parse(line);
-    if (!node || !(*node)["pairs"]) {
+    if (!node || !node->contains("pairs")) {
       lines_.push_back(line);
       continue;
     }
@@ -295,14 +308,14 @@ std::string front_end_program() {
 namespace {
 
 // The lines that relmap-frontend says of them, each an object.
-Result<std::vector<YAML::Node>> listed(const std::vector<std::string>& arguments) {
+Result<std::vector<Document>> listed(const std::vector<std::string>& arguments) {
   std::vector<std::string> command{front_end_program(), "--list"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   auto front_end = FrontEnd::start(command);
   if (!front_end.ok()) return front_end.status();
   while (!front_end->take()) front_end->wait(1000);
   if (!front_end->status().ok()) return front_end->status();
-  std::vector<YAML::Node> nodes;
+  std::vector<Document> nodes;
   for (const std::string& line : front_end->lines()) {
     auto node = parse(line);
     if (!node) return {Reason::CORRUPT, "relmap-frontend --list said: " + line};
@@ -315,7 +328,7 @@ Result<std::vector<LoggedSession>> list_log(const std::string& path) {
   const auto nodes = listed({"--source", "log", path});
   if (!nodes.ok()) return nodes.status();
   std::vector<LoggedSession> sessions;
-  for (const YAML::Node& node : *nodes) {
+  for (const Document& node : *nodes) {
     const auto uuid = SessionUuid::parse(text(node, "uuid"));
     if (!uuid) return {Reason::CORRUPT, "relmap-frontend --list named a session without a uuid"};
     sessions.push_back({*uuid, text(node, "name"), static_cast<std::uint32_t>(number(node, "first")),
@@ -330,13 +343,13 @@ Result<PhotographFolder> list_photographs(const std::string& path, const Recordi
   const auto nodes = listed(arguments);
   if (!nodes.ok()) return nodes.status();
   PhotographFolder folder;
-  for (const YAML::Node& node : *nodes) {
+  for (const Document& node : *nodes) {
     Status unlisted;
-    if (const auto error = node["error"]; error && error.IsMap())
+    if (const Document& error = member(node, "error"); error.is_object())
       unlisted = {reason_named(text(error, "reason")), text(error, "message")};
     folder.cameras.push_back({text(node, "camera"), number(node, "pictures"), recording_of(node), unlisted});
-    folder.folders_passed_over = texts(node["folders_passed_over"]);
-    folder.files_passed_over = texts(node["files_passed_over"]);
+    folder.folders_passed_over = texts(member(node, "folders_passed_over"));
+    folder.files_passed_over = texts(member(node, "files_passed_over"));
   }
   return folder;
 }
@@ -348,9 +361,8 @@ Result<ListedRecording> list_recording(const std::string& path, const RecordingO
   if (!nodes.ok()) return nodes.status();
   const auto recording = nodes->size() == 1 ? recording_of(nodes->front()) : std::nullopt;
   if (!recording) return {Reason::CORRUPT, "relmap-frontend --list did not say what " + path + " is"};
-  const YAML::Node rate = nodes->front()["supposed_rate_hz"];
   return ListedRecording{*recording, text(nodes->front(), "robot"), text(nodes->front(), "name"),
-                         rate && rate.IsScalar() ? rate.as<double>(0) : 0};
+                         real_number(nodes->front(), "supposed_rate_hz").value_or(0)};
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <set>
 
 #include "proto/base/names.h"
-#include "proto/keyframe/usual_robot.h"
 
 namespace relmap::batch {
 

@@ -6,7 +6,7 @@
 #include <system_error>
 #include <utility>
 
-#include "tools/terminal/json.h"
+#include "proto/base/json.h"
 
 namespace relmap::batch {
 
@@ -39,8 +39,8 @@ Summary SummaryStore::read(const SessionUuid& uuid) const {
 }
 
 Status SummaryStore::begin(const SessionUuid& uuid, const RecordingIdentity& recording) const {
-  return write(path_of(uuid, kSummary), terminal::Json()
-                                            .add("recording", terminal::Json()
+  return write(path_of(uuid, kSummary), Json()
+                                            .add("recording", Json()
                                                                   .add("fingerprint", recording.fingerprint)
                                                                   .add("count", recording.count)
                                                                   .add("contents", recording.contents)

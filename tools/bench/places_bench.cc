@@ -8,7 +8,7 @@
 #include <random>
 
 #include "server/place/place_index.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 #include "storage/testing/endless_drive.h"
 #include "storage/testing/temporary_folder.h"
 #include "tools/bench/subcommand.h"

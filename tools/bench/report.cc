@@ -6,6 +6,8 @@
 #include <numeric>
 #include <ostream>
 
+#include "proto/base/json.h"
+
 namespace relmap::bench {
 
 namespace {
@@ -29,17 +31,14 @@ void Report::add(std::string key, std::vector<double> values, std::string meanin
 }
 
 void Report::print_json(std::ostream& out) const {
-  out << "{";
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    out << (k == 0 ? "\n  \"" : ",\n  \"") << rows_[k].key << "\": ";
-    if (rows_[k].series.empty()) {
-      out << text(rows_[k].value);
-      continue;
-    }
-    for (std::size_t i = 0; i < rows_[k].series.size(); ++i) out << (i == 0 ? "[" : ", ") << text(rows_[k].series[i]);
-    out << "]";
+  Json json;
+  for (const Row& row : rows_) {
+    if (row.series.empty())
+      json.add(row.key, row.value);
+    else
+      json.add(row.key, row.series);
   }
-  out << "\n}\n";
+  out << json.text_lines();
 }
 
 void Report::print_table(std::ostream& out) const {
@@ -50,13 +49,6 @@ void Report::print_table(std::ostream& out) const {
     out << row.key << std::string(width + 2 - row.key.size(), ' ')
         << std::string(12 - std::min<std::size_t>(12, value.size()), ' ') << value << "  " << row.meaning << '\n';
   }
-}
-
-double quantile(std::vector<double> samples, double q) {
-  if (samples.empty()) return 0;
-  const auto at = samples.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(samples.size() - 1));
-  std::nth_element(samples.begin(), at, samples.end());
-  return *at;
 }
 
 double mean(const std::vector<double>& samples) {

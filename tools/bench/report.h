@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "proto/base/quantile.h"
+
 namespace relmap::bench {
 
 class Report {
@@ -28,8 +30,6 @@ class Report {
   std::vector<Row> rows_;
 };
 
-// The value below which a share q (0..1) of the samples lies; 0 for none.
-double quantile(std::vector<double> samples, double q);
 double mean(const std::vector<double>& samples);
 double deviation(const std::vector<double>& samples);  // standard, of the population they are drawn from
 

@@ -10,8 +10,8 @@
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/raw_log_writer.h"
 #include "proto/base/clock.h"
+#include "proto/base/json.h"
 #include "tools/camera/commands.h"
-#include "tools/terminal/json.h"
 #include "tools/terminal/progress_bar.h"
 
 namespace relmap::camera {
@@ -81,10 +81,10 @@ Result<ExitCode> record(const GlobalOptions& options, terminal::Console& console
   const capture::RawLogCounts counts = (*log)->counts();
   const iidc::LiveCounts live = camera->live->counts();
   if (options.json) {
-    std::vector<terminal::Json> faults;
+    std::vector<Json> faults;
     for (const auto& [reason, count] : live.faults)
-      faults.push_back(terminal::Json().add("reason", reason_name(reason)).add("count", count));
-    terminal::Json json;
+      faults.push_back(Json().add("reason", reason_name(reason)).add("count", count));
+    Json json;
     json.add("file", wish.file)
         .add("frames", counts.frames)
         .add("bytes", counts.bytes)
@@ -139,7 +139,7 @@ Result<ExitCode> replay(const GlobalOptions& options, terminal::Console& console
     rate = text;
   }
   if (options.json) {
-    console.reply(terminal::Json()
+    console.reply(Json()
                       .add("file", wish.file)
                       .add("serial", log->header().serial)
                       .add("model", log->header().model)

@@ -11,8 +11,8 @@
 
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/rig_check.h"
+#include "proto/base/json.h"
 #include "tools/camera/commands.h"
-#include "tools/terminal/json.h"
 #include "tools/terminal/progress_bar.h"
 
 namespace relmap::camera {
@@ -113,7 +113,7 @@ Result<ExitCode> show(const GlobalOptions& options, terminal::Console& console, 
     if (!cv::imwrite(path, side_by_side(frame, rectifier.has_value())))
       return {Reason::IO_ERROR, "cannot write " + path};
     if (options.json)
-      console.reply(terminal::Json().add("file", path).add("time", terminal::time_text(frame.time_us)).text());
+      console.reply(Json().add("file", path).add("time", terminal::time_text(frame.time_us)).text());
     else
       console.out() << path << '\n';
     ++shown;
@@ -130,8 +130,8 @@ struct CheckOptions {
 std::string percent(double share) { return terminal::fixed(100 * share, 1) + " %"; }
 std::string pixels(std::optional<double> value) { return value ? terminal::fixed(*value, 2) + " px" : "not known"; }
 
-terminal::Json json_of(const vision::EyeReport& eye) {
-  terminal::Json json;
+Json json_of(const vision::EyeReport& eye) {
+  Json json;
   json.add("mean", eye.mean).add("deviation", eye.deviation).add("saturated", eye.saturated).add("black", eye.black);
   if (eye.edge_width) json.add("edge_width_px", *eye.edge_width);
   return json;
@@ -214,13 +214,13 @@ Result<ExitCode> check(const GlobalOptions& options, terminal::Console& console,
   if (wish.raw)
     std::erase_if(report.findings, [](const Status& finding) { return finding.reason() == Reason::ROWS_APART; });
   if (options.json) {
-    std::vector<terminal::Json> findings;
+    std::vector<Json> findings;
     for (const Status& finding : report.findings)
-      findings.push_back(terminal::Json()
+      findings.push_back(Json()
                              .add("reason", reason_name(finding.reason()))
                              .add("message", finding.message())
                              .add("advice", vision::rig_advice(finding.reason())));
-    console.reply(terminal::Json()
+    console.reply(Json()
                       .add("pairs", std::uint64_t(report.pairs))
                       .add("matches", std::uint64_t(report.matches))
                       .add("rectified", !wish.raw)

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "proto/base/json.h"
 #include "tools/camera/commands.h"
-#include "tools/terminal/json.h"
 
 namespace relmap::camera {
 
@@ -56,8 +56,8 @@ std::string takes_text(const FeatureState& state) {
   return text;
 }
 
-terminal::Json json_of(const FeatureState& state) {
-  terminal::Json json;
+Json json_of(const FeatureState& state) {
+  Json json;
   json.add("feature", iidc::feature_name(state.feature))
       .add("on", state.on)
       .add("auto", state.automatic)
@@ -109,7 +109,7 @@ Result<ExitCode> list(const GlobalOptions& options, terminal::Console& console) 
     const std::string state = camera.usable.ok() ? "ready" : camera.usable.to_string();
     const std::string calibration = camera.serial.empty() ? "" : calibration_text(folder, camera.serial);
     if (options.json) {
-      terminal::Json json;
+      Json json;
       json.add("serial", camera.serial)
           .add("guid", iidc::guid_text(camera.guid))
           .add("vendor", camera.vendor)
@@ -148,16 +148,16 @@ Result<ExitCode> info(const GlobalOptions& options, terminal::Console& console, 
                                                                                    : "1.04");
   const std::string calibration = calibration_text(folder_of(options), address.serial);
   if (options.json) {
-    std::vector<terminal::Json> mode_list, feature_list;
+    std::vector<Json> mode_list, feature_list;
     for (const iidc::ModeInfo& mode : *modes)
-      mode_list.push_back(terminal::Json()
+      mode_list.push_back(Json()
                               .add("mode", mode.mode.name())
                               .add("width", std::uint64_t(mode.width))
                               .add("height", std::uint64_t(mode.height))
                               .add("codings", codings_text(mode))
                               .add("two_eyes", two_eyes(mode)));
     for (const FeatureState& state : *features) feature_list.push_back(json_of(state));
-    console.reply(terminal::Json()
+    console.reply(Json()
                       .add("serial", address.serial)
                       .add("guid", iidc::guid_text(address.guid))
                       .add("vendor", address.vendor)

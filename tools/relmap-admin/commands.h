@@ -6,9 +6,9 @@
 #include <string>
 
 #include "client/admin_types.h"
+#include "proto/base/json.h"
 #include "proto/base/status.h"
 #include "tools/terminal/console.h"
-#include "tools/terminal/json.h"
 #include "tools/terminal/progress_bar.h"
 
 namespace relmap::admin {
@@ -29,7 +29,7 @@ struct Context {
 struct Answer {
   Status status;
   bool damage = false;
-  terminal::Json json;  // beside reason and message
+  Json json;  // beside reason and message
 };
 using Action = std::function<Answer(Context&)>;
 

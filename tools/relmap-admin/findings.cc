@@ -9,9 +9,9 @@ void print_finding(const Context& context, const storage::Finding& finding) {
   const std::string frame = finding.frame.session == 0 ? "" : finding.frame.to_string();
   context.say(reason + "  " + (frame.empty() ? "" : "frame " + frame + ": ") + finding.what +
               (finding.repaired ? "  (mended)" : ""));
-  terminal::Json json;
+  Json json;
   json.add("reason", reason).add("frame", frame).add("message", finding.what).add("repaired", finding.repaired);
-  context.console.reply(terminal::Json().add("finding", json).text());
+  context.console.reply(Json().add("finding", json).text());
 }
 
 storage::OnProgress maintenance_progress(const Context& context) {

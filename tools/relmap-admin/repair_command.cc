@@ -25,9 +25,9 @@ std::string list(const std::vector<Item>& items) {
   return all.empty() ? "none" : all;
 }
 template <typename Item>
-std::vector<terminal::Json> documents(const std::vector<Item>& items) {
-  std::vector<terminal::Json> all;
-  for (const Item& item : items) all.push_back(terminal::Json().add("range", text(item)));
+std::vector<Json> documents(const std::vector<Item>& items) {
+  std::vector<Json> all;
+  for (const Item& item : items) all.push_back(Json().add("range", text(item)));
   return all;
 }
 

@@ -64,7 +64,7 @@ Answer show_stats(const std::string& directory, Context& context) {
   const auto stats = target->daemon ? target->daemon->stats() : stats_of(target->engine);
   if (!stats.ok()) return {stats.status(), stats.reason() == Reason::DATA_LOSS, {}};
   if (!context.console.json) print(*stats, context);
-  terminal::Json properties;
+  Json properties;
   for (const auto& [name, value] : stats->properties) properties.add(name, value);
   Answer answer;
   answer.json.add("sessions", stats->status.sessions)

@@ -73,7 +73,7 @@ Status check_free(const std::string& directory) {
 
 Status check_interrupt() { return terminal::interrupted() ? Status(Reason::DEADLINE, "interrupted") : Status(); }
 
-void add_map(terminal::Json& json, const MapIdentity& map) {
+void add_map(Json& json, const MapIdentity& map) {
   if (map.known()) json.add("map_uuid", map.uuid.to_string()).add("map_epoch", map.epoch);
 }
 

@@ -26,7 +26,7 @@ Result<Target> open_target(const Context& context, const std::string& directory,
 Status check_free(const std::string& directory);
 
 // Which map it is, as keys of an answer: "map_uuid" and "map_epoch", if it is known.
-void add_map(terminal::Json& json, const MapIdentity& map);
+void add_map(Json& json, const MapIdentity& map);
 
 // The engine's progress on the bar; DEADLINE once interrupted.
 storage::EngineProgress engine_progress(const Context& context, const std::string& step);

@@ -3,12 +3,12 @@
 #include <memory>
 #include <ostream>
 
+#include "proto/base/json.h"
 #include "proto/base/number_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
 #include "tools/relmap/output_files.h"
 #include "tools/relmap/view_options.h"
-#include "tools/terminal/json.h"
 
 namespace relmap::cli {
 
@@ -56,7 +56,7 @@ class Report {
   }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
     if (json_)
-      left_out_.push_back(terminal::Json().add("root", root).add("frames", frames));
+      left_out_.push_back(Json().add("root", root).add("frames", frames));
     else
       err_ << "left out: " << title << '\n';
   }
@@ -82,9 +82,9 @@ class Report {
     if (items.size() > kMaxTold) err_ << "  and " << items.size() - kMaxTold << " more (--json has all)\n";
   }
   void add_json(const Part& part) {
-    std::vector<terminal::Json> tears, doubtful;
+    std::vector<Json> tears, doubtful;
     for (const Tear& tear : part.tears)
-      tears.push_back(terminal::Json()
+      tears.push_back(Json()
                           .add("edge", tear.edge.to_string())
                           .add("from", tear.a.to_string())
                           .add("to", tear.b.to_string())
@@ -92,7 +92,7 @@ class Report {
                           .add("degrees", tear.degrees)
                           .add("sigmas", tear.sigmas));
     for (const DoubtfulStep& step : part.doubtful) {
-      terminal::Json json;
+      Json json;
       json.add("edge", step.edge.to_string()).add("from", step.a.to_string()).add("to", step.b.to_string());
       if (step.carried_by.empty())
         json.add("guess", step.guess).add("sigma", step.sigma_m);
@@ -100,7 +100,7 @@ class Report {
         json.add("carriedBy", step.carried_by.front().to_string());
       doubtful.push_back(json.add("beside", name_of(step.beside)));
     }
-    terminal::Json json;
+    Json json;
     json.add("file", part.file).add("root", part.root).add("frames", part.frames);
     if (part.has_landmarks) json.add("landmarks", part.landmarks);
     files_.push_back(json.add("tears", tears).add("doubtful", doubtful));
@@ -109,8 +109,8 @@ class Report {
   const bool json_;
   std::ostream& out_;
   std::ostream& err_;
-  terminal::Json whole_;
-  std::vector<terminal::Json> files_, left_out_;
+  Json whole_;
+  std::vector<Json> files_, left_out_;
 };
 
 std::string title_of(const RelaxedMap& map, std::size_t number) {

@@ -9,6 +9,7 @@
 #include <ostream>
 #include <set>
 
+#include "proto/base/json.h"
 #include "proto/base/number_text.h"
 
 namespace relmap::cli {
@@ -69,19 +70,6 @@ Rgb session_colour(SessionNumber session) {
   static constexpr Rgb kColours[] = {{0, 114, 178},  {230, 159, 0}, {0, 158, 115},  {204, 121, 167},
                                      {86, 180, 233}, {213, 94, 0},  {240, 228, 66}, {90, 90, 90}};
   return kColours[(session - 1) % std::size(kColours)];
-}
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      (out += '\\') += c;
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += format("\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
-    else
-      out += c;
-  }
-  return out + '"';
 }
 
 template <typename Items, typename Text>
@@ -148,18 +136,28 @@ class Features {
   bool first_ = true;
 };
 
+double rounded(double value, double unit) { return std::round(value / unit) * unit; }
+
 std::string tear_json(const Tear& tear) {
-  return "{\"edge\":" + quoted(tear.edge.to_string()) +
-         format(",\"metres\":%.4f,\"degrees\":%.3f,\"sigmas\":%.2f}", tear.metres, tear.degrees, tear.sigmas);
+  return Json()
+      .add("edge", tear.edge.to_string())
+      .add("metres", rounded(tear.metres, 1e-4))
+      .add("degrees", rounded(tear.degrees, 1e-3))
+      .add("sigmas", rounded(tear.sigmas, 1e-2))
+      .text();
 }
 
 std::string step_json(const DoubtfulStep& step) {
-  const std::string what =
-      step.carried_by.empty()
-          ? "\"guess\":" + quoted(step.guess) + format(",\"sigma\":%.3f", step.sigma_m)
-          : "\"carriedBy\":" + json_list(step.carried_by, [](EdgeId id) { return quoted(id.to_string()); });
-  return "{\"edge\":" + quoted(step.edge.to_string()) + ',' + what + ",\"beside\":" + quoted(name_of(step.beside)) +
-         '}';
+  Json json;
+  json.add("edge", step.edge.to_string());
+  if (step.carried_by.empty()) {
+    json.add("guess", step.guess).add("sigma", rounded(step.sigma_m, 1e-3));
+  } else {
+    std::vector<std::string> carried_by;
+    for (const EdgeId id : step.carried_by) carried_by.push_back(id.to_string());
+    json.add("carriedBy", carried_by);
+  }
+  return json.add("beside", name_of(step.beside)).text();
 }
 
 }  // namespace
@@ -298,14 +296,15 @@ void write_ply_tail(const RelaxedMap& map, std::size_t number, std::ostream& out
 
 void write_geojson(const RelaxedMap& map, std::size_t number, const std::optional<Geodetic>& place, std::ostream& out) {
   const MapPart& part = map.parts.at(number);
-  out << R"({"type":"FeatureCollection","root":)" << quoted(part.root.to_string()) << R"(,"roots":)"
-      << json_list(map.parts, [](const MapPart& other) { return quoted(other.root.to_string()); }) << R"(,"part":)"
-      << number + 1 << R"(,"parts":)" << map.parts.size() << R"(,"frames":)" << part.frames.size() << R"(,"located":)"
-      << (place ? "true" : "false") << R"(,"tears":)" << json_list(part.tears, tear_json) << R"(,"doubtful":)"
-      << json_list(part.doubtful, step_json) << R"(,"note":)"
-      << quoted(place ? "the root was put where the caller said; its y axis is taken for plumb"
-                      : "where the map lies on the Earth is not known: features have no geometry; metresInRoot has "
-                        "their positions in the frame of the root (x right, y down, z forward)")
+  out << R"({"type":"FeatureCollection","root":)" << Json::quoted(part.root.to_string()) << R"(,"roots":)"
+      << json_list(map.parts, [](const MapPart& other) { return Json::quoted(other.root.to_string()); })
+      << R"(,"part":)" << number + 1 << R"(,"parts":)" << map.parts.size() << R"(,"frames":)" << part.frames.size()
+      << R"(,"located":)" << (place ? "true" : "false") << R"(,"tears":)" << json_list(part.tears, tear_json)
+      << R"(,"doubtful":)" << json_list(part.doubtful, step_json) << R"(,"note":)"
+      << Json::quoted(place
+                          ? "the root was put where the caller said; its y axis is taken for plumb"
+                          : "where the map lies on the Earth is not known: features have no geometry; metresInRoot has "
+                            "their positions in the frame of the root (x right, y down, z forward)")
       << R"(,"features":[)";
   Features features(part, place, out);
 
@@ -320,9 +319,10 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
   std::vector<FrameId> run;
   const auto end_run = [&] {
     if (!run.empty())
-      features.add(run,
-                   "\"session\":" + std::to_string(run[0].session) + ",\"name\":" + quoted(map.name(run[0].session)) +
-                       ",\"first\":" + quoted(run.front().to_string()) + ",\"last\":" + quoted(run.back().to_string()));
+      features.add(run, "\"session\":" + std::to_string(run[0].session) +
+                            ",\"name\":" + Json::quoted(map.name(run[0].session)) +
+                            ",\"first\":" + Json::quoted(run.front().to_string()) +
+                            ",\"last\":" + Json::quoted(run.back().to_string()));
     run.clear();
   };
   for (const PlacedFrame& placed : part.frames) {
@@ -334,12 +334,13 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
     const RelaxedMap::Spring& spring = map.springs[index];
     if (spring.kind == client::EdgeKind::kOdometry && !spring.doubtful) continue;
     features.add({spring.relaxed.a, spring.relaxed.b},
-                 "\"edge\":" + quoted(spring.edge.to_string()) + ",\"kind\":\"" + kind_of(spring.kind) +
+                 "\"edge\":" + Json::quoted(spring.edge.to_string()) + ",\"kind\":\"" + kind_of(spring.kind) +
                      "\",\"tear\":" + (torn.contains(spring.edge) ? "true" : "false") +
                      ",\"doubtful\":" + (spring.doubtful ? "true" : "false"));
   }
   for (const MapPart::Label& label : part.labels)
-    features.add({label.frame}, "\"label\":" + quoted(label.text) + ",\"frame\":" + quoted(label.frame.to_string()));
+    features.add({label.frame},
+                 "\"label\":" + Json::quoted(label.text) + ",\"frame\":" + Json::quoted(label.frame.to_string()));
   out << "\n]}\n";
 }
 

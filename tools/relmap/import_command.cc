@@ -9,9 +9,9 @@
 
 #include "proto/base/bytes.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/json.h"
 #include "tools/g2o/pose_graph.h"
 #include "tools/relmap/commands.h"
-#include "tools/terminal/json.h"
 #include "tools/terminal/progress_bar.h"
 
 namespace relmap::cli {
@@ -157,8 +157,8 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, terminal::Con
   if (!graph.ok()) return graph.status();
   if (graph->poses.empty()) return {Reason::CORRUPT, options.file + " holds no poses"};
   tell_left_out(*graph, console.err());
-  console.reply(terminal::Json()
-                    .add("graph", terminal::Json()
+  console.reply(Json()
+                    .add("graph", Json()
                                       .add("frames", graph->poses.size())
                                       .add("loops", graph->loops.size())
                                       .add("parallelLoops", graph->parallel_loops.size())

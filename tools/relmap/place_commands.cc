@@ -4,10 +4,10 @@
 #include <optional>
 #include <ostream>
 
+#include "proto/base/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/picture_file.h"
 #include "tools/relmap/view_options.h"
-#include "tools/terminal/json.h"
 
 namespace relmap::cli {
 
@@ -73,8 +73,8 @@ Status localise(const Seen& seen, client::Client& client, terminal::Console& con
 
 // That a picture shows no place of the map is an answer, too.
 std::string refusal_json(const Status& status) {
-  return terminal::Json()
-      .add("error", terminal::Json().add("reason", reason_name(status.reason())).add("message", status.message()))
+  return Json()
+      .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
       .text();
 }
 

@@ -7,7 +7,7 @@
 
 #include "proto/base/number_text.h"
 #include "proto/calibration/calibration.h"
-#include "proto/calibration/no_camera.h"
+#include "proto/geometry/camera.h"
 #include "tools/relmap/eye_names.h"
 #include "tools/relmap/picture_file.h"
 

@@ -11,12 +11,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
+#include "proto/base/json.h"
 #include "proto/keyframe/keyframe.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 #include "tools/sim/points_world.h"
-#include "tools/sim/progress.h"
 #include "tools/terminal/command_line.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace {
 
@@ -264,9 +265,10 @@ struct PicturesCommand {
   }
 
   void render(const relmap::sim::PictureWorld& scene, const fs::path& folder) const {
-    relmap::sim::Progress progress("rendering", "pairs", world.frames);
+    relmap::terminal::ProgressBar progress(std::cerr, relmap::terminal::is_terminal());
     std::atomic<int> next = 0;
-    std::mutex mutex;  // of progress and failure
+    int done = 0;
+    std::mutex mutex;  // of done, progress and failure
     std::exception_ptr failure;
     const auto work = [&] {
       try {
@@ -277,7 +279,8 @@ struct PicturesCommand {
             write_picture(pair.right, folder / "image_1", i);
           }
           const std::lock_guard lock(mutex);
-          progress.step();
+          progress.show("rendering", static_cast<std::uint64_t>(++done), static_cast<std::uint64_t>(world.frames),
+                        "pairs");
         }
       } catch (...) {
         next = world.frames;
@@ -302,27 +305,43 @@ struct PicturesCommand {
 
   std::string description(const SE3& T_world_first) const {
     const StereoCamera& c = world.camera;
-    std::string first = kitti_pose(T_world_first);
-    first.pop_back();
-    std::replace(first.begin(), first.end(), ' ', ',');
-    return format(
-               "{\n  \"kind\": \"pictures\",\n  \"scene\": \"%s\",\n  \"seed\": %llu,\n  \"drive_seed\": %llu,\n  "
-               "\"light\": \"%s\",\n  \"start_m\": %g,\n"
-               "  \"pairs\": %d,\n  \"laps\": "
-               "%g,\n  \"step_m\": %g,\n"
-               "  \"circuit_m\": %g,\n  \"rate_hz\": %g,\n  \"start_us\": %lld,\n",
-               scene_kind.c_str(), static_cast<unsigned long long>(world.seed),
-               static_cast<unsigned long long>(world.seed_of_drive()), light.c_str(), world.start, world.frames,
-               world.laps, world.step, world.circuit_length(), world.rate, static_cast<long long>(world.start_us)) +
-           format(
-               "  \"camera\": {\"f\": %g, \"cx\": %g, \"cy\": %g, \"baseline\": %g, \"width\": %d, \"height\": %d},\n"
-               "  \"noise\": %g,\n  \"exposure_variation\": %g,\n  \"lateral_deviation_m\": %g,\n"
-               "  \"heading_deviation_rad\": %g,\n  \"exposure_jumps\": %g,\n  \"exposure_s\": %g,\n"
-               "  \"drop_share\": %g,\n  \"ride\": \"%s\",\n  \"on_foot\": %s,\n  \"faults\": \"%s\",\n  "
-               "\"T_world_first\": [%s]\n}\n",
-               c.f, c.cx, c.cy, c.baseline, c.width, c.height, world.noise, world.exposure_variation,
-               world.lateral_deviation, world.heading_deviation, world.exposure_jumps, world.exposure_s,
-               world.drop_share, ride.c_str(), world.carried ? "false" : "true", faults.c_str(), first.c_str());
+    std::vector<double> first;
+    for (int row = 0; row < 3; ++row)
+      for (const double number :
+           {T_world_first.R(row, 0), T_world_first.R(row, 1), T_world_first.R(row, 2), T_world_first.t[row]})
+        first.push_back(number);
+    return relmap::Json()
+        .add("kind", "pictures")
+        .add("scene", scene_kind)
+        .add("seed", world.seed)
+        .add("drive_seed", world.seed_of_drive())
+        .add("light", light)
+        .add("start_m", world.start)
+        .add("pairs", world.frames)
+        .add("laps", world.laps)
+        .add("step_m", world.step)
+        .add("circuit_m", world.circuit_length())
+        .add("rate_hz", world.rate)
+        .add("start_us", world.start_us)
+        .add("camera", relmap::Json()
+                           .add("f", c.f)
+                           .add("cx", c.cx)
+                           .add("cy", c.cy)
+                           .add("baseline", c.baseline)
+                           .add("width", c.width)
+                           .add("height", c.height))
+        .add("noise", world.noise)
+        .add("exposure_variation", world.exposure_variation)
+        .add("lateral_deviation_m", world.lateral_deviation)
+        .add("heading_deviation_rad", world.heading_deviation)
+        .add("exposure_jumps", world.exposure_jumps)
+        .add("exposure_s", world.exposure_s)
+        .add("drop_share", world.drop_share)
+        .add("ride", ride)
+        .add("on_foot", !world.carried)
+        .add("faults", faults)
+        .add("T_world_first", first)
+        .text_lines();
   }
 };
 
@@ -371,23 +390,27 @@ struct PointsCommand {
     const relmap::sim::PointsWorld points(world);
     const int frames = static_cast<int>(points.size());
     std::ofstream file = create(folder / "keyframes.bin");
-    relmap::sim::Progress progress("making", "keyframes", frames);
+    relmap::terminal::ProgressBar progress(std::cerr, relmap::terminal::is_terminal());
     for (int i = 0; i < frames; ++i) {
       relmap::ByteWriter record;
       const relmap::Bytes bytes = relmap::encode_keyframe(points.keyframe(i));
       record.put(static_cast<std::uint32_t>(bytes.size()));
       record.put_bytes(bytes);
       file.write(reinterpret_cast<const char*>(record.bytes().data()), static_cast<std::streamsize>(record.size()));
-      progress.step();
+      progress.show("making", static_cast<std::uint64_t>(i) + 1, static_cast<std::uint64_t>(frames), "keyframes");
     }
     write_poses(folder / "poses.txt", frames, [&](int i) { return points.T_world_frame(i); });
-    create(folder / "sim.json") << format(
-        "{\n  \"kind\": \"points\",\n  \"shape\": \"%s\",\n  \"seed\": %llu,\n  \"noise_seed\": %llu,\n"
-        "  \"frames\": %u,\n  \"frames_per_lap\": %u,\n  \"step_m\": %g,\n  \"appearance\": %u,\n"
-        "  \"pixel_noise\": %g\n}\n",
-        shape.c_str(), static_cast<unsigned long long>(world.world_seed),
-        static_cast<unsigned long long>(world.noise_seed), world.frames, world.frames_per_lap, world.step,
-        world.appearance, world.pixel_noise);
+    create(folder / "sim.json") << relmap::Json()
+                                       .add("kind", "points")
+                                       .add("shape", shape)
+                                       .add("seed", world.world_seed)
+                                       .add("noise_seed", world.noise_seed)
+                                       .add("frames", world.frames)
+                                       .add("frames_per_lap", world.frames_per_lap)
+                                       .add("step_m", world.step)
+                                       .add("appearance", world.appearance)
+                                       .add("pixel_noise", world.pixel_noise)
+                                       .text_lines();
   }
 };
 

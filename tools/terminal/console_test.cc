@@ -4,7 +4,6 @@
 
 #include <sstream>
 
-#include "tools/terminal/json.h"
 #include "tools/terminal/progress_bar.h"
 
 namespace relmap::terminal {
@@ -42,19 +41,6 @@ TEST(Units, AreThoseThatPeopleRead) {
   EXPECT_EQ(duration_text(12 * 86400 + 5 * 3600 + 59), "12 d 5 h");
   EXPECT_EQ(vector_text({0.0001, -0.0001, -1}), "(0.000, 0.000, -1.000)");
   EXPECT_EQ(time_text(1'700'000'000'123'456), "2023-11-14T22:13:20.123Z");
-}
-
-TEST(Json, IsWhatJsonReadersRead) {
-  EXPECT_EQ(Json().text(), "{}");
-  EXPECT_EQ(Json()
-                .add("name", "a \"b\" \\ \n\x01 Z\u00fcrich")
-                .add("n", std::uint64_t{18446744073709551615u})
-                .add("yes", true)
-                .add("list", std::vector<Json>{Json().add("x", 1.5), Json()})
-                .add("inner", Json().add("none", ""))
-                .text(),
-            R"({"name":"a \"b\" \\ \n\u0001 Zürich","n":18446744073709551615,"yes":true,)"
-            R"("list":[{"x":1.5},{}],"inner":{"none":""}})");
 }
 
 TEST(ProgressBar, SaysALineAtEachStepWhereThereIsNoTerminal) {

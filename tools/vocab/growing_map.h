@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "server/place/hand_made_graph.h"
 #include "server/place/place_index.h"
+#include "server/place/testing/hand_made_graph.h"
 #include "tools/vocab/recognition_set.h"
 #include "tools/vocab/tf_idf.h"
 

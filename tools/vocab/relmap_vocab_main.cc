@@ -1,10 +1,9 @@
 // relmap-vocab: trains, describes and measures vocabularies.
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <numeric>
@@ -16,6 +15,7 @@
 #include "server/place/vocabulary_training.h"
 #include "tools/terminal/command_line.h"
 #include "tools/terminal/console.h"
+#include "tools/terminal/progress_bar.h"
 #include "tools/vocab/evaluation.h"
 #include "tools/vocab/picture_folder.h"
 #include "tools/vocab/recognition_set.h"
@@ -30,12 +30,19 @@ int fail(const Status& status) {
   return 1;
 }
 
-// One line, rewritten; silent where nobody watches.
-void show_progress(std::string_view stage, double share) {
-  if (!isatty(STDERR_FILENO)) return;
-  std::fprintf(stderr, "\r%-12.*s %5.1f %%%s", static_cast<int>(stage.size()), stage.data(), 100 * share,
-               share >= 1 ? "\n" : "");
-}
+// Shows how far the work has come, in per cent.
+class Percentage {
+ public:
+  void show(std::string_view stage, double share) {
+    bar_.show(std::string(stage), static_cast<std::uint64_t>(100 * share), 100, "%");
+  }
+  std::function<void(double)> of(const char* stage) {
+    return [this, stage](double share) { show(stage, share); };
+  }
+
+ private:
+  terminal::ProgressBar bar_{std::cerr, terminal::is_terminal()};
+};
 
 struct TrainArguments {
   std::string out;
@@ -48,10 +55,11 @@ struct TrainArguments {
 int train(const TrainArguments& arguments) {
   const auto files = list_pictures(arguments.pictures, arguments.every);
   if (!files.ok()) return fail(files.status());
-  const auto pictures =
-      describe_pictures(*files, arguments.views, [](double share) { show_progress("pictures", share); });
+  Percentage progress;
+  const auto pictures = describe_pictures(*files, arguments.views, progress.of("pictures"));
   if (!pictures.ok()) return fail(pictures.status());
-  const auto model = place::train_vocabulary(*pictures, arguments.options, show_progress);
+  const auto model = place::train_vocabulary(
+      *pictures, arguments.options, [&](std::string_view stage, double share) { progress.show(stage, share); });
   if (!model.ok()) return fail(model.status());
   if (const Status status = write_file(arguments.out, place::encode_vocabulary(*model)); !status.ok())
     return fail(status);
@@ -151,8 +159,8 @@ int measure(const EvaluateArguments& arguments) {
   if (!vocabulary.ok()) return fail(vocabulary.status());
   const auto set = load_recognition_set(arguments.set, arguments.folders);
   if (!set.ok()) return fail(set.status());
-  const auto result =
-      evaluate(*vocabulary, *set, !arguments.no_geometry, [](double done) { show_progress("pictures", done); });
+  Percentage progress;
+  const auto result = evaluate(*vocabulary, *set, !arguments.no_geometry, progress.of("pictures"));
   if (!result.ok()) return fail(result.status());
   print_evaluation(*result, !arguments.no_geometry, arguments.json);
   return 0;
@@ -162,6 +170,7 @@ int measure(const EvaluateArguments& arguments) {
 int measure_reliability(const std::vector<std::string>& sets, const EvaluateArguments& arguments) {
   const auto vocabulary = place::Vocabulary::load(arguments.vocabulary);
   if (!vocabulary.ok()) return fail(vocabulary.status());
+  Percentage progress;
   std::vector<ReliabilityCurve> curves;
   std::map<std::string, std::vector<Claim>> claims;
   for (const std::string& text : sets) {
@@ -171,7 +180,7 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
     for (std::string folder; std::getline(list, folder, ',');) folders.push_back(folder);
     const auto set = load_recognition_set(name, folders);
     if (!set.ok()) return fail(set.status());
-    const auto result = evaluate(*vocabulary, *set, false, [](double done) { show_progress("pictures", done); });
+    const auto result = evaluate(*vocabulary, *set, false, progress.of("pictures"));
     if (!result.ok()) return fail(result.status());
     auto& of_name = claims[name];
     of_name.insert(of_name.end(), result->claims.begin(), result->claims.end());

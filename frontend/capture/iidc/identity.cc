@@ -1,10 +1,10 @@
 #include "frontend/capture/iidc/identity.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "frontend/capture/iidc/register_file.h"
 #include "frontend/capture/iidc/registers.h"
+#include "proto/base/hex.h"
 
 namespace relmap::iidc {
 
@@ -17,11 +17,7 @@ std::string described(const CameraAddress& address) {
 
 }  // namespace
 
-std::string guid_text(std::uint64_t guid) {
-  char text[20];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(guid));
-  return text;
-}
+std::string guid_text(std::uint64_t guid) { return hex(guid); }
 
 std::optional<ConfigRom> identify(CameraLink& link, CameraAddress& address) {
   const auto quadlets = read_config_rom(link);

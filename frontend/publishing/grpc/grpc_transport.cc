@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cassert>
 #include <condition_variable>
-#include <cstdio>
 #include <deque>
 #include <mutex>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "client/rpc_error.h"
 #include "client/server_address.h"
 #include "frontend/publishing/grpc/stream_messages.h"
+#include "proto/base/hex.h"
 #include "relmap/v1/ingest.grpc.pb.h"
 
 namespace relmap::publishing {
@@ -32,17 +32,6 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   // The pauses are ours: otherwise a new channel would wait for what an old one to the same address has failed at.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-}
-
-// As DIR/endpoint has it.
-std::string hex(const BootId& boot) {
-  std::string text;
-  for (const std::uint8_t byte : boot) {
-    char digits[3];
-    std::snprintf(digits, sizeof digits, "%02x", byte);
-    text += digits;
-  }
-  return text;
 }
 
 bool same(const v1::IngestRequest& a, const v1::IngestRequest& b) {

@@ -39,7 +39,7 @@ class RiddenDrive {
     storage::ClosureProposalRecord proposal;
     proposal.query = frame(i);
     proposal.match = frame(i - kLap);
-    const SE3 off(Matrix3::Identity(), {0, 0, metres});
+    const SE3 off{Matrix3::Identity(), Vector3(0, 0, metres)};
     proposal.T_match_query = off * (world_.T_world_frame(i - kLap).inverse() * world_.T_world_frame(i));
     proposal.covariance = 1e-4 * Matrix6::Identity();
     proposal.probability = 0.99f;

@@ -7,7 +7,7 @@
 #include "proto/base/crc32c.h"
 #include "server/map/mapper.h"
 #include "server/map/testing/one_eye.h"
-#include "server/place/random_vocabulary.h"
+#include "server/place/testing/random_vocabulary.h"
 #include "server/rpc/core.h"
 #include "storage/engine/memory_engine.h"
 #include "tools/sim/points_world.h"

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "proto/base/hex.h"
 #include "proto/keyframe/ingest_messages.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
@@ -54,12 +55,7 @@ class FakeIngest final : public v1::Ingest::Service {
     server_.reset();
   }
   std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
-  std::string boot_text() const {
-    std::string text;
-    for (const std::uint8_t byte : boot_)
-      for (const int digit : {byte >> 4, byte & 15}) text += "0123456789abcdef"[digit];
-    return text;
-  }
+  std::string boot_text() const { return hex(boot_); }
 
   std::unique_lock<std::mutex> lock() { return std::unique_lock(mutex_); }
   Manners manners;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "server/place/descriptor.h"
-#include "server/place/hand_made_graph.h"
+#include "server/place/testing/hand_made_graph.h"
 
 namespace relmap::place {
 

@@ -1,0 +1,64 @@
+// Geometry over one candidate of appearance after the other, for one picture.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/place/place_index.h"
+#include "server/place/uniqueness.h"
+#include "server/place/verify.h"
+#include "storage/graph/graph.h"
+
+namespace relmap::place {
+
+// Asked before each piece of work; must not be empty. Anything but ok (DEADLINE, SHUTTING_DOWN) ends the work with it.
+using Proceed = std::function<Status()>;
+
+// Which candidates a run tries.
+struct TrialLimits {
+  std::size_t max_trials = std::numeric_limits<std::size_t>::max();
+  double min_probability = 0;                                              // the first candidate below it ends the run
+  std::uint32_t sure_inliers = std::numeric_limits<std::uint32_t>::max();  // a place confirmed with so many ends it
+  bool skip_mono = false;     // candidates of mono sessions, which are places without metres, are passed over
+  bool needs_metres = false;  // a place that is confirmed without metres is refused: NOT_STEREO
+};
+
+class Trials {
+ public:
+  // `graph`, `proceed` and what `query` refers to must outlive this. `seed` fixes RANSAC.
+  Trials(const storage::Graph& graph, const QueryPicture& query, std::uint64_t seed, const Proceed& proceed);
+
+  // Tries the candidates in their order. What `proceed` says.
+  Status run(std::span<const PlaceCandidate> candidates, const TrialLimits& limits);
+
+  // Drops the trials that geometry does not confirm.
+  void keep_confirmed();
+
+  const std::vector<PlaceTrial>& all() const { return trials_; }
+  // Of which candidate a trial is. (Its own frame is the one where most fits.)
+  const PlaceCandidate& candidate(std::size_t trial) const { return candidates_[trial]; }
+  std::size_t size() const { return trials_.size(); }
+  std::size_t tried() const { return tried_; }  // those dropped included
+
+  // Of the functions of these names in uniqueness.h and verify.h.
+  std::optional<std::size_t> best() const { return best_of(trials_); }
+  std::optional<Standing> weigh(std::size_t answers, const ComparePlace& compare = {}) const {
+    return place::weigh(graph_, query_, trials_, answers, seed_, compare);
+  }
+
+ private:
+  const storage::Graph& graph_;
+  const QueryPicture query_;
+  const std::uint64_t seed_;
+  const Proceed& proceed_;
+  std::vector<PlaceTrial> trials_;
+  std::vector<PlaceCandidate> candidates_;  // of trials_, one each
+  std::size_t tried_ = 0;
+};
+
+}  // namespace relmap::place
