@@ -14,7 +14,7 @@ Finding read_finding(const v1::Finding& message) {
   return {reason_from_wire(message.reason()), read_id(message.frame()), message.message()};
 }
 
-// Reads a stream to its end; `take` says whether to go on.
+// Reads a stream to its end, or until `take` returns false.
 template <typename Reply, typename Take>
 Status read_all(grpc::ClientContext& context, grpc::ClientReader<Reply>& stream, Take take) {
   Reply reply;

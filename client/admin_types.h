@@ -1,4 +1,4 @@
-// What operators get to know of the map as a whole, as plain values.
+// The results of an operator's calls, as plain values.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@ namespace relmap::client {
 struct Progress {
   std::string step;
   std::uint64_t done = 0, total = 0;  // total 0: not known
-  std::string unit;                   // of both: "frames", "bytes"
+  std::string unit;                   // of done and total: "frames", "bytes"
 };
-// Several times a second while long work goes on; false ends it.
+// Called several times a second during long work; returning false ends the work.
 using OnProgress = std::function<bool(const Progress&)>;
 
 struct Finding {
   Reason reason = Reason::OK;
-  FrameId frame;  // session 0: none in particular
+  FrameId frame;  // session 0: the finding is not about one frame
   std::string message;
 };
 
@@ -34,7 +34,7 @@ struct VerifySummary {
 struct Backup {
   std::string folder;
   std::uint64_t bytes = 0;
-  std::uint64_t durable_sequence = 0;  // of the journal: all through it is in the backup
+  std::uint64_t durable_sequence = 0;  // the backup contains the journal up to and including this sequence
 };
 
 struct Compaction {  // bytes on disk
@@ -42,9 +42,10 @@ struct Compaction {  // bytes on disk
 };
 
 struct StoreStats {
-  std::uint64_t map_bytes = 0, blob_bytes = 0, garbage_bytes = 0;  // on disk; garbage among the blobs, those in the map
+  // On disk. blob_bytes are part of map_bytes, and garbage_bytes, which compact() frees, part of blob_bytes.
+  std::uint64_t map_bytes = 0, blob_bytes = 0, garbage_bytes = 0;
   std::uint64_t journal_bytes = 0, journal_records = 0;
-  std::string dropped;  // what the last start cut off the journal, in words
+  std::string dropped;  // what the daemon cut off the journal when it started, in words
   std::vector<std::pair<std::string, std::string>> properties;
   DaemonStatus status;
 };

@@ -1,4 +1,4 @@
-// What a Client is made of. Internal to client/.
+// The implementation of Client. Internal to client/.
 #pragma once
 
 #include <google/protobuf/util/json_util.h>
@@ -16,10 +16,10 @@
 
 namespace relmap::client {
 
-inline constexpr int kMaxResumptions = 3;  // of one stream, without progress between them
+inline constexpr int kMaxResumptions = 3;  // of a stream, without progress between them
 
 struct Client::Impl {
-  using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
+  using Clock = std::chrono::system_clock;  // the clock of gRPC's deadlines
 
   Impl(std::string s, std::shared_ptr<grpc::Channel> c, ClientOptions o)
       : server(std::move(s)),
@@ -52,7 +52,7 @@ struct Client::Impl {
     return ask(*map, method, request, reply, deadline());
   }
 
-  // All pages of a list; `take` reads one and may fail.
+  // Asks for all pages of a list. `take` is called with each; its failure ends the list.
   template <typename Reply, typename Method, typename Request, typename Take>
   Status list(Method method, Request request, Take take) const {
     const Clock::time_point until = deadline();
@@ -65,7 +65,8 @@ struct Client::Impl {
     }
   }
 
-  // All messages of a stream; what `take` returns ends it. One that breaks is resumed.
+  // Reads all messages of a stream. `take` is called with each; its failure ends the stream. A stream that breaks is
+  // resumed.
   template <typename Reply, typename Method, typename Request, typename Take>
   Status read_stream(Method method, Request request, Take take) const {
     if (Status texts = check_texts(request); !texts.ok()) return texts;
@@ -91,7 +92,7 @@ struct Client::Impl {
     }
   }
 
-  const std::string server;  // as it was named
+  const std::string server;  // as given to connect()
   const std::shared_ptr<grpc::Channel> channel;
   const ClientOptions options;
   const std::unique_ptr<v1::Map::Stub> map;

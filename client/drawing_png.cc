@@ -8,10 +8,10 @@
 namespace relmap::client {
 namespace {
 
-constexpr int kOversampling = 2;     // of the page drawn on, against the picture saved
+constexpr int kOversampling = 2;     // pixels drawn per pixel saved, along each axis
 constexpr int kSubpixelBits = 4;     // of OpenCV's fixed-point coordinates
 constexpr double kCapUnits = 21;     // height of a capital of OpenCV's stroke fonts at scale 1, pixels
-constexpr double kCapHeight = 0.70;  // of a capital, against the em
+constexpr double kCapHeight = 0.70;  // height of a capital, in ems
 
 cv::Scalar scalar(Colour c) {
   return {static_cast<double>(c.blue), static_cast<double>(c.green), static_cast<double>(c.red)};
@@ -21,13 +21,13 @@ std::string ascii(const std::string& utf8) {
   std::string out;
   for (const char c : utf8) {
     const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xC0) == 0x80) continue;  // within a letter
+    if ((byte & 0xC0) == 0x80) continue;  // not the first byte of a letter
     out += byte < 0x20 || byte > 0x7E ? '?' : c;
   }
   return out;
 }
 
-// Pieces of a line that are drawn when it is dashed.
+// The pieces of a dashed line.
 std::vector<std::vector<Vector2>> dashes(const std::vector<Vector2>& points, double length) {
   std::vector<std::vector<Vector2>> out{{points[0]}};
   double left = length;
@@ -111,7 +111,7 @@ class PngDrawing : public Drawing {
   }
 
  private:
-  // Draws on the page, or, where it is seen through, on a mask over what it covers.
+  // Draws on the page. A transparent shape is drawn on a mask first, which is then blended with the page.
   template <typename Draw>
   void paint(const std::vector<Vector2>& points, double width, Colour colour, double opacity, const Draw& draw) {
     if (opacity >= 1) {
@@ -123,7 +123,7 @@ class PngDrawing : public Drawing {
     box = cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
           cv::Rect(0, 0, page_.cols, page_.rows);
     if (box.empty()) return;
-    // One mask for all that is drawn so; it is empty in between.
+    // The mask is kept for the next transparent shape, and is zero between shapes.
     if (mask_.empty()) mask_ = cv::Mat::zeros(page_.size(), CV_8U);
     draw(mask_, cv::Scalar(255));
     const double ink[3] = {static_cast<double>(colour.blue), static_cast<double>(colour.green),
@@ -156,10 +156,10 @@ class PngDrawing : public Drawing {
   double font_scale(const TextStyle& style) const { return style.size * scale_ * kCapHeight / kCapUnits; }
   int stroke_of(const TextStyle& style) const { return thickness(style.size * (style.bold ? 0.135 : 0.085)); }
 
-  double scale_;  // pixels of the page to a point
+  double scale_;  // pixels of page_ per point
   cv::Size size_;
   cv::Mat page_;
-  cv::Mat mask_;  // of what is seen through, while it is drawn
+  cv::Mat mask_;  // of the transparent shape that is being drawn
 };
 
 }  // namespace

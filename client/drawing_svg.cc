@@ -18,7 +18,7 @@ namespace {
   return text;
 }
 
-// Of ' ' to '~', in thousandths of the em.
+// Widths of ' ' to '~', in thousandths of the em.
 constexpr int kDejaVuWidths[] = {317,  400, 459, 837, 636, 950, 779, 274, 390, 390, 500, 837, 317, 360, 317, 336,
                                  636,  636, 636, 636, 636, 636, 636, 636, 636, 636, 336, 336, 837, 837, 837, 530,
                                  1000, 684, 686, 698, 770, 631, 575, 774, 751, 294, 294, 655, 557, 862, 748, 787,
@@ -97,7 +97,7 @@ class SvgDrawing : public Drawing {
     body_ += ">" + escape(utf8) + "</text>\n";
   }
 
-  // An upper bound: which of the fonts the reader has is not known, and DejaVu Sans is the widest of them.
+  // An upper bound: it is not known which of the fonts the reader has, and DejaVu Sans is the widest of them.
   double text_width(const std::string& utf8, const TextStyle& style) const override {
     int thousandths = 0;
     for (const char c : utf8) {
@@ -105,7 +105,7 @@ class SvgDrawing : public Drawing {
       if (byte >= 0x20 && byte < 0x7F)
         thousandths += (style.bold ? kDejaVuBoldWidths : kDejaVuWidths)[byte - 0x20];
       else if ((byte & 0xC0) != 0x80)
-        thousandths += 1000;  // of a letter beyond ASCII: of Chinese ones, and more than Latin and Cyrillic ones have
+        thousandths += 1000;  // a letter beyond ASCII: as wide as a Chinese one, wider than Latin and Cyrillic ones
     }
     return thousandths * 1e-3 * style.size;
   }

@@ -11,7 +11,7 @@ Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
     for (int k = 0; k < 24; ++k) {
       const double angle = 2 * M_PI * k / 24;
       const Vector2 direction(std::cos(angle), std::sin(angle));
-      // The side of the box that faces the anchor stands at the distance.
+      // `distance` is that from the anchor to the side of the box that faces it.
       const Vector2 middle =
           anchor + distance * direction + Vector2(direction.x() * size.x() / 2, direction.y() * size.y() / 2);
       const Box box = inside(Box{middle - size / 2, middle + size / 2});
@@ -25,7 +25,7 @@ Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
   return best;
 }
 
-// Moved into the area, as far as it fits there.
+// `box` moved into the area. If it is too large, it begins at the area's top left corner.
 Box LabelPlacement::inside(const Box& box) const {
   const Vector2 back = (box.high - area_.high).cwiseMax(0.0), on = (area_.low - (box.low - back)).cwiseMax(0.0);
   return {box.low - back + on, box.high - back + on};

@@ -1,4 +1,4 @@
-// Where the texts of a map stand, so that they hide neither the map nor each other.
+// Places the texts of a map so that they hide neither the map nor each other.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ class LabelPlacement {
 
   void avoid(const Vector2& point) { points_.push_back(point); }
   void avoid(const Box& box) { boxes_.push_back(box); }
-  // The box of a text of this size that belongs to `anchor`; it is avoided from then on.
+  // Returns the box for a text of this size that belongs to `anchor`. Later texts avoid it.
   Box place(const Vector2& anchor, const Vector2& size);
 
  private:

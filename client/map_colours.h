@@ -1,5 +1,5 @@
-// The colours of pictures of the map. Any two of them can be told apart by every eye, those that lack red, green or
-// blue cones included, on white (map_colours_test).
+// The colours of pictures of the map. On white, any two of them can be told apart by everyone, including people who
+// lack red, green or blue cones (map_colours_test).
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace relmap::client {
 
-// Of sessions, in the order in which they are drawn; after the last the first comes again.
+// The colours of sessions, in the order in which they are drawn. They repeat after the last one.
 inline constexpr std::array<Colour, 6> kSessionColours{Colour{0, 114, 178},  Colour{31, 187, 75}, Colour{188, 150, 207},
                                                        Colour{76, 161, 255}, Colour{126, 46, 19}, Colour{96, 3, 113}};
 inline constexpr Colour session_colour(std::size_t place) { return kSessionColours[place % kSessionColours.size()]; }

@@ -1,6 +1,6 @@
-// Can readers tell the colours of a map apart, also those who lack cones for red (protanopia), green (deuteranopia) or
-// blue (tritanopia)? Their sight is simulated by the matrices of Machado, Oliveira and Fernandes (IEEE TVCG 15(6),
-// 2009) at full severity, in linear RGB; distances are those of CIELAB, in which 2.3 is just noticeable.
+// Tests that readers can tell the colours of a map apart, including those who lack cones for red (protanopia), green
+// (deuteranopia) or blue (tritanopia). Their sight is simulated by the matrices of Machado, Oliveira and Fernandes
+// (IEEE TVCG 15(6), 2009) at full severity, in linear RGB. Distances are in CIELAB, where 2.3 is just noticeable.
 #include "client/map_colours.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ Vector3 lab(const Vector3& rgb) {
 
 struct Eye {
   const char* name;
-  Matrix3 sees;  // of linear RGB
+  Matrix3 sees;  // maps linear RGB to the linear RGB that this eye sees
 };
 std::vector<Eye> eyes() {
   const auto matrix = [](std::initializer_list<double> rows) {
@@ -62,15 +62,15 @@ Named marks() {
           {"ink", kInkColour},           {"paper", {255, 255, 255}}};
 }
 
-void expect_apart(const Named& some, const Named& others, double least) {
+void expect_apart(const Named& some, const Named& others, double min_distance) {
   for (const Eye& eye : eyes())
     for (const auto& [name, colour] : some)
       for (const auto& [other_name, other] : others)
-        EXPECT_GT(distance(colour, other, eye), least)
+        EXPECT_GT(distance(colour, other, eye), min_distance)
             << name << " and " << other_name << " to a " << eye.name << " eye";
 }
 
-// Eight times what is just noticeable, on thin lines.
+// Thin lines need eight times the just noticeable distance.
 constexpr double kApart = 16;
 
 TEST(MapColours, AllCanBeToldApartByEveryEye) {
@@ -84,7 +84,7 @@ TEST(MapColours, AllCanBeToldApartByEveryEye) {
   }
 }
 
-// The course of time of a single session, light to dark.
+// Shades of a single session show time, from light to dark.
 TEST(MapColours, ShadesOfASingleSessionLookLikeNothingElse) {
   Named shades;
   for (const double white : {0.5, 0.4, 0.3, 0.2, 0.1})

@@ -1,4 +1,4 @@
-// What a picture of the map shows, looked up by frame, session and kind.
+// Looks up what a picture of the map shows, by frame, session and kind of edge.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace relmap::client {
 
 class MapContents {
  public:
-  explicit MapContents(const MapPicture& picture);  // which must outlive it
+  explicit MapContents(const MapPicture& picture);  // `picture` must outlive it
 
   const MapPicture& picture() const { return picture_; }
 
@@ -25,17 +25,17 @@ class MapContents {
   // Null: the frame is not in the picture.
   const Place* find(FrameId frame) const;
 
-  // Frames of each session, ascending, in whatever parts.
+  // The frames of each session, ascending, over all parts.
   const std::map<SessionNumber, std::vector<FrameId>>& sessions() const { return sessions_; }
-  // Of a session: its name, with its number where colours come again.
+  // The name of a session, with its number if there are more sessions than colours.
   std::string name(SessionNumber session) const;
-  // Colour of a session, and of one of its frames: of a single session the course of time is shown, light to dark.
   Colour colour(SessionNumber session) const;
+  // The colour of a frame: that of its session, or, if there is only one session, a shade from light to dark in time.
   Colour shade(FrameId frame) const;
 
-  // The edge of its robot's motion that leads to this frame from an older one of its part; null: there is none.
+  // The edge of the robot's motion that leads to this frame from an older one in the same part; null: there is none.
   const MapPicture::Edge* step(FrameId frame) const;
-  // Edges of the kind within parts, and those that lead from one part to another, which are not drawn.
+  // The number of edges of this kind within parts, and of those between parts, which are not drawn.
   std::size_t count(MapPicture::EdgeKind kind) const;
   std::size_t count_between_parts(MapPicture::EdgeKind kind) const;
 

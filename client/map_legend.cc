@@ -15,7 +15,8 @@ using EdgeKind = MapPicture::EdgeKind;
 
 constexpr Colour kFaint{112, 118, 126}, kWhite{255, 255, 255};
 constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18, kEntryGap = 9;
-constexpr std::size_t kMaxSessions = 40, kTerseFrom = 8;  // from so many sessions on they have a line each
+constexpr std::size_t kMaxSessions = 40;  // further sessions are only counted
+constexpr std::size_t kTerseFrom = 8;     // from this number of sessions on, each has one line
 
 const TextStyle kPlain{.size = 15, .colour = kInkColour}, kSmall{.size = 13, .colour = kFaint};
 

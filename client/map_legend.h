@@ -1,4 +1,4 @@
-// What the lines, dashes, marks and colours of a picture of the map mean.
+// The legend of a picture of the map, which explains its lines, dashes, marks and colours.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@ namespace relmap::client {
 
 class MapLegend {
  public:
-  // No wider than `width`, by the letters of `measure`. All of every text is in it.
+  // Wraps its texts so that it is no wider than `width` with the letters of `measure`, and cuts nothing off.
   MapLegend(const MapContents& contents, const Drawing& measure, double width);
 
   double height() const { return height_; }

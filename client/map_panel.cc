@@ -15,8 +15,8 @@ namespace {
 using EdgeKind = MapPicture::EdgeKind;
 
 constexpr Colour kGrid{233, 233, 228}, kBorder{214, 214, 208}, kFaint{112, 118, 126}, kWhite{255, 255, 255};
-constexpr double kNarrow = 420;             // points: a panel below has smaller margins and letters
-constexpr std::size_t kNamedSessions = 12;  // more are named by their numbers
+constexpr double kNarrow = 420;             // points; narrower panels have smaller margins and letters
+constexpr std::size_t kNamedSessions = 12;  // if there are more, they are labelled with their numbers
 
 double inset_of(double width) { return width < kNarrow ? 22 : 34; }
 
@@ -106,7 +106,7 @@ void draw_query(Drawing& out, const Vector2& at, const Vector2& view) {
   out.disc(at, 8, kQueryColour, 3, kWhite);
 }
 
-// What is drawn into one area.
+// Draws a panel into an area.
 class MapPanel::Pen {
  public:
   Pen(const MapPanel& panel, Drawing& out, const Box& area)
@@ -135,7 +135,7 @@ class MapPanel::Pen {
   }
 
  private:
-  // Where a frame stands; false if it is in another part, or none.
+  // Sets `at` to the position of a frame on the page; false if the frame is not in this part.
   bool find(FrameId frame, Vector2& at) const {
     const auto* place = contents_.find(frame);
     if (!place || place->part != panel_.part_) return false;
@@ -158,8 +158,8 @@ class MapPanel::Pen {
 
   void grid() {
     out_.rectangle(area_.low, area_.size(), kWhite, 1);
-    const double longest = std::min(170.0, 0.45 * area_.size().x());
-    const double bar = round_length(longest / panel_.plan_.points_per_metre());
+    const double max_length = std::min(170.0, 0.45 * area_.size().x());
+    const double bar = round_length(max_length / panel_.plan_.points_per_metre());
     const double step = bar * panel_.plan_.points_per_metre();
     const Vector2 middle = (area_.low + area_.high) / 2;
     const Stroke thin{kGrid, 1, 1, 0};
@@ -200,10 +200,10 @@ class MapPanel::Pen {
     if (find(picture_.route->frames.back(), at)) draw_route_end(out_, at);
   }
 
-  // Runs of frames joined by measured motion; other motion is drawn between them.
+  // Draws each run of frames that measured motion joins, and the other motion between the runs.
   void trajectory(const std::vector<FrameId>& frames) {
     std::vector<std::vector<FrameId>> runs;
-    std::vector<std::pair<FrameId, EdgeKind>> bridges;  // to a frame from the one before
+    std::vector<std::pair<FrameId, EdgeKind>> bridges;  // to this frame from the one before it
     for (std::size_t k = 0; k < frames.size(); ++k) {
       const MapPicture::Edge* step = contents_.step(frames[k]);
       if (step && (k == 0 || std::min(step->a, step->b) != frames[k - 1])) step = nullptr;
@@ -220,7 +220,7 @@ class MapPanel::Pen {
     for (const auto& [frame, kind] : bridges) {
       const Vector2 from = at(std::min(contents_.step(frame)->a, contents_.step(frame)->b)), to = at(frame);
       Stroke stroke = motion_stroke(kind, contents_.shade(frame));
-      stroke.dash = std::clamp((to - from).norm() / 3, 1.5, stroke.dash);  // that a short step is broken, too
+      stroke.dash = std::clamp((to - from).norm() / 3, 1.5, stroke.dash);  // so that a short step is dashed, too
       out_.line(from, to, stroke);
     }
     for (const std::vector<FrameId>& run : runs) draw_run(run, frames.size());
@@ -233,7 +233,7 @@ class MapPanel::Pen {
       out_.disc(points[0], 2.6, contents_.shade(run[0]), 0, kWhite);
       return;
     }
-    constexpr std::size_t kShades = 48;  // pieces that show the course of time
+    constexpr std::size_t kShades = 48;  // number of pieces of different shade, which show time
     const std::size_t piece = std::max<std::size_t>(1, of / kShades);
     out_.polyline(points, {kWhite, 4.8, 0.85, 0});
     for (std::size_t k = 0; k + 1 < run.size(); k += piece) {
@@ -255,14 +255,14 @@ class MapPanel::Pen {
   void closures() {
     Vector2 a, b;
     for (ClosureStyle style : closure_styles()) {
-      // Who asks for a route wants to see the route: hundreds of closures would hide it.
+      // Hundreds of closures of full width would hide the route.
       if (picture_.route) style.stroke.width *= 0.4;
       for (const MapPicture::Edge& edge : picture_.edges)
         if (edge.kind == style.kind && find(edge.a, a) && find(edge.b, b)) draw_closure(out_, style, a, b);
     }
   }
 
-  // Where its session began and ended, if that was in this part.
+  // Draws where the session began and ended, if that is in this part.
   void ends(SessionNumber session, const std::vector<FrameId>& frames) {
     const std::vector<FrameId>& all = contents_.sessions().at(session);
     const Colour ink = contents_.colour(session);
@@ -299,7 +299,7 @@ class MapPanel::Pen {
     }
   }
 
-  // A text beside its place, with a line to it if it stands off.
+  // Draws a text near `at`, with a line between them if they are far apart.
   void leader(const Vector2& at, const std::string& text, const TextStyle& style) {
     const double line_height = 1.25 * style.size;
     const std::vector<std::string> lines = wrap(out_, text, style, std::min(260.0, 0.7 * area_.size().x()));
@@ -320,14 +320,14 @@ class MapPanel::Pen {
   const Vector2 shift_;
   const bool narrow_;
   LabelPlacement placement_;
-  std::map<SessionNumber, std::vector<FrameId>> frames_;  // of this part, ascending
+  std::map<SessionNumber, std::vector<FrameId>> frames_;  // in this part, ascending
 };
 
-MapPanel::MapPanel(const MapContents& contents, std::size_t part, double width, double tallest)
+MapPanel::MapPanel(const MapContents& contents, std::size_t part, double width, double max_height)
     : contents_(contents),
       part_(part),
       inset_(inset_of(width)),
-      plan_(positions(contents, part), width - 2 * inset_, tallest, contents.picture().turn_to_fit) {}
+      plan_(positions(contents, part), width - 2 * inset_, max_height, contents.picture().turn_to_fit) {}
 
 void MapPanel::draw(Drawing& out, const Box& area) const { Pen(*this, out, area).draw(); }
 

@@ -17,14 +17,14 @@ namespace {
 
 constexpr Colour kPaper{252, 252, 250}, kFaint{112, 118, 126};
 constexpr double kMargin = 36, kLegendWidth = 236, kGap = 28, kPanelGap = 22, kCaptionLine = 19;
-constexpr double kTallestAlone = 640, kTallestFirst = 420, kLowest = 110;
+constexpr double kMaxHeightAlone = 640, kMaxHeightFirst = 420, kMinHeight = 110;  // of plans
 constexpr std::size_t kMaxPanels = 24;
 
 const TextStyle kTitle{.size = 26, .colour = kInkColour, .bold = true}, kSubtitle{.size = 16, .colour = kFaint},
     kNote{.size = 16, .colour = kInkColour}, kPartTitle{.size = 15, .colour = kInkColour, .bold = true},
     kCaption{.size = 13, .colour = kFaint};
 
-// The first `shown` parts in rows: the first part alone, the others beside each other.
+// The number of panels in each row of the page: the first part has a row to itself.
 std::vector<std::size_t> columns_of_rows(std::size_t shown) {
   std::vector<std::size_t> rows{1};
   const std::size_t others = shown - 1, columns = others <= 4 ? 2 : others <= 9 ? 3 : 4;
@@ -32,7 +32,7 @@ std::vector<std::size_t> columns_of_rows(std::size_t shown) {
   return rows;
 }
 
-// A page: title, panels of the parts, legend.
+// Lays out and draws a page: title, panels of the parts, legend.
 class Composer {
  public:
   Composer(const MapPicture& picture, const Drawing& measure)
@@ -116,19 +116,20 @@ class Composer {
     std::size_t part = 0;
     for (const std::size_t columns : columns_of_rows(shown)) {
       const bool first = part == 0;
-      // A row that is not full has panels as narrow as those above it.
+      // The panels of a row that is not full are as wide as those above.
       if (!first && width_of_others_ == 0)
         width_of_others_ = (column_ - kPanelGap * static_cast<double>(columns - 1)) / static_cast<double>(columns);
       const double width = first || shown == 2 ? column_ : width_of_others_;
-      const double tallest = shown == 1 ? kTallestAlone : first || shown == 2 ? kTallestFirst : 0.75 * width;
+      const double max_height = shown == 1 ? kMaxHeightAlone : first || shown == 2 ? kMaxHeightFirst : 0.75 * width;
       std::vector<Panel> row;
-      double plans = kLowest, captions_end = y;
+      double plans = kMinHeight, captions_end = y;
       for (std::size_t k = 0; k < columns; ++k, ++part) {
         const double left = kMargin + static_cast<double>(k) * (width + kPanelGap);
         double below = y;
         std::vector<Line> caption;
         if (shown > 1) caption = caption_of(part, left, below, width);
-        row.push_back({MapPanel(contents_, part, width, tallest), std::move(caption), {{left, 0}, {left + width, 0}}});
+        row.push_back(
+            {MapPanel(contents_, part, width, max_height), std::move(caption), {{left, 0}, {left + width, 0}}});
         plans = std::max(plans, row.back().map.plan_height());
         captions_end = std::max(captions_end, below);
       }
@@ -180,7 +181,7 @@ Status write_map_picture(const MapPicture& picture, const std::string& path) {
     return ending == ".svg" ? make_svg_drawing(width, height, kPaper)
                             : make_png_drawing(width, height, kPaper, picture.png_scale);
   };
-  const auto measure = page(1, 1);  // letters are as wide on any page
+  const auto measure = page(1, 1);  // letters have the same width on a page of any size
   const Composer composer(picture, *measure);
   const auto drawing = page(picture.width, composer.height());
   composer.draw(*drawing);

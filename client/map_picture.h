@@ -1,6 +1,6 @@
-// A picture of a piece of the map: trajectories seen from above, loop closures, labels, a route, a query. Frames that
-// nothing connects are drawn apart, each part in a frame of its own, at its own scale: how they lie to each other is
-// not known.
+// Draws a piece of the map: trajectories seen from above, loop closures, labels, a route, a query. Parts that no edge
+// connects are drawn separately, each in its own frame and at its own scale, since their relative position is not
+// known.
 #pragma once
 
 #include <cstdint>
@@ -18,18 +18,18 @@ namespace relmap::client {
 struct MapPicture {
   struct Frame {
     FrameId id;
-    SE3 T_root_frame;  // camera frames (x right, y down, z forward): drawn with x to the right and z up
+    SE3 T_root_frame;  // between camera frames (x right, y down, z forward); drawn with x to the right and z up
   };
-  // Frames that hang together, in the frame of one of them.
+  // Connected frames, with poses relative to `root`.
   struct Part {
     FrameId root;
     std::vector<Frame> frames;
   };
-  // How an edge is drawn. Loop edges in their state; those taken out are drawn only when they are given.
+  // How an edge is drawn.
   enum class EdgeKind : std::uint8_t {
     kMotion,
-    kUnmeasuredMotion,  // of the robot, guessed
-    kCarriedMotion,     // of what carried it
+    kUnmeasuredMotion,  // a guess of the robot's motion
+    kCarriedMotion,     // the robot was carried along it
     kLoopAccepted,
     kLoopCandidate,
     kLoopQuarantined,
@@ -48,29 +48,30 @@ struct MapPicture {
     std::string caption;          // for the legend: "route to bakery, 41.2 m"
   };
   struct Query {
-    FrameId frame;  // beside which it was taken
+    FrameId frame;  // the frame in which it was localised
     SE3 T_frame_query;
     std::string caption;
   };
 
   std::string title, subtitle;
-  std::vector<Part> parts;  // the largest picture first; of many parts the last are only counted
-  std::vector<Edge> edges;  // those between frames that are not there are left out; those between parts are counted
+  std::vector<Part> parts;  // the first one gets the largest panel; beyond 24, parts are only counted
+  std::vector<Edge> edges;  // edges of frames that are in no part are left out; edges between parts are only counted
   std::map<SessionNumber, std::string> session_names;
   std::vector<Label> labels;
   std::optional<Route> route;
   std::optional<Query> query;
-  std::size_t mono_sessions = 0;  // that the map has, too: they know no metres, and are only counted
-  // Turn the plan so that its longer side lies across the picture; otherwise x is to the right and z up.
+  std::size_t mono_sessions = 0;  // they have no metric scale, and are only counted
+  // Turns the plan so that its longer side lies across the picture; otherwise x is to the right and z up.
   bool turn_to_fit = true;
   double width = 1200;   // of the page, in points
-  double png_scale = 2;  // pixels to a point
+  double png_scale = 2;  // pixels per point
 };
 
 inline bool is_motion(MapPicture::EdgeKind kind) { return kind <= MapPicture::EdgeKind::kCarriedMotion; }
 
-// Writes `path`, whose ending says how: .svg or .png. EMPTY_MAP, INVALID_ARGUMENT (another ending, NaN in a pose),
-// IO_ERROR.
+// Writes the picture to `path`, whose ending, .svg or .png, selects the format. EMPTY_MAP (no part, or one without
+// frames), INVALID_ARGUMENT (another ending, a pose that is not finite, width not in 600..4000, png_scale not in
+// 0.5..4), IO_ERROR.
 Status write_map_picture(const MapPicture& picture, const std::string& path);
 
 }  // namespace relmap::client

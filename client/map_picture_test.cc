@@ -54,7 +54,7 @@ MapPicture circle(int frames = 60) {
   return picture;
 }
 
-// A part of its own: `frames` of a new session on a line.
+// A part of `frames` frames of a new session, on a line.
 void add_part(MapPicture& picture, SessionNumber session, std::uint32_t frames) {
   MapPicture::Part& part = picture.parts.emplace_back();
   part.root = {session, 0};
@@ -71,7 +71,7 @@ int count(const std::string& text, const std::string& part) {
   return n;
 }
 
-TEST_F(MapPictureFile, SvgHoldsWhatThePictureSays) {
+TEST_F(MapPictureFile, SvgHoldsAllThatThePictureShows) {
   MapPicture picture = circle();
   picture.title = "Street <A> & B";
   picture.session_names[1] = "robot-7";
@@ -91,7 +91,7 @@ TEST_F(MapPictureFile, SvgHoldsWhatThePictureSays) {
   EXPECT_THAT(svg, ::testing::Not(::testing::HasSubstr("nan")));
 }
 
-TEST_F(MapPictureFile, MotionIsDrawnOnlyWhereAnEdgeSaysSo) {
+TEST_F(MapPictureFile, MotionIsDrawnOnlyAlongEdges) {
   MapPicture whole = circle(3), broken = circle(3);
   broken.edges.pop_back();
   ASSERT_TRUE(write_map_picture(whole, path("whole.svg")).ok());
@@ -99,7 +99,7 @@ TEST_F(MapPictureFile, MotionIsDrawnOnlyWhereAnEdgeSaysSo) {
   EXPECT_GT(count(contents(path("whole.svg")), "<polyline"), count(contents(path("broken.svg")), "<polyline"));
 }
 
-TEST_F(MapPictureFile, PngIsAPictureOfThePage) {
+TEST_F(MapPictureFile, PngHasThePagesSizeAndContents) {
   MapPicture picture = circle();
   picture.png_scale = 1;
   ASSERT_TRUE(write_map_picture(picture, path("map.png")).ok());
@@ -114,7 +114,7 @@ TEST_F(MapPictureFile, PngIsAPictureOfThePage) {
   EXPECT_LT(number(20), 1000);
 }
 
-// All that an SVG says, and where it ends at the latest: texts are taken to be as wide as they were laid out.
+// The texts of an SVG, and an upper bound of where each ends: texts are assumed to be as wide as they were laid out.
 struct Text {
   double left = 0, right = 0, y = 0;
   std::string text;
@@ -151,7 +151,7 @@ std::vector<double> numbers_of(const std::string& svg) {
   }
   return numbers;
 }
-// All texts, line after line, with a space between them.
+// All lines of text, joined by spaces.
 std::string said_in(const std::string& svg) {
   std::string all;
   for (const Text& text : texts_of(svg)) all += text.text + " ";
@@ -171,7 +171,7 @@ void expect_nothing_cut_off(const std::string& svg) {
   }
 }
 
-TEST_F(MapPictureFile, PartsThatNothingConnectsAreDrawnApartEachWithItsScale) {
+TEST_F(MapPictureFile, UnconnectedPartsAreDrawnApartEachWithItsScale) {
   MapPicture picture = circle();
   add_part(picture, 2, 9);
   add_part(picture, 3, 1);
@@ -198,8 +198,8 @@ TEST_F(MapPictureFile, PartsThatNothingConnectsAreDrawnApartEachWithItsScale) {
   EXPECT_THAT(said_in(contents(path("alone.svg"))), ::testing::Not(::testing::HasSubstr("not known")));
 }
 
-// Each part by itself: where it lies on the page depends on nothing but its own shape.
-TEST_F(MapPictureFile, HowPartsLieToEachOtherDoesNotMatter) {
+// The position of a part on the page depends only on its own shape.
+TEST_F(MapPictureFile, TheRelativePoseOfPartsDoesNotMatter) {
   MapPicture here = circle(), there = circle();
   add_part(here, 2, 9);
   add_part(there, 2, 9);
@@ -234,7 +234,7 @@ TEST_F(MapPictureFile, DashesAndDotsAreExplained) {
   EXPECT_THAT(said_in(contents(path("plain.svg"))), ::testing::Not(::testing::HasSubstr("dashes")));
 }
 
-TEST_F(MapPictureFile, NothingThatIsWrittenIsCutOff) {
+TEST_F(MapPictureFile, NoTextIsCutOff) {
   MapPicture picture = circle();
   for (SessionNumber session = 2; session <= 20; ++session) add_part(picture, session, session < 10 ? session : 1);
   picture.session_names[1] = "a_name_of_a_session_that_somebody_typed_without_any_space_2026-11-24T08:15:00";
@@ -261,7 +261,7 @@ TEST_F(MapPictureFile, NothingThatIsWrittenIsCutOff) {
   }
 }
 
-TEST_F(MapPictureFile, WhatIsNotDrawnIsSaid) {
+TEST_F(MapPictureFile, TheLegendCountsWhatIsNotDrawn) {
   MapPicture picture = circle();
   ASSERT_TRUE(write_map_picture(picture, path("all.svg")).ok());
   EXPECT_THAT(contents(path("all.svg")), testing::Not(testing::HasSubstr("mono session")));
@@ -271,7 +271,7 @@ TEST_F(MapPictureFile, WhatIsNotDrawnIsSaid) {
   EXPECT_THAT(contents(path("some.svg")), testing::HasSubstr(">not drawn: photographs have"));
 }
 
-TEST_F(MapPictureFile, OfMoreSessionsThanColoursEachBearsItsNumber) {
+TEST_F(MapPictureFile, SessionsAreNumberedIfThereAreMoreThanColours) {
   MapPicture picture;
   add_part(picture, 1, 30);
   for (SessionNumber session = 2; session <= 30; ++session) {
@@ -290,7 +290,7 @@ TEST_F(MapPictureFile, OfMoreSessionsThanColoursEachBearsItsNumber) {
   expect_nothing_cut_off(svg);
 }
 
-TEST_F(MapPictureFile, OfVeryManyPartsTheSmallestAreCounted) {
+TEST_F(MapPictureFile, TheSmallestOfVeryManyPartsAreOnlyCounted) {
   MapPicture picture = circle();
   for (SessionNumber session = 2; session <= 60; ++session) add_part(picture, session, 2);
   ASSERT_TRUE(write_map_picture(picture, path("many.svg")).ok());
@@ -307,7 +307,7 @@ TEST_F(MapPictureFile, ASingleFrameIsFine) {
   expect_nothing_cut_off(contents(path("one.svg")));
 }
 
-TEST_F(MapPictureFile, WhatCannotBeDrawnIsRefusedByName) {
+TEST_F(MapPictureFile, BadPicturesAreRefusedWithTheirReason) {
   EXPECT_EQ(write_map_picture(circle(), path("map.jpg")).reason(), Reason::INVALID_ARGUMENT);
   EXPECT_EQ(write_map_picture({}, path("map.svg")).reason(), Reason::EMPTY_MAP);
   EXPECT_EQ(write_map_picture(circle(), path("no/such/folder/map.svg")).reason(), Reason::IO_ERROR);
@@ -335,7 +335,7 @@ TEST(MapPlan, TurnsTheLongSideAcross) {
     EXPECT_LE(plan.at(p).x(), 900 + 1e-6);
     EXPECT_LE(plan.at(p).y(), plan.height() + 1e-6);
   }
-  // Turned, not mirrored: a right turn stays one.
+  // The plan is turned, not mirrored: a right turn stays a right turn.
   const Vector2 a = plan.heading(SE3{}), b = plan.heading(SE3{so3_exp(Vector3(0, 0.5, 0)), Vector3::Zero()});
   EXPECT_GT(a.x() * b.y() - a.y() * b.x(), 0);
 }
@@ -355,7 +355,7 @@ TEST(LabelPlacement, TextsHideNeitherEachOtherNorTheTrajectory) {
   }
 }
 
-TEST(LabelPlacement, TextsStayInsideWhateverTheyBelongTo) {
+TEST(LabelPlacement, TextsStayInsideTheArea) {
   const Box area{{10, 10}, {200, 100}};
   LabelPlacement placement(area);
   for (const Vector2& anchor : {Vector2(12, 12), Vector2(198, 50), Vector2(100, 98)}) {

@@ -6,7 +6,7 @@
 namespace relmap::client {
 namespace {
 
-constexpr double kMinExtent = 2;  // metres: a single frame is not magnified without end
+constexpr double kMinExtent = 2;  // metres; limits the scale of a plan with a single frame
 
 template <typename Turned>
 Box bounds(const std::vector<Vector3>& positions, const Turned& turned) {

@@ -1,4 +1,4 @@
-// From camera poses in metres to places on the page.
+// Maps camera poses in metres to positions on the page.
 #pragma once
 
 #include <vector>
@@ -18,17 +18,18 @@ struct Box {
   }
 };
 
-// The view from above that fits positions into a width and a height.
+// A plan seen from above, scaled so that all positions fit into a width and a height.
 class MapPlan {
  public:
-  // `turn`: so that the plan becomes as low as it can. At least one position, all finite.
+  // There must be at least one position, and all must be finite. `turn`: rotates the plan so that it is as low as
+  // possible.
   MapPlan(const std::vector<Vector3>& positions, double width, double max_height, bool turn);
 
   double points_per_metre() const { return scale_; }
-  double height() const { return height_; }  // that the plan needs
-  // From the top left corner of the plan's area.
+  double height() const { return height_; }  // points
+  // The position on the page, in points from the top left corner of the plan.
   Vector2 at(const Vector3& position) const;
-  // Direction of travel on the page, a unit vector; zero for a camera that looks straight up or down.
+  // The direction in which the camera looks, as a unit vector on the page; zero if it looks straight up or down.
   Vector2 heading(const SE3& pose) const;
 
  private:
@@ -36,7 +37,7 @@ class MapPlan {
 
   double cos_ = 1, sin_ = 0;
   double scale_ = 1, height_ = 0;
-  Vector2 origin_ = Vector2::Zero();  // in turned metres, of the area's corner
+  Vector2 origin_ = Vector2::Zero();  // the plan's corner, in metres after turning
 };
 
 }  // namespace relmap::client

@@ -1,4 +1,5 @@
-// What the map answers, as plain values. Conventions are those of proto/geometry/geometry.h.
+// Requests to the map and its answers, as plain values. proto/geometry/geometry.h has the conventions for transforms
+// and covariances, relmap/v1/map.proto the full description of each field.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +33,7 @@ enum class Verification : std::uint8_t {
   kCompounded = 6
 };
 
-// "accepted"; parse_edge_state() reads it back.
+// The name for display, as in "accepted". parse_edge_state() reads the name of a state.
 const char* name_of(EdgeState state);
 const char* name_of(EdgeKind kind);
 const char* name_of(Verification verification);
@@ -46,54 +47,54 @@ struct Session {
   SessionState state = SessionState::kOpen;
   std::string uuid, robot, name;
   StereoCamera camera;  // rectified
-  // Before its front-end rectified the pictures; nothing: they came rectified, or it is not known.
+  // Before rectification; absent if the pictures came rectified, or it is not known.
   std::optional<StereoCalibration> raw;
   bool oneway = false;
-  std::uint32_t first = 0, last = 0;  // indices
+  std::uint32_t first = 0, last = 0;  // lowest and highest index of its frames
   std::uint32_t frames = 0;
   std::int64_t first_time_us = 0, last_time_us = 0;
-  std::uint32_t refused = 0, given_up = 0;  // sequences
+  std::uint32_t refused = 0, given_up = 0;  // numbers of sequences
   std::uint64_t next_sequence = 0;          // everything below is applied, refused or given up
 };
 
-// A loop closure came into a state.
+// A change of a loop closure's state.
 struct EdgeEvent {
   std::uint64_t journal_sequence = 0;  // orders the events of a map
   EdgeState state = EdgeState::kCandidate;
   Reason reason = Reason::OK;
-  EdgeId cause;  // the closure that was proposed, or edited, then
-  std::string note;
+  EdgeId cause;      // the closure whose proposal or edit caused it
+  std::string note;  // the operator's note
 };
 
-// How far the place that a closure recognised stands out from all others.
+// How much the place that a closure recognised stands out from all other places.
 struct Uniqueness {
-  std::optional<FrameId> runner_up;  // of the places elsewhere that geometry confirms the one that fits best
+  std::optional<FrameId> runner_up;  // the best fitting of the other places that geometry confirms
   std::uint32_t runner_up_inliers = 0;
   double runner_up_probability = 0;  // by appearance
-  std::uint32_t alike = 0;           // places elsewhere that geometry confirms
-  std::optional<double> differs;     // share of what both views should show in which they show different things
-  // Cells of the picture in which landmarks of the place should be found again, and of them those in which none is; 0:
-  // not measured.
+  std::uint32_t alike = 0;           // number of other places that geometry confirms
+  std::optional<double> differs;     // of what both views should show, the share in which they differ, 0..1
+  // Number of cells of the picture in which landmarks of the place should be found, and the number of these in which
+  // none was found. 0: not measured.
   std::uint32_t compared = 0, changed = 0;
 };
 
-// Frames along which their robot was carried, as loop closures in force say against its odometry.
+// Consecutive frames of a session along which its robot was carried: loop closures in force contradict its odometry.
 struct CarriedStretch {
-  FrameId first, last;           // of one session, the older first
-  std::vector<EdgeId> closures;  // that say so; at most 16
+  FrameId first, last;           // the older one first
+  std::vector<EdgeId> closures;  // the closures that show it; at most 16
 };
 
-// Frames between which nothing measured how their robot moved (Edge::unmeasured).
+// Consecutive frames of a session between which nothing measured how its robot moved (Edge::unmeasured).
 struct UnmeasuredStretch {
-  FrameId first, last;  // of one session, the older first
+  FrameId first, last;  // the older one first
   std::uint32_t steps = 0;
   double distance_m = 0;  // a guess
 };
-// Of a way.
+// The unmeasured stretches of a route or path. If there are any, its transform is a guess.
 struct Unmeasured {
-  std::vector<UnmeasuredStretch> stretches = {};  // one after the other; at most 256
-  std::uint32_t steps = 0;                        // of all: with any, the way is a guess
-  double distance_m = 0;                          // of all: so much of the way's length is a guess
+  std::vector<UnmeasuredStretch> stretches = {};  // in order; at most 256
+  std::uint32_t steps = 0;                        // of all stretches
+  double distance_m = 0;                          // of all stretches: the part of the length that is a guess
 };
 
 struct Edge {
@@ -102,24 +103,25 @@ struct Edge {
   EdgeKind kind = EdgeKind::kOdometry;
   EdgeState state = EdgeState::kAccepted;
   Reason reason = Reason::OK;
-  bool carries = false;
+  bool carries = false;  // an edge of the graph while accepted; false: a closure that only binds landmarks
   SE3 T_ab;
   Matrix6 covariance = Matrix6::Identity();
-  std::uint32_t support = 0;
-  bool prior_active = false;
-  MotionSource source = MotionSource::kVision;  // of motion
-  // Neither a camera nor landmarks have measured T_ab: it is a guess (`source`) of this covariance, or what the robot
-  // says of a gap.
+  std::uint32_t support = 0;                    // number of observations whose path uses it
+  bool prior_active = false;                    // it has too little support, and so keeps the prior of its measurement
+  MotionSource source = MotionSource::kVision;  // of the robot's motion
+  // Neither a camera nor landmarks measured T_ab: it is a guess with this covariance (`source` tells of which kind), or
+  // what the robot reports of a gap.
   bool unmeasured = false;
   double driven_s = 0, standing_s = 0;
   Verification verification = Verification::kNone;
-  std::uint32_t inliers = 0, bound = 0;
+  std::uint32_t inliers = 0;
+  std::uint32_t bound = 0;  // number of observations and landmarks that it justifies
   double probability = 0, spread = 0;
   std::vector<EdgeId> consistent_with;
-  std::vector<EdgeEvent> history;             // oldest first
-  std::optional<Uniqueness> uniqueness = {};  // of a closure, where it is known
-  std::vector<EdgeId> carried_by = {};  // of motion: closures in force that say that the robot was carried along it
-  std::optional<CarriedStretch> carried = {};  // of a closure in force that says so
+  std::vector<EdgeEvent> history;              // oldest first
+  std::optional<Uniqueness> uniqueness = {};   // of a closure, if it is known
+  std::vector<EdgeId> carried_by = {};         // of motion: closures which show that the robot was carried
+  std::optional<CarriedStretch> carried = {};  // of a closure which shows that
 };
 
 struct Frame {
@@ -134,17 +136,18 @@ struct Frame {
   std::string thumbnail;  // JPEG
 };
 
-// A picture, or a stereo pair, and which camera took it. Files as they are: JPEG or PNG, of any camera.
+// A picture or a stereo pair, as the bytes of JPEG or PNG files, and the camera that took it.
 struct View {
   std::string left, right;
-  // Of rectified pictures; of unrectified ones; or the camera of a session of the map, as it takes pictures. None:
-  // unknown, it is estimated where metres are asked for.
+  // StereoCamera: the pictures are rectified; StereoCalibration: they are not; SessionNumber: they are raw pictures of
+  // that session's camera. monostate: the camera is unknown, and is estimated if a pose in metres is asked for.
   std::variant<std::monostate, StereoCamera, StereoCalibration, SessionNumber> camera;
-  bool rectified = false;  // with a session: the pictures are rectified already, as the map keeps them
-  bool supposed = false;   // that it is this camera is not known: the answer's covariance allows for another one
-  // With a session: which eye of its rig took the picture is not known; the covariance allows for the right one.
+  bool rectified = false;  // with a session: the pictures are rectified already
+  bool supposed = false;   // the camera is only assumed; the covariance allows for another one
+  // With a session: it is not known which eye of the rig took the picture. The left one is assumed, and the covariance
+  // allows for the right one.
   bool either_eye = false;
-  // Instead of all of these: what this frame of the map saw.
+  // If set, the view is what this frame of the map saw, and all of the above is ignored.
   std::optional<FrameId> frame = {};
 };
 
@@ -157,15 +160,15 @@ struct Localisation {
   double probability = 0;  // of the place, by appearance
   double spread = 0;
   double new_place = 0;
-  bool near_prior = false;                       // then probability and new_place are not known
-  std::optional<double> estimated_focal_length;  // pixels of the picture; of one whose camera was not named
+  bool near_prior = false;                       // found around the prior; probability and new_place are not set
+  std::optional<double> estimated_focal_length;  // pixels of the picture; if its camera was unknown
 };
 
 struct MatchOptions {
   std::uint32_t max_places = 0;    // 0: 20
-  std::uint32_t max_verified = 0;  // of the most probable, how many geometry is tried on; 0: 10, at most 20
+  std::uint32_t max_verified = 0;  // geometry is tried on this number of places; 0: 10, at most 20
   bool thumbnails = false;
-  std::optional<FrameId> near = {};  // thought to be near it: places around are likelier
+  std::optional<FrameId> near = {};  // a frame supposed to be near; places around it are more likely
 };
 
 struct PlaceMatch {
@@ -173,36 +176,37 @@ struct PlaceMatch {
   double probability = 0;  // by appearance
   Verification verification = Verification::kNone;
   std::uint32_t inliers = 0;
-  double spread = 0;                // 0..1, of the picture
-  std::optional<SE3> T_frame_view;  // where it is verified in metres
+  double spread = 0;                // share of the picture that the inliers span, 0..1
+  std::optional<SE3> T_frame_view;  // if it is verified in metres
   Matrix6 covariance = Matrix6::Identity();
   std::optional<double> estimated_focal_length;  // as in Localisation
-  Status unverified;                             // why geometry has not confirmed it
+  Status unverified;                             // not ok: why geometry has not confirmed it
   std::string thumbnail;                         // JPEG
 };
 struct PlaceMatches {
-  std::vector<PlaceMatch> places;  // verified ones first, by inliers; the others most probable first
+  std::vector<PlaceMatch> places;  // verified ones by number of inliers, then the others by probability
   double new_place = 1;
-  Status nothing_verified;  // why no place is
+  Status nothing_verified;  // not ok: why no place is verified
 };
 
 struct Robot {
   std::string name;
 };
-// A frame, a label, where something was seen, or where a robot is now.
+// A frame, a label, the place of a view, or the newest frame of a robot.
 using RouteEnd = std::variant<FrameId, std::string, View, Robot>;
 enum class RouteBy : std::uint8_t { kDistance = 1, kTime = 2, kCertainty = 3 };
 
-// What counts how much, for each edge; relmap/v1/map.proto.
+// The cost of an edge is the sum of its properties with these weights (relmap/v1/map.proto).
 struct RouteWeights {
   double metre = 0, driven_second = 0, standing_second = 0, square_metre_of_variance = 0;
 };
 struct RouteFilter {
-  std::vector<SessionNumber> sessions;  // whose frames may be passed; none: all
+  std::vector<SessionNumber> sessions;  // only their frames may be passed; empty: all
   std::vector<FrameId> avoid_frames;
   std::vector<std::string> avoid_labels;
   std::uint32_t min_support = 0;
   bool long_loops = true;
+  // Treat candidate or quarantined closures as edges.
   bool suppose_candidates = false, suppose_quarantined = false;
 };
 
@@ -210,11 +214,11 @@ struct RouteRequest {
   RouteEnd from, to;
   RouteBy by = RouteBy::kDistance;
   bool count_standing = false;
-  double max_cost = 0;                             // metres, seconds, or as the weights have it; 0: no limit
-  std::vector<RouteEnd> or_from = {}, or_to = {};  // as good as these
+  double max_cost = 0;                             // in the unit of the cost; 0: no limit
+  std::vector<RouteEnd> or_from = {}, or_to = {};  // alternatives to `from` and `to`
   std::optional<RouteWeights> weights = {};        // instead of `by`
   RouteFilter filter = {};
-  bool covariance = false;  // with each step
+  bool covariance = false;  // each step has T_start_this and its covariance
 };
 
 struct RouteStep {
@@ -227,23 +231,23 @@ struct RouteStep {
   bool long_loop = false;
   bool carried = false;     // the robot was carried along the edge to the next step
   bool unmeasured = false;  // nothing measured that edge
-  // On request.
+  // Set if RouteRequest::covariance is.
   SE3 T_start_this;
   Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
 };
 struct Route {
   FrameId from, to;
-  double cost = 0;  // what was made least
+  double cost = 0;  // the minimised cost
   double distance_m = 0, time_s = 0;
   std::uint32_t long_loops = 0;
   std::vector<CarriedStretch> carried;  // in the order of the route
-  Unmeasured unmeasured = {};           // so, too
-  std::string frame_by_frame;           // why the daemon had to search so; empty: it passed cells
-  // Closures that only bind landmarks were ways, too: the daemon searched frame by frame, or the route is short and its
-  // goal lies among the 2,000 frames nearest to the start.
+  Unmeasured unmeasured = {};           // in the order of the route
+  std::string frame_by_frame;           // why the daemon had to search frame by frame; empty: it searched by cells
+  // The search also used closures that only bind landmarks: the daemon searched frame by frame, or the route is short
+  // and its goal is among the 2,000 frames nearest to the start.
   bool bound_closures = false;
-  bool no_way_by_edges = false;                    // and edges alone lead to no goal, or to none within max_cost
-  std::optional<Localisation> from_view, to_view;  // of ends that are pictures
+  bool no_way_by_edges = false;                    // no goal can be reached by edges alone, or none within max_cost
+  std::optional<Localisation> from_view, to_view;  // of ends that are views
   std::vector<RouteStep> steps;
 };
 
@@ -252,9 +256,9 @@ struct TransformBetween {
   Matrix6 covariance = Matrix6::Identity();
   std::uint32_t edges = 0;
   double distance_m = 0;
-  bool compounded = false;                   // the covariance: from those of single edges
+  bool compounded = false;                   // the covariance is compounded from those of single edges
   std::vector<CarriedStretch> carried = {};  // on the path, from a to b
-  Unmeasured unmeasured = {};                // so, too
+  Unmeasured unmeasured = {};                // on the path, from a to b
 };
 
 struct LabelledFrames {
@@ -262,20 +266,21 @@ struct LabelledFrames {
   std::vector<FrameId> frames;
 };
 
-// A piece of a pose graph: frames without pictures, axes of a camera (x right, y down, z forward).
+// A piece of a pose graph to be imported. Its frames have no pictures, and the axes of a camera (x right, y down,
+// z forward).
 struct GraphPiece {
   struct Frame {
     SE3 T_odom_frame;
-    std::optional<Matrix6> step_covariance;  // of the step from the frame before; none: it is not known
+    std::optional<Matrix6> step_covariance;  // of the motion from the previous frame; absent: not known
     std::int64_t time_us = 0;                // UTC
     std::int64_t driven_us = 0;
   };
   struct Loop {
-    std::uint32_t query = 0, match = 0;  // indices; query is the later
+    std::uint32_t query = 0, match = 0;  // indices; query is the later one
     SE3 T_match_query;
     Matrix6 covariance = Matrix6::Identity();
   };
-  static constexpr std::size_t kMaxSent = 1000;  // of either
+  static constexpr std::size_t kMaxSent = 1000;  // frames, and loops
 
   SessionUuid session;
   std::string robot, name;
@@ -293,38 +298,39 @@ struct EdgeFilter {
 
 // What an operator does to a loop closure.
 enum class EdgeAction : std::uint8_t {
-  kRemove,       // out of the map, with all that agree with it
-  kRemoveAlone,  // out of the map by itself: those that agree with it stay
-  kRestore,      // back as it was, with what went with it
-  kAccept,       // into force, whatever it is: it is not outvoted from now on
-  kWithdraw      // what it was before it was accepted so
+  kRemove,       // removes it, with all closures that agree with it
+  kRemoveAlone,  // removes only this closure; those that agree with it stay
+  kRestore,      // restores it, with those that were removed with it
+  kAccept,       // puts it into force whatever its state; it is never outvoted
+  kWithdraw      // withdraws kAccept: it returns to its state before
 };
 struct EditOptions {
   std::string note = {};  // for the journal
-  bool dry_run = false;   // says what the edit would change, and changes nothing
-  // A removal's: EdgeEdit::shown of a dry run. WRONG_STATE if other closures would go by now; 0: whatever there is
-  // goes.
+  bool dry_run = false;   // reports what the edit would change, and changes nothing
+  // For a removal: EdgeEdit::shown of a dry run. WRONG_STATE if by now other closures would be removed than in the dry
+  // run; 0: no such check.
   std::uint64_t shown = 0;
 };
 
 struct ClosureChange {
   EdgeId id;
   FrameId a, b;                            // older, newer
-  std::optional<EdgeState> before, after;  // none: it was, or is, not there
+  std::optional<EdgeState> before, after;  // absent: it did not, or does not, exist
   Reason reason_before = Reason::OK, reason_after = Reason::OK;
-  bool edge_before = false, edge_after = false;  // an edge of the graph
-  std::uint32_t bound = 0, bound_frames = 0;     // what it binds while it is in force, and in how many frames
+  bool edge_before = false, edge_after = false;  // whether it is an edge of the graph
+  // Numbers of observations and landmarks that it justifies while it is in force, and of frames that have them.
+  std::uint32_t bound = 0, bound_frames = 0;
 };
 struct EditEffect {
   std::vector<ClosureChange> closures;
-  std::vector<CarriedStretch> carried, not_carried;  // from now on, and not any more
+  std::vector<CarriedStretch> carried, not_carried;  // where the robot counts as carried from now on, or no longer
 };
-// Of an edit, or a proposal. In a dry run: as it would be.
+// The result of an edit or a proposal; for a dry run, the result that it would have.
 struct EdgeEdit {
-  Edge edge;  // after
+  Edge edge;  // afterwards
   EditEffect effect;
-  bool done = false;        // not a dry run
-  std::uint64_t shown = 0;  // of a removal's dry run: stands for the closures that would go, for EditOptions
+  bool done = false;        // it was not a dry run
+  std::uint64_t shown = 0;  // for a dry run of a removal: identifies the closures to be removed, for EditOptions::shown
 };
 
 enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };
@@ -332,7 +338,7 @@ enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };
 struct TrajectoryPiece {
   SessionNumber session = 0;
   std::string_view bytes;
-  std::vector<Edge> doubtful;  // steps in it that nothing measured, or along which the robot was carried
+  std::vector<Edge> doubtful;  // its edges that nothing measured, or along which the robot was carried
 };
 
 struct ExportedFrame {
@@ -340,23 +346,23 @@ struct ExportedFrame {
   std::int64_t time_us = 0;  // UTC
   struct Landmark {
     Eigen::Vector3f point;        // in the frame's coordinates, metres
-    std::uint32_t observers = 0;  // frames that determine it
+    std::uint32_t observers = 0;  // number of frames that determine it
   };
-  std::vector<Landmark> landmarks;  // in force, based in the frame, their depth measured
+  std::vector<Landmark> landmarks;  // those in force, based in the frame, with measured depth
 };
 
 using ReasonCounts = std::map<Reason, std::uint64_t>;
 
-// One session on its way in; counts are since the daemon heard of it first.
+// A session that is being received. Counts are since the daemon first heard of it. status.proto describes the fields.
 struct RobotStatus {
   std::string uuid;
   SessionNumber session = 0;                    // 0: not begun
-  std::string robot, name;                      // empty: nothing whole came yet
+  std::string robot, name;                      // empty: no whole keyframe was received yet
   double keyframes_per_s = 0, bytes_per_s = 0;  // over the last ten seconds
-  double silent_s = 0;                          // since it was heard last
-  std::optional<double> lag_s;      // from the time stamp of its newest durable keyframe till that was durable
+  double silent_s = 0;                          // since the last message from it
+  std::optional<double> lag_s;      // from the time stamp of its newest durable keyframe until it was durable
   std::uint64_t next_sequence = 0;  // everything below is settled
-  std::uint64_t seen = 0;           // 1 + the highest sequence that something came of
+  std::uint64_t seen = 0;           // 1 + the highest sequence of which anything was received
   std::uint32_t missing = 0, incomplete = 0, pending = 0;
   std::uint32_t queued_messages = 0;
   std::uint64_t dropped_messages = 0;
@@ -364,8 +370,8 @@ struct RobotStatus {
   ReasonCounts refused, not_taken;
   Reason blocked = Reason::OK;
   double limit_hz = 0;
-  std::vector<std::string> same_name;  // uuids of sessions that other robots of this name bring at the same time
-  bool silent = false;                 // for a minute or more, though its session has not ended; as it was heard last
+  std::vector<std::string> same_name;  // uuids of sessions that other robots of the same name send now
+  bool silent = false;                 // nothing received for a minute, though its session has not ended
 };
 
 struct MemoryShare {
@@ -373,28 +379,28 @@ struct MemoryShare {
   std::uint64_t used = 0, allowance = 0;
 };
 
-// A session whose pictures contradict the calibration of others', where they show the same places.
+// A session whose calibration contradicts that of other sessions, where their pictures show the same places.
 struct DoubtfulCamera {
   SessionNumber session = 0;
   std::string robot, name;
   std::vector<SessionNumber> against;
-  std::uint64_t contradicted = 0;  // keyframes, of it and of those, since the daemon started
-  std::string message;             // of the last one: what would fit
+  std::uint64_t contradicted = 0;  // keyframes, of it and of those sessions, since the daemon started
+  std::string message;             // from the last of these keyframes: the calibration that would fit
 };
 
 struct DaemonStatus {
   std::string version, boot_id, data_folder, lcm_url;
-  MapIdentity map;  // not known: the daemon does not say it
+  MapIdentity map;  // not known() if the daemon does not report it
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;
   bool deterministic = false;
-  Status storage, lcm;  // not ok: why the daemon takes nothing in
+  Status storage, lcm;  // not ok: why the daemon accepts nothing, or nothing over LCM
 
   std::uint32_t sessions = 0, labels = 0;
   std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0, places_left_out = 0;
   ReasonCounts refused_by_reason;
   std::vector<DoubtfulCamera> doubtful_cameras;
-  // What routes are found by in milliseconds; why that is missing (empty: it is not).
+  // The cells by which routes are found in milliseconds, and why there are none (empty: there are).
   std::uint64_t route_chunks = 0, route_chunks_changed = 0, route_cells_outdated = 0;
   std::uint32_t route_weights = 0;
   std::string routes_missing_because;

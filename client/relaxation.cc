@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kMinDamping = 1e-9, kMaxDamping = 1e12;
 
-// An edge between frames numbered from 0.
+// An edge between frames that are numbered from 0.
 struct Link {
   int a = 0, b = 0;
   SE3 T_ba_measured;  // inverse of the measurement
@@ -47,7 +47,7 @@ Robust huber(double squared, bool robust, double width) {
   return {2 * width * sigmas - width * width, width / sigmas};
 }
 
-// One connected component: frames 0..n-1, frame 0 held.
+// A connected component with frames 0..n-1, of which frame 0 is fixed.
 class Component {
  public:
   Component(std::vector<Link> links, int frames, const RelaxationOptions& options)
@@ -74,7 +74,7 @@ class Component {
       const Eigen::VectorXd gradient = linearise(system);
       const Eigen::VectorXd diagonal = system.diagonal();
       double fallen = -1;
-      while (fallen < 0) {  // until a step lowers the true cost
+      while (fallen < 0) {  // until a step lowers the cost
         if (!(damping < kMaxDamping)) return finish_stuck(cost);
         if (system.factorise(damping * diagonal)) {
           const std::vector<SE3> moved = step(system.solve(-gradient));
@@ -98,7 +98,7 @@ class Component {
   }
 
  private:
-  // No step lowers the cost: at rounding error of a minimum, unless the numbers have gone wrong.
+  // No step lowers the cost: this is the minimum up to rounding errors, unless a number is not finite.
   Status finish_stuck(double cost) {
     if (!std::isfinite(cost)) return {Reason::NUMERICAL, "the cost of the pose graph is not finite"};
     converged_ = true;
@@ -190,7 +190,7 @@ std::vector<int> find_components(int frames, const std::vector<Link>& links, int
   };
   for (const Link& link : links) {
     const int a = root(link.a), b = root(link.b);
-    parent[std::max(a, b)] = std::min(a, b);  // so that a root is its component's first frame
+    parent[std::max(a, b)] = std::min(a, b);  // so that the root is the first frame of its component
   }
   std::vector<int> component(frames);
   count = 0;
@@ -217,7 +217,7 @@ Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<R
   Relaxation out;
   const std::vector<int> component = find_components(static_cast<int>(frames.size()), links, out.components);
   std::vector<std::vector<int>> members(out.components);
-  std::vector<int> place(frames.size());  // of a frame within its component
+  std::vector<int> place(frames.size());  // index of each frame within its component
   for (std::size_t k = 0; k < frames.size(); ++k) {
     place[k] = static_cast<int>(members[component[k]].size());
     members[component[k]].push_back(static_cast<int>(k));

@@ -25,7 +25,7 @@ Matrix6 diagonal_covariance(double translation, double rotation) {
 
 FrameId frame(int index) { return {1, static_cast<std::uint32_t>(index)}; }
 
-// A circle driven 1.2 times by noisy odometry, with exact-ish loop edges where it meets itself.
+// A circle driven 1.2 times with noisy odometry, and nearly exact loop edges where it meets itself.
 struct Circle {
   std::vector<FrameId> frames;
   std::vector<SE3> truth;
@@ -50,7 +50,7 @@ struct Circle {
     const SE3 T = truth[a].inverse() * truth[b] * SE3::exp(random_vector(random, 0.01, 0.004));
     edges.push_back({frames[a], frames[b], T, diagonal_covariance(0.01, 0.004), kind});
   }
-  double error(const Relaxation& result) const {  // with the first frame on its truth
+  double error(const Relaxation& result) const {  // with the first frame at its true pose
     double sum = 0;
     for (std::size_t k = 0; k < truth.size(); ++k)
       sum += (truth[0] * result.poses[k].T_component_frame.t - truth[k].t).norm();
@@ -84,7 +84,7 @@ TEST(Relaxation, EndsWhereADenseGaussNewtonEnds) {
   options.relative_tolerance = 1e-14;
   const auto result = relax(circle.frames, circle.edges, options);
   ASSERT_TRUE(result.ok());
-  // Gauss-Newton with numerical Jacobians and a dense solve, from the truth.
+  // Gauss-Newton with numerical Jacobians and a dense solve, starting at the true poses.
   const int n = static_cast<int>(circle.truth.size());
   std::vector<SE3> poses;
   for (const SE3& T : circle.truth) poses.push_back(circle.truth[0].inverse() * T);
@@ -118,7 +118,7 @@ TEST(Relaxation, EndsWhereADenseGaussNewtonEnds) {
   for (int k = 0; k < n; ++k) EXPECT_LT((result->poses[k].T_component_frame.t - poses[k].t).norm(), 1e-5) << k;
 }
 
-TEST(Relaxation, ALoopClosureMendsANoisyCircle) {
+TEST(Relaxation, LoopClosuresCorrectANoisyCircle) {
   double before = 0, after = 0, cost_per_edge = 0;
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     const Circle circle(seed);
@@ -132,7 +132,7 @@ TEST(Relaxation, ALoopClosureMendsANoisyCircle) {
     cost_per_edge += closed->final_cost / static_cast<double>(circle.edges.size()) / 5;
   }
   EXPECT_LT(after, 0.7 * before);
-  // 6 per edge, times the share of edges that are redundant.
+  // The expected cost is 6 per edge, times the share of redundant edges.
   EXPECT_GT(cost_per_edge, 0.1);
   EXPECT_LT(cost_per_edge, 1.0);
 }
@@ -150,7 +150,7 @@ TEST(Relaxation, AWrongClosureBendsTheCircleLittle) {
   EXPECT_LT(robust, 0.1 * (circle.truth[20].t - circle.truth[60].t).norm());
 }
 
-TEST(Relaxation, ComponentsAreSolvedApart) {
+TEST(Relaxation, ComponentsAreSolvedSeparately) {
   const Circle circle(2, 40);
   std::vector<FrameId> frames{{7, 3}};  // a frame without edges comes first
   frames.insert(frames.end(), circle.frames.begin(), circle.frames.end());
@@ -181,7 +181,7 @@ TEST(Relaxation, EmptyAndSingleFramesAreFine) {
   EXPECT_EQ(one->poses[0].T_component_frame.t, Vector3::Zero());
 }
 
-TEST(Relaxation, BadEdgesAreRefusedByName) {
+TEST(Relaxation, BadEdgesAreRefusedWithTheirReason) {
   const RelaxationEdge good{frame(0), frame(1), SE3{}, diagonal_covariance(0.01, 0.01), RelaxationEdgeKind::kOdometry};
   const auto reason = [&](auto change) {
     RelaxationEdge edge = good;

@@ -18,7 +18,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReplyBytes);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // A daemon that was restarted is found again soon.
+  // Reconnects soon after a daemon was restarted.
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
@@ -49,7 +49,7 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
     return {Reason::UNREACHABLE, "nothing answers at " + where->address + named};
   if (where->boot_id.empty()) return std::unique_ptr<Client>(new Client(std::move(impl)));
 
-  // After a crash the endpoint stays behind, and its port may be another daemon's by now.
+  // After a crash the file `endpoint` remains, and another daemon may use its port by now.
   grpc::ClientContext context;
   context.set_deadline(until);
   v1::GetStatusReply reply;
@@ -216,7 +216,7 @@ Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const E
 }
 
 Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::string& label, bool present) {
-  if (!is_utf8(label)) return {Reason::BAD_NAME, "label is not UTF-8"};  // as the daemon would call it
+  if (!is_utf8(label)) return {Reason::BAD_NAME, "label is not UTF-8"};  // the reason that the daemon would give
   v1::SetLabelRequest request;
   *request.mutable_frame() = to_wire(frame);
   request.set_label(label);

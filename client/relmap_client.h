@@ -1,11 +1,11 @@
-// The map of a running relmapd, over its RPC API.
+// The C++ client of a running relmapd.
 //
 //   auto client = client::Client::connect("/var/lib/relmap");       // or "host:port"
 //   if (!client.ok()) return client.status();
 //   auto route = (*client)->find_route({.from = FrameId{1, 20}, .to = "kitchen"});
 //
-// Every call returns what the daemon answered, or the daemon's reason; UNREACHABLE where none answers, DEADLINE where
-// it took too long. Thread-safe.
+// Every call returns the daemon's answer or its reason; UNREACHABLE if no daemon answers, DEADLINE if it takes too
+// long. relmap/v1/map.proto and admin.proto list the reasons of each call. Thread-safe.
 #pragma once
 
 #include <chrono>
@@ -21,72 +21,77 @@ namespace relmap::client {
 
 struct ClientOptions {
   std::chrono::milliseconds connect_timeout{5000};
-  std::chrono::milliseconds deadline{60000};  // of each call; streams and lists count as one
+  std::chrono::milliseconds deadline{60000};  // of each call; a whole stream or list is one call
   // Called with the canonical proto3 JSON of each message received, in order, by the calling thread.
   std::function<void(const std::string& json)> on_reply;
 };
 
 class Client {
  public:
-  // `server`: the data folder of a daemon on this machine (DIR/endpoint says where it answers), or HOST:PORT.
-  // INVALID_ARGUMENT: neither. UNREACHABLE, with why.
+  // `server`: the data folder of a daemon on this machine (DIR/endpoint has its address), or HOST:PORT.
+  // INVALID_ARGUMENT: it is neither. UNREACHABLE: no daemon answers; the message says why.
   static Result<std::unique_ptr<Client>> connect(const std::string& server, ClientOptions options = {});
   ~Client();
-  // Another client of the same server, with the same options, where it answers now: a daemon that was started anew may
-  // do so at another port. As connect().
+  // Connects to the same server with the same options again, since a restarted daemon may use another port. Fails as
+  // connect() does.
   Result<std::unique_ptr<Client>> connect_again() const;
 
   Result<DaemonStatus> status();
-  // Returns when the daemon has applied, looked up and relaxed all that it took in.
+  // Returns when the daemon has applied, looked up and relaxed all keyframes that it has.
   Status wait_idle();
 
-  // `prior`: a frame somewhere near; tried first, and the rest of the map only if it is not there.
+  // `prior`: a frame near the view. Its surroundings are searched first, and the rest of the map only if the view is
+  // not found there.
   Result<Localisation> localise(const View& view, std::optional<FrameId> prior = {});
   Result<PlaceMatches> match_image(const View& view, const MatchOptions& options = {});
-  // A stream that breaks is resumed, on the version of the map on which it began.
+  // A stream that breaks is resumed with the same map version.
   Result<Route> find_route(const RouteRequest& request);
   Result<TransformBetween> transform_between(FrameId a, FrameId b);
 
   Result<Frame> frame(FrameId id, bool with_thumbnail = false);
   // Sessions heard of in the last minute, by robot and session.
   Result<std::vector<RobotStatus>> robots();
-  // Whole lists, page by page from one map version; VIEW_EXPIRED if it went meanwhile.
+  // Whole lists, all pages from one map version; VIEW_EXPIRED if that version expires meanwhile.
   Result<std::vector<Session>> sessions();
   Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
   Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "", const std::string& words = "");
 
   Result<EdgeEdit> edit_edge(EdgeId edge, EdgeAction action, const EditOptions& options = {});
-  // What geometry finds between two frames, as a loop closure that is judged like any other; `accept`: put into force.
-  // Why it finds nothing: TOO_FEW_INLIERS and others. WRONG_STATE: there is a closure between the two.
+  // Verifies two frames by geometry and proposes the result as a loop closure, which is judged like any other, or with
+  // `accept` put into force. TOO_FEW_INLIERS and others: geometry does not confirm it. WRONG_STATE: there is already a
+  // closure between the two.
   Result<EdgeEdit> propose_edge(FrameId a, FrameId b, bool accept = false, const EditOptions& options = {});
-  // The frame's labels afterwards.
+  // Adds a label, or removes it if `present` is false. Returns the frame's labels afterwards.
   Result<std::vector<std::string>> set_label(FrameId frame, const std::string& label, bool present = true);
 
-  // A graph made elsewhere, piece by piece in the order of its frames: the session's number. See Map.ImportGraph.
+  // Imports a piece of a graph that was made elsewhere; pieces come in the order of their frames. Returns the session's
+  // number. See Map.ImportGraph.
   Result<SessionNumber> import_graph(const GraphPiece& piece);
 
-  // Sessions (none: all but mono sessions) as streams; what `take` returns ends them. A stream that breaks is resumed.
-  // Each session's file, in order, in pieces: its odometry edges, chained.
+  // Exports sessions (empty: all but mono sessions). If `take` fails, the export ends with its status. A stream that
+  // breaks is resumed.
+  // The trajectory file of each session, in order and in pieces: its odometry edges, chained.
   using TrajectorySink = std::function<Status(const TrajectoryPiece& piece)>;
   Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
                              const TrajectorySink& take);
-  // Each session's frames, ascending, with their landmarks if they are wanted.
+  // The frames of each session, ascending, with their landmarks if `landmarks` is set.
   using FrameSink = std::function<Status(const ExportedFrame& frame)>;
   Status export_frames(const std::vector<SessionNumber>& sessions, bool landmarks, const FrameSink& take);
 
-  // For operators. The work is the daemon's; one piece of it at a time (BUDGET_EXCEEDED). DEADLINE also when
-  // `on_progress` has ended it.
+  // For operators. The daemon does one of verify, backup and compact at a time (BUDGET_EXCEEDED). DEADLINE also if
+  // `on_progress` ended the work.
   Result<VerifySummary> verify(const std::vector<SessionNumber>& sessions,
                                const std::function<void(const Finding&)>& on_finding, const OnProgress& on_progress);
   // `folder`: on the daemon's machine, absolute.
   Result<Backup> backup(const std::string& folder, const OnProgress& on_progress);
   Result<Compaction> compact(const OnProgress& on_progress);
   Result<StoreStats> stats();
-  // A frozen session takes nothing in, and nothing in it moves.
+  // A frozen session accepts no keyframes, and its edges and landmarks do not change.
   Status freeze_session(SessionNumber session, bool frozen = true);
-  // Returns when all its frames are gone; DEADLINE: the daemon goes on with it. `uuid`: of that session, to be sure.
+  // Returns when all frames of the session are deleted. DEADLINE: the daemon continues the deletion. `uuid` must be
+  // that of the session, as a safeguard.
   Status delete_session(SessionNumber session, const std::string& uuid, const OnProgress& on_progress);
-  // What is dirty, now; the journal sequence that is committed then.
+  // Commits what is dirty, and returns the journal sequence up to which the map is committed.
   Result<std::uint64_t> commit();
 
  private:

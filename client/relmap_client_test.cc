@@ -1,4 +1,4 @@
-// The client against a daemon that says what the test tells it to.
+// Tests the client against a daemon whose answers the test sets.
 #include "client/relmap_client.h"
 
 #include <grpcpp/grpcpp.h>
@@ -90,7 +90,7 @@ class FakeMap final : public v1::Map::Service {
     stream->Write(reply);
     return grpc::Status::OK;
   }
-  // Breaks after each piece, until it has been resumed through all of them.
+  // Breaks after each piece, so that it has to be resumed for each.
   grpc::Status Export(grpc::ServerContext*, const v1::ExportRequest* request,
                       grpc::ServerWriter<v1::ExportReply>* stream) override {
     const int piece = request->resume_token().empty() ? 0 : std::stoi(request->resume_token());
@@ -177,7 +177,7 @@ TEST_F(ClientTest, ReachesADaemonThatListensEverywhereOverLoopback) {
   EXPECT_EQ(resolve_server(folder_.string())->address, "localhost:5");
 }
 
-TEST_F(ClientTest, ReadsWhatPlacesMatchAndWhyNot) {
+TEST_F(ClientTest, ReadsMatchesAndTheReasonsOfOthers) {
   View view;
   view.frame = FrameId{3, 17};
   const auto matches = client()->match_image(view, {.max_verified = 5, .thumbnails = true});
@@ -203,7 +203,7 @@ TEST_F(ClientTest, ReadsStatus) {
   EXPECT_EQ(status->storage.to_string(), "READ_ONLY: disk full");
 }
 
-TEST_F(ClientTest, GivesTheDaemonsOwnReason) {
+TEST_F(ClientTest, ReturnsTheDaemonsReason) {
   const auto found = client()->localise({});
   EXPECT_EQ(found.status().to_string(), "NO_CALIBRATION: which camera?");
 }
@@ -212,7 +212,7 @@ TEST_F(ClientTest, RpcsThatTheDaemonDoesNotHaveAreUnimplemented) {
   EXPECT_EQ(client()->wait_idle().reason(), Reason::UNIMPLEMENTED);
 }
 
-// gRPC cannot carry it, and what it says of it by itself is that there were no such RPC.
+// gRPC cannot send such text, and would by itself report that the RPC does not exist.
 TEST_F(ClientTest, TextThatIsNotUtf8IsRefusedByNameBeforeItIsSent) {
   const auto client = Client::connect(address()).or_throw();
   const std::string bad = "caf\xe9";
@@ -222,7 +222,7 @@ TEST_F(ClientTest, TextThatIsNotUtf8IsRefusedByNameBeforeItIsSent) {
   EXPECT_EQ(client->labels("", bad).status().to_string(), "INVALID_ARGUMENT: words is not UTF-8");
   EXPECT_EQ(client->edit_edge({{1, 2}, 1}, EdgeAction::kRemove, {.note = bad}).status().to_string(),
             "INVALID_ARGUMENT: note is not UTF-8");
-  RouteRequest route{.from = FrameId{1, 2}, .to = bad};  // within a part of the message
+  RouteRequest route{.from = FrameId{1, 2}, .to = bad};  // in a nested message
   EXPECT_EQ(client->find_route(route).status().to_string(), "INVALID_ARGUMENT: label is not UTF-8");
   route.to = FrameId{1, 2};
   route.filter.avoid_labels = {"dock", bad};
@@ -245,7 +245,7 @@ TEST_F(ClientTest, Localises) {
   EXPECT_EQ(found->inliers, 44u);
 }
 
-TEST_F(ClientTest, ReadsListsToTheirEndAndTellsEachReply) {
+TEST_F(ClientTest, ReadsListsToTheirEndAndReportsEachReply) {
   std::vector<std::string> replies;
   ClientOptions options;
   options.on_reply = [&](const std::string& json) { replies.push_back(json); };
@@ -258,7 +258,7 @@ TEST_F(ClientTest, ReadsListsToTheirEndAndTellsEachReply) {
   EXPECT_NE(replies[0].find("\"nextPageToken\":\"more\""), std::string::npos) << replies[0];
 }
 
-TEST_F(ClientTest, GoesOnWithARouteThatBroke) {
+TEST_F(ClientTest, ResumesARouteThatBreaks) {
   const auto route = client()->find_route({FrameId{1, 0}, "far away", RouteBy::kTime, false, 0});
   ASSERT_TRUE(route.ok()) << route.status().to_string();
   EXPECT_EQ(route->distance_m, 12.5);
@@ -266,7 +266,7 @@ TEST_F(ClientTest, GoesOnWithARouteThatBroke) {
   for (std::uint32_t i = 0; i < 3; ++i) EXPECT_EQ(route->steps[i].frame, (FrameId{1, i}));
 }
 
-TEST_F(ClientTest, PutsARouteTogether) {
+TEST_F(ClientTest, JoinsTheMessagesOfARoute) {
   const auto route = client()->find_route({FrameId{1, 0}, "kitchen", RouteBy::kTime, false, 0});
   ASSERT_TRUE(route.ok()) << route.status().to_string();
   EXPECT_EQ(route->distance_m, 12.5);
@@ -311,12 +311,12 @@ TEST_F(ClientTest, ReadsFramesWithAndWithoutTheirLandmarks) {
   }
 }
 
-TEST_F(ClientTest, FramesWithHalfALandmarkAreIllFormed) {
+TEST_F(ClientTest, FramesWithAnIncompleteLandmarkAreCorrupt) {
   EXPECT_EQ(client()->export_frames({13}, true, [](const ExportedFrame&) { return Status(); }).reason(),
             Reason::CORRUPT);
 }
 
-TEST_F(ClientTest, EndsAnExportThatCannotBeWritten) {
+TEST_F(ClientTest, EndsAnExportIfTheSinkFails) {
   const Status status = client()->export_trajectories(
       ExportFormat::kTum, {}, [&](const TrajectoryPiece&) { return Status(Reason::IO_ERROR, "full"); });
   EXPECT_EQ(status.reason(), Reason::IO_ERROR);

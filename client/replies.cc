@@ -11,7 +11,7 @@ Status ill_formed(const char* what, const Status& why) {
   return {Reason::CORRUPT, std::string("the daemon's ") + what + " is ill formed: " + why.message()};
 }
 
-// The covariance may be absent; what is there is taken as it is.
+// The covariance may be absent. Its plausibility is not checked.
 Matrix6 read_covariance(const v1::Covariance& message) {
   UpperTriangle values;
   if (message.upper_size() != static_cast<int>(values.size())) return Matrix6::Identity();
@@ -87,7 +87,7 @@ CarriedStretch read_carried(const v1::CarriedStretch& message) {
   return stretch;
 }
 
-// Of a RouteSummary, or a TransformBetweenReply.
+// `message`: a RouteSummary or a TransformBetweenReply.
 template <typename Way>
 Unmeasured read_unmeasured(const Way& message) {
   Unmeasured unmeasured{.steps = message.unmeasured_steps(), .distance_m = message.unmeasured_m()};

@@ -1,4 +1,4 @@
-// Messages to and from map_types.h. Internal to client/.
+// Converts messages to and from the types of map_types.h. Internal to client/.
 #pragma once
 
 #include "client/map_types.h"
@@ -27,7 +27,7 @@ namespace relmap::client {
 v1::View view_message(const View& view);
 v1::FindRouteRequest route_message(const RouteRequest& asked);
 
-// Answers of a daemon are trusted to be well formed; one that is not is CORRUPT.
+// CORRUPT: the daemon's reply is malformed.
 Result<Edge> read_edge(const v1::Edge& message);
 EditEffect read_effect(const v1::EditEffect& message);
 Result<ExportedFrame> read_exported(const v1::ExportedFrame& message);

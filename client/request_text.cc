@@ -14,7 +14,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-// Of one field, which is there.
+// Checks a field that is set.
 Status check_field(const Message& message, const FieldDescriptor& field) {
   const bool text = field.type() == FieldDescriptor::TYPE_STRING;
   if (!text && field.cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return {};

@@ -1,4 +1,4 @@
-// The texts of a request, before it is sent. Internal to client/.
+// Checks the texts of a request before it is sent. Internal to client/.
 #pragma once
 
 #include "proto/base/status.h"
@@ -9,7 +9,8 @@ class Message;
 
 namespace relmap::client {
 
-// INVALID_ARGUMENT: one of its texts is not UTF-8, and which. A daemon cannot read such a request, nor say which it is.
+// INVALID_ARGUMENT, with the name of the field, if a text is not UTF-8. A daemon cannot parse such a request, and so
+// could not say which text it is.
 Status check_texts(const google::protobuf::Message& request);
 
 }  // namespace relmap::client

@@ -1,4 +1,4 @@
-// What a failed call means. Internal to client/ and to the adapters that make calls of their own.
+// Turns gRPC's status into ours. Internal to client/ and to adapters that make their own calls.
 #pragma once
 
 #include "proto/base/status.h"
@@ -9,7 +9,8 @@ class Status;
 
 namespace relmap::client {
 
-// The daemon's own reason, from relmap.v1.Error in the status details; without one, the nearest reason of the code.
+// The daemon's reason and message, from relmap.v1.Error in the status details. Without one, the reason that corresponds
+// to gRPC's code.
 Status status_of(const grpc::Status& status);
 
 }  // namespace relmap::client

@@ -17,7 +17,7 @@ bool is_host_port(const std::string& text) {
   return error == std::errc{} && stop == end && port > 0 && port < 65536;
 }
 
-// A daemon that listens on every address is reached over loopback from its own machine.
+// Replaces the address of a daemon that listens on all interfaces by loopback.
 std::string reachable(const std::string& address) {
   for (const std::string any : {"0.0.0.0:", "[::]:"})
     if (address.starts_with(any)) return "localhost:" + address.substr(any.size());
@@ -44,7 +44,7 @@ Result<ServerAddress> resolve_server(const std::string& server) {
     else if (key == "boot")
       file >> address.boot_id;
     else
-      std::getline(file, key);  // of a later version
+      std::getline(file, key);  // ignores the lines of later versions
   }
   if (!is_host_port(address.address) || address.boot_id.empty())
     return {Reason::CORRUPT, path + " does not say where the daemon answers"};

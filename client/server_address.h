@@ -1,4 +1,4 @@
-// Where a daemon answers.
+// Finds the address of a daemon.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ struct ServerAddress {
   std::string boot_id;   // empty: the address was given
 };
 
-// `server`: a data folder, whose file `endpoint` says "address HOST:PORT", "pid N" and "boot ID", a line each; or
-// HOST:PORT. INVALID_ARGUMENT: neither. UNREACHABLE: no daemon serves the folder. CORRUPT: its endpoint is none.
+// `server` is HOST:PORT, or a data folder, whose file `endpoint` has the lines "address HOST:PORT", "pid N" and
+// "boot ID". INVALID_ARGUMENT: it is neither. UNREACHABLE: no daemon serves the folder. CORRUPT: the file is malformed.
 Result<ServerAddress> resolve_server(const std::string& server);
 
 }  // namespace relmap::client

@@ -7,7 +7,7 @@ namespace relmap::client {
 
 namespace {
 
-// A number and what it counts stay together: "12 m".
+// The words of `text`. A number and its unit, as in "12 m", are one word.
 std::vector<std::string> words_of(const std::string& text) {
   std::vector<std::string> words;
   for (std::size_t begin = 0; begin < text.size();) {
@@ -21,10 +21,10 @@ std::vector<std::string> words_of(const std::string& text) {
   return words;
 }
 
-// A name may be broken behind these: "drives/2026-11-24_morning".
+// Whether a long name such as "drives/2026-11-24_morning" may be broken behind `c`.
 bool separates(char c) { return c == '/' || c == '_' || c == '-' || c == '.' || c == ','; }
 
-// Where the letter ends that begins at `at`.
+// The end of the letter that begins at `at`.
 std::size_t after_letter(const std::string& utf8, std::size_t at) {
   for (++at; at < utf8.size() && (static_cast<unsigned char>(utf8[at]) & 0xC0) == 0x80;) ++at;
   return at;

@@ -1,4 +1,4 @@
-// Texts of a page that must not be longer than the room that there is.
+// Breaks texts into lines.
 #pragma once
 
 #include <string>
@@ -8,8 +8,9 @@
 
 namespace relmap::client {
 
-// Lines no wider than `width`, of all of the text: broken at spaces, but not between a number and its unit; a word that
-// is too long, behind the last / _ - . or comma that fits, or between its letters. At least one line.
+// Breaks a text into lines no wider than `width` (unless a single letter is wider), and returns at least one. It breaks
+// at spaces, but not between a number and its unit. A word that is too long is broken behind the last / _ - . or comma
+// that fits, or else between letters.
 std::vector<std::string> wrap(const Drawing& measure, const std::string& utf8, const TextStyle& style, double width);
 
 }  // namespace relmap::client

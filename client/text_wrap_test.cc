@@ -16,7 +16,7 @@ class TextWrap : public ::testing::TestWithParam<bool> {
       GetParam() ? make_svg_drawing(1, 1, {255, 255, 255}) : make_png_drawing(1, 1, {255, 255, 255}, 2);
 };
 
-TEST_P(TextWrap, LosesNothingAndExceedsNothing) {
+TEST_P(TextWrap, KeepsAllTextWithinTheWidth) {
   const TextStyle style{.size = 15, .colour = {}};
   for (const std::string text :
        {"a short one", "evening survey of the second robot in the northern hall, on the day before the fair",
@@ -53,8 +53,8 @@ TEST_P(TextWrap, BreaksANameBehindItsSeparators) {
 INSTANTIATE_TEST_SUITE_P(Drawings, TextWrap, ::testing::Bool(),
                          [](const auto& which) { return which.param ? "Svg" : "Png"; });
 
-// The advances of DejaVu Sans, the widest of the fonts that an SVG asks for, at 100 points.
-TEST(SvgText, IsNeverWiderThanItWasTakenFor) {
+// The widths at 100 points in DejaVu Sans, the widest of the fonts that an SVG asks for.
+TEST(SvgText, IsNeverWiderThanItsEstimate) {
   const auto svg = make_svg_drawing(1, 1, {255, 255, 255});
   const TextStyle plain{.size = 100, .colour = {}}, bold{.size = 100, .colour = {}, .bold = true};
   EXPECT_GE(svg->text_width("WWWW", plain), 395.1);

@@ -1,5 +1,5 @@
-// Little-endian bytes in and out, for every binary format of relmap (keyframe payload, journal, chunks, vocabulary).
-// Integers and IEEE floats in their own width, counts as they are declared by the format, no padding.
+// Reads and writes the little-endian bytes of every binary format of relmap (keyframe payload, journal, chunks,
+// vocabulary). Integers and IEEE floats take their own width, without padding; the format says how wide counts are.
 #pragma once
 
 #include <bit>
@@ -36,11 +36,12 @@ class ByteWriter {
     put_raw(values, count * sizeof(T));
   }
   void put_bytes(ByteSpan bytes) { put_raw(bytes.data(), bytes.size()); }
-  void put_string(std::string_view text) {  // u16 length, then the bytes
+  // Writes the length as u16, then the bytes; `text` must be shorter than 64 KiB.
+  void put_string(std::string_view text) {
     put(static_cast<std::uint16_t>(text.size()));
     put_raw(text.data(), text.size());
   }
-  // Overwrites what was put at `offset` (a length or checksum known only at the end).
+  // Overwrites what was put at `offset`, such as a length or checksum that is known only at the end.
   template <Scalar T>
   void patch(std::size_t offset, T value) {
     std::memcpy(bytes_.data() + offset, &value, sizeof value);
@@ -61,8 +62,8 @@ class ByteWriter {
   Bytes bytes_;
 };
 
-// Reads never pass the end: a read that would, gives zeros and makes the reader bad for good. So a decoder reads
-// straight through and asks ok() before it trusts a count and at its end.
+// Never reads past the end: such a read returns zeros, and ok() is false from then on. A decoder can therefore read
+// without checking each field, and asks ok() before it trusts a count and once at its end.
 class ByteReader {
  public:
   explicit ByteReader(ByteSpan bytes) : bytes_(bytes) {}
@@ -85,7 +86,8 @@ class ByteReader {
     const auto bytes = get_bytes(get<std::uint16_t>());
     return {bytes.begin(), bytes.end()};
   }
-  // True if `count` items of at least `item_size` bytes can still follow: asked before memory is set aside for them.
+  // True if the bytes that remain can hold `count` items of at least `item_size` bytes. To be asked before memory is
+  // reserved for them.
   bool fits(std::size_t count, std::size_t item_size) const {
     return ok_ && (item_size == 0 || count <= remaining() / item_size);
   }

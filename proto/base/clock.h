@@ -1,4 +1,4 @@
-// The time of day, as all of relmap writes it.
+// The time of day in the form that all of relmap uses.
 #pragma once
 
 #include <chrono>

@@ -9,7 +9,7 @@ namespace relmap {
 
 namespace {
 
-// Reads one decimal number off the front of `text`; false if there is none or it overflows.
+// Removes a decimal number from the front of `text`; false if there is none or it overflows.
 bool take_number(std::string_view& text, std::uint32_t& number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc{} || end == text.data()) return false;

@@ -1,5 +1,6 @@
-// The identities of the map. They are values, cheap to copy, totally ordered, and mean the same on the wire,
-// in memory and on disk. None is ever reused.
+// The identifiers of the map. They are values, cheap to copy and totally ordered, and mean the same on the wire, in
+// memory and on disk. None is ever reused. parse() reads what to_string() writes, and returns
+// nothing if the text is malformed.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@
 
 namespace relmap {
 
-// 128 random bits: a name that nobody else gives.
+// 128 random bits, so that no two parties choose the same one.
 struct Uuid {
   std::array<std::uint8_t, 16> bytes{};
 
@@ -21,16 +22,17 @@ struct Uuid {
   bool is_nil() const { return *this == Uuid{}; }
   std::string to_string() const;  // 8-4-4-4-12 hexadecimal digits
   static std::optional<Uuid> parse(std::string_view text);
-  static Uuid random();  // from the system's entropy
+  static Uuid random();  // version 4, from the system's entropy
 };
 
-// One trajectory of one robot, named by the front-end at begin.
+// Identifies a session, one trajectory of one robot. The front-end chooses it when it begins the session.
 using SessionUuid = Uuid;
 
-// The number that storage gives a session; 0 is none.
+// The number that the map gives a session, from 1; 0: no session.
 using SessionNumber = std::uint32_t;
 
-// A keyframe of the map. `index` is its sequence on the wire, so it may skip; the chunk is known without a lookup.
+// A keyframe of the map. `index` is its sequence on the wire, so there may be gaps, and its chunk is known without a
+// lookup.
 struct FrameId {
   SessionNumber session = 0;
   std::uint32_t index = 0;
@@ -45,9 +47,9 @@ struct FrameId {
   static std::optional<FrameId> parse(std::string_view text);
 };
 
-// An edge lives with the newer of its frames, so its identity says where it is stored. Ordinal 0 is the odometry
-// (or prior) edge to the frame before; 1, 2, ... are loop closures in the order in which they were proposed.
-// Edge ids order the neighbours of a frame in every search (docs/method.md, 2: "increasing edge id").
+// An edge is stored with the newer of its frames, `frame`. Ordinal 0 is the odometry (or prior) edge to the previous
+// frame; 1, 2, ... are loop closures in the order in which they were proposed. Every search visits the neighbours of a
+// frame in the order of edge ids (docs/method.md, 2: "increasing edge id").
 struct EdgeId {
   FrameId frame;
   std::uint32_t ordinal = 0;
@@ -58,10 +60,11 @@ struct EdgeId {
   static std::optional<EdgeId> parse(std::string_view text);
 };
 
-// A loop closure is its edge record, whether or not it carries an edge of the graph. Invalid: tracking, no closure.
+// A loop closure has the id of its edge record, whether or not it carries an edge of the graph. Invalid where an
+// observation comes from tracking and not from a closure.
 using ClosureId = EdgeId;
 
-// A point of the map: the slot-th landmark whose base is `base`.
+// The slot-th landmark whose base frame is `base`.
 struct LandmarkId {
   FrameId base;
   std::uint32_t slot = 0;
@@ -71,7 +74,7 @@ struct LandmarkId {
   std::string to_string() const;  // "3:120.17"
 };
 
-// A track on the wire, within its session: the keyframe that introduced it, and its index there.
+// A track on the wire, unique within its session: the keyframe that introduced it, and its index there.
 struct TrackId {
   std::uint32_t sequence = 0;
   std::uint32_t index = 0;

@@ -1,4 +1,4 @@
-// Which map a daemon serves, so that a robot that was in one does not go on in another.
+// Which map a daemon serves, so that a robot does not continue a session in another map.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 namespace relmap {
 
 struct MapIdentity {
-  Uuid uuid;  // random, drawn once for each map; nil: not known (no map yet, or one of a daemon that does not say it)
-  // When this history of the map began, in microseconds UTC: with the map, or where it was restored from a backup. A
-  // restore raises it, so the map that goes on without what came after the backup is told from the one that had it.
+  Uuid uuid;  // random, drawn once for each map; nil: not known (no map yet, or an older daemon does not report it)
+  // When the map was made or last restored from a backup, in microseconds UTC. A restored map has lost what came after
+  // the backup; its higher epoch tells it from the original.
   std::uint64_t epoch = 0;
 
   bool operator==(const MapIdentity&) const = default;

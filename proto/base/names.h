@@ -1,4 +1,4 @@
-// Names that people read: robots, sessions, labels.
+// Names for display: of robots and sessions, and labels.
 #pragma once
 
 #include <string_view>
@@ -9,12 +9,12 @@ namespace relmap {
 
 inline constexpr std::size_t kMaxNameBytes = 64;
 
-// BAD_NAME unless `text` is 1..64 bytes of well-formed UTF-8 (RFC 3629) without control characters.
-// `what` begins the message: "robot", "label".
+// BAD_NAME unless `text` is 1..64 bytes of well-formed UTF-8 (RFC 3629) without control characters and with something
+// other than white space. `what` begins the message: "robot", "label".
 Status check_name(std::string_view what, std::string_view text);
 
-// The robot of a recording that names none. Many such recordings may be taken in at a time, so two of this name are
-// never taken for the same robot.
+// The robot of recordings that name none, set by `relmap ingest`. Several such recordings may be ingested at a time, so
+// sessions of this name are not reported as two robots of one name.
 inline constexpr char kUsualRobot[] = "batch";
 
 }  // namespace relmap

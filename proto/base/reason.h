@@ -1,6 +1,5 @@
-// Why something was refused, failed, or is in the state it is in. Every negative answer carries one.
-// The numbers are those of relmap.v1.Reason (proto/relmap/v1/reason.proto) and never change; a test in
-// wire compares the two name by name.
+// Why something was refused, failed, or is in its state. Every negative answer carries a reason. The numbers are those
+// of relmap.v1.Reason (proto/relmap/v1/reason.proto) and never change; a test in proto/wire compares names and numbers.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +7,7 @@
 
 namespace relmap {
 
-// X(name, number): the single list from which the enum and its names are made.
+// X(name, number): the list from which the enum and its names are made.
 #define RELMAP_REASONS(X)                                                                                             \
   X(OK, 0)                                                                                                            \
   /* What a robot sent. */                                                                                            \
@@ -16,17 +15,17 @@ namespace relmap {
   X(BAD_SIZE, 2)                /* too many or too few elements, or a payload over its limit */                       \
   X(TIME_BACKWARDS, 3)          /* not later than the session's previous keyframe */                                  \
   X(IMPLAUSIBLE_CALIBRATION, 4) /* fails check_plausible() */                                                         \
-  X(CALIBRATION_CHANGED, 5)     /* differs from the one the session began with */                                     \
+  X(CALIBRATION_CHANGED, 5)     /* differs from the one that the session began with */                                \
   X(CORRUPT, 6)                 /* CRC32C mismatch or undecodable bytes */                                            \
-  X(TRUNCATED, 7)               /* bytes end before what they announce */                                             \
-  X(SEQUENCE_CONFLICT, 8)       /* the sequence is known with another CRC32C */                                       \
+  X(TRUNCATED, 7)               /* the bytes end before all that they announce */                                     \
+  X(SEQUENCE_CONFLICT, 8)       /* the daemon has this sequence with another CRC32C */                                \
   X(BAD_ROTATION, 9)            /* quaternion is not of unit length */                                                \
   X(BAD_COVARIANCE, 10)         /* not symmetric positive definite */                                                 \
   X(OUTSIDE_PICTURE, 11)        /* a measurement outside the picture or with u_right > u_left */                      \
   X(BAD_TRACK, 12)              /* track from the future, twice in one keyframe, or of an unknown level */            \
   X(UNKNOWN_PROTOCOL_VERSION, 13)                                                                                     \
   X(BAD_NAME, 14)         /* empty, too long, or not UTF-8 */                                                         \
-  X(SEQUENCE_TOO_FAR, 15) /* beyond the bounded window */                                                             \
+  X(SEQUENCE_TOO_FAR, 15) /* further ahead of the session than the daemon can keep */                                 \
   X(BAD_DURATION, 16)     /* driven or standing time negative or longer than elapsed; a time outside 1970..2255 */    \
   X(SEQUENCE_SETTLED, 17) /* already refused or given up as a gap */                                                  \
   X(DROPPED_BY_ROBOT, 18) /* a gap: the robot's spool was full */                                                     \
@@ -35,8 +34,8 @@ namespace relmap {
   X(TIME_AHEAD, 21)       /* a time stamp more than a minute after the one before it, and alone with it */            \
   X(NOT_ALLOWED, 22)      /* the robot is not on the daemon's list */                                                 \
   X(RATE_LIMITED, 23)     /* more than the daemon takes from one robot; kept by the robot and sent again */           \
-  X(SESSION_FROZEN, 24)   /* an operator froze the session: it takes nothing more in */                               \
-  X(SESSION_DELETED, 25)  /* the session is being deleted, or was */                                                  \
+  X(SESSION_FROZEN, 24)   /* an operator froze the session: it accepts no more keyframes */                           \
+  X(SESSION_DELETED, 25)  /* the session is being deleted, or has been */                                             \
   X(MAP_RESTORED, 26)     /* a gap: the map was restored from a backup that is older than what the robot still has */ \
   /* What a caller asked. */                                                                                          \
   X(INVALID_ARGUMENT, 40)                                                                                             \
@@ -60,8 +59,8 @@ namespace relmap {
   X(NOT_STEREO, 58)                                                                                                   \
   X(COST_LIMIT, 59)        /* no route within the maximum cost */                                                     \
   X(WRONG_STATE, 60)       /* the edge is already in that state, or cannot enter it */                                \
-  X(NOT_CONFIRMED, 61)     /* whoever was asked did not say yes, or nobody could be asked */                          \
-  X(WRONG_CALIBRATION, 62) /* what is seen contradicts it: the picture is not of this camera, or not rectified */     \
+  X(NOT_CONFIRMED, 61)     /* the user did not say yes, or there was nobody to ask */                                 \
+  X(WRONG_CALIBRATION, 62) /* the picture contradicts it: taken by another camera, or not rectified */                \
   /* Why a loop closure is in its state. */                                                                           \
   X(CONSISTENT, 80)   /* accepted: agrees with others of another query frame */                                       \
   X(LONE, 81)         /* candidate: nothing agrees with it yet */                                                     \
@@ -72,10 +71,10 @@ namespace relmap {
   X(DECLARED_GAP, 86)         /* accepted: bridges keyframes the robot gave up */                                     \
   X(CONTRADICTS_MOTION, 87)   /* candidate: the robot's own motion between its ends says otherwise */                 \
   X(ACCEPTED_BY_OPERATOR, 88) /* accepted: an operator decided; never outvoted */                                     \
-  X(CARRIED, 89)              /* accepted: says with others that the robot was carried between its ends */            \
+  X(CARRIED, 89)              /* accepted: shows, as others do, that the robot was carried between its ends */        \
   X(BEYOND_DOUBT, 90)         /* accepted alone: its geometry is strong and no other place comes near it */           \
-  X(LOOKS_ALIKE, 91)          /* with others of a stretch: something else is seen there, behind a stop */             \
-  X(REMOVED_ALONE, 92)        /* an operator removed this closure and none of those that agree with it */             \
+  X(LOOKS_ALIKE, 91)   /* another place that looks alike: so say all closures between the two stretches of motion */  \
+  X(REMOVED_ALONE, 92) /* an operator removed this closure and none of those that agree with it */                    \
   /* The daemon and its disk. */                                                                                      \
   X(UNIMPLEMENTED, 100)                                                                                               \
   X(BUDGET_EXCEEDED, 101)                                                                                             \
@@ -121,10 +120,10 @@ enum class Reason : std::uint16_t {
 #undef X
 };
 
-// "NOT_FINITE"; "UNKNOWN" for a number that is none of ours.
+// The name, as in "NOT_FINITE"; "UNKNOWN" for a number that is not in the list.
 std::string_view reason_name(Reason reason);
 
-// False if `number` is none of ours. Used where a reason is read from bytes.
+// True if `number` is in the list. To be asked where a reason is read from bytes.
 bool is_reason(std::uint16_t number);
 
 }  // namespace relmap

@@ -1,5 +1,5 @@
-// Status and Result<T>: how every fallible function of relmap answers. Bad input and failing disks are
-// statuses; a broken promise of our own code is an assertion.
+// Status and Result<T>, which every function of relmap that can fail returns. Bad input and failing disks are statuses;
+// errors of our own code are assertions.
 #pragma once
 
 #include <cassert>
@@ -29,8 +29,8 @@ class [[nodiscard]] Status {
   std::string message_;
 };
 
-// Thrown where a status must cross code that cannot return one: reads of the paged graph below a search or a solve.
-// Caught by the worker and by the RPC wrapper, which answer with its status.
+// Carries a status through code that cannot return one, such as reads of the paged graph within a search or a solve.
+// The worker and the RPC wrapper catch it and answer with its status.
 class StatusError : public std::runtime_error {
  public:
   explicit StatusError(Status status) : std::runtime_error(status.to_string()), status_(std::move(status)) {}
@@ -40,7 +40,7 @@ class StatusError : public std::runtime_error {
   Status status_;
 };
 
-// A value, or the reason there is none.
+// A value, or the status that says why there is none.
 template <typename T>
 class [[nodiscard]] Result {
  public:
@@ -62,7 +62,7 @@ class [[nodiscard]] Result {
   T* operator->() { return &value(); }
   const T* operator->() const { return &value(); }
 
-  // The value, or a StatusError.
+  // Returns the value, or throws a StatusError.
   T or_throw() && {
     if (!ok()) throw StatusError(std::get<Status>(state_));
     return std::get<T>(std::move(state_));

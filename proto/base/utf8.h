@@ -7,13 +7,13 @@
 
 namespace relmap {
 
-// Takes the first code point off `text`, which is not empty. None, and `text` stays as it is: it does not begin with a
-// well-formed one.
+// Removes the first code point from `text`, which must not be empty, and returns it. Returns nothing, and leaves `text`
+// as it is, if it does not begin with a well-formed code point.
 std::optional<char32_t> take_code_point(std::string_view& text);
 
 bool is_utf8(std::string_view text);
 
-// Unicode's property White_Space: it takes room, and nothing is seen of it.
+// Whether `code` has Unicode's property White_Space.
 bool is_white_space(char32_t code);
 
 }  // namespace relmap

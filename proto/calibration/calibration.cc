@@ -18,7 +18,8 @@ Status implausible(const Parts&... parts) {
   return refuse_calibration(Reason::IMPLAUSIBLE_CALIBRATION, parts...);
 }
 
-// True if a ray further out is seen further in, before the edge of the picture at `edge` (in focal lengths).
+// True if the distortion is not monotonic out to the edge of the picture, so that two rays are seen in one pixel.
+// `edge`: distance of the edge from the principal point, in focal lengths.
 bool folds(const RawCamera& c, double edge) {
   constexpr int kSteps = 400;
   for (int i = 1; i <= kSteps; ++i) {
@@ -26,7 +27,7 @@ bool folds(const RawCamera& c, double edge) {
     if (1 + r2 * (3 * c.k1 + r2 * (5 * c.k2 + r2 * 7 * c.k3)) <= 0) return true;
     if (r * (1 + r2 * (c.k1 + r2 * (c.k2 + r2 * c.k3))) >= edge) return false;
   }
-  return true;  // twice as far out as the edge, and still inside the picture
+  return true;  // a ray twice as far out as the edge is still inside the picture
 }
 
 Status check_camera(const char* eye, const RawCamera& c, int width, int height) {
@@ -61,10 +62,12 @@ Status check_pair(const SE3& T) {
 bool undistorted(const RawCamera& c) { return c.k1 == 0 && c.k2 == 0 && c.p1 == 0 && c.p2 == 0 && c.k3 == 0; }
 
 Status check_rectified(const StereoCalibration& c) {
-  if (c.left.fx != c.left.fy || !undistorted(c.left)) return implausible("said to be rectified, but is distorted");
+  if (c.left.fx != c.left.fy || !undistorted(c.left))
+    return implausible("marked as rectified, but fx and fy differ, or there is distortion");
   if (c.mono()) return {};
   const bool parallel = c.T_right_left.R.isIdentity(1e-9) && c.T_right_left.t.tail<2>().norm() < 1e-9;
-  if (!(c.left == c.right) || !parallel) return implausible("said to be rectified, but the eyes differ");
+  if (!(c.left == c.right) || !parallel)
+    return implausible("marked as rectified, but the eyes differ, or are not parallel");
   return {};
 }
 

@@ -4,7 +4,7 @@ namespace relmap {
 
 namespace {
 
-// The fields in their order, for the writer and for the reader; matrices column by column.
+// Visits the fields in their order in the bytes, for the writer and for the reader; matrices column by column.
 template <typename Calibration, typename Field>
 void each_field(Calibration& c, Field field) {
   for (auto* camera : {&c.left, &c.right})
@@ -36,8 +36,10 @@ Result<StereoCalibration> decode_calibration(ByteSpan bytes) {
   const auto rectified = in.get<std::uint8_t>();
   calibration.rectified = rectified == 1;
   each_field(calibration, [&](double* numbers, std::size_t count) { in.get_array(numbers, count); });
-  if (!in.at_end()) return {Reason::CORRUPT, "a calibration of " + std::to_string(bytes.size()) + " bytes"};
-  if (rectified > 1) return {Reason::CORRUPT, "a calibration that is neither of raw nor of rectified pictures"};
+  if (!in.at_end())
+    return {Reason::CORRUPT, "a calibration of " + std::to_string(bytes.size()) + " bytes is too short or too long"};
+  if (rectified > 1)
+    return {Reason::CORRUPT, "the flag for rectified pictures is " + std::to_string(rectified) + "; must be 0 or 1"};
   return calibration;
 }
 

@@ -1,4 +1,5 @@
-// A stereo calibration in a record of relmap's own, bit for bit: in the log of a camera and in a session's header.
+// The bytes of a stereo calibration, as they stand in a camera's log and in a session's header. Decoding gives the same
+// calibration to the last bit.
 #pragma once
 
 #include "proto/base/bytes.h"
@@ -8,7 +9,7 @@ namespace relmap {
 
 Bytes encode_calibration(const StereoCalibration& calibration);
 
-// CORRUPT: bytes that encode_calibration() never writes. Whether the calibration is plausible is not asked.
+// CORRUPT: bytes that encode_calibration() never writes. Does not check that the calibration is plausible.
 Result<StereoCalibration> decode_calibration(ByteSpan bytes);
 
 }  // namespace relmap

@@ -24,8 +24,8 @@ TEST(CalibrationBytes, OfAnotherLengthAreRefused) {
     EXPECT_EQ(decode_calibration(ByteSpan(bytes).first(size)).reason(), Reason::CORRUPT);
 }
 
-// What decodes encodes to the same bytes, so a flag has one way to be written.
-TEST(CalibrationBytes, WithAFlagThatIsNoneAreRefused) {
+// Bytes that decode are encoded to the same bytes again, so a flag must have only one encoding.
+TEST(CalibrationBytes, WithAFlagOtherThanZeroOrOneAreRefused) {
   Bytes bytes = encode_calibration(sample_raw_calibration());
   constexpr std::size_t kFlag = 8;  // behind the width and the height
   bytes[kFlag] = 2;

@@ -1,4 +1,4 @@
-// EuRoC's sensor.yaml, of cameras and of inertial units. T_BS: sensor to body.
+// Parses EuRoC's sensor.yaml of cameras and of inertial units. T_BS: sensor to body.
 #include <cmath>
 
 #include "proto/calibration/calibration_yaml.h"
@@ -54,8 +54,8 @@ ImuSensor read_imu(std::string_view text) {
   sensor.gyro_walk = number("gyroscope_random_walk");
   if (root["timeshift_cam_imu"].IsDefined()) sensor.time_shift_s = number("timeshift_cam_imu");
   if (!(sensor.gyro_noise > 0 && sensor.gyro_noise <= 1 && sensor.gyro_walk >= 0 && sensor.gyro_walk <= 1))
-    fail(Reason::IMPLAUSIBLE_CALIBRATION, "noise ", sensor.gyro_noise, " and walk ", sensor.gyro_walk,
-         " of the gyroscope; must be above 0 and at most 1, 0 and at most 1");
+    fail(Reason::IMPLAUSIBLE_CALIBRATION, "gyroscope noise ", sensor.gyro_noise,
+         " must be above 0 and at most 1, walk ", sensor.gyro_walk, " must be 0..1");
   if (!(std::abs(sensor.time_shift_s) <= kMaxTimeShiftS))
     fail(Reason::IMPLAUSIBLE_CALIBRATION, "clocks ", sensor.time_shift_s, " s apart; at most ", kMaxTimeShiftS);
   return sensor;
@@ -64,11 +64,11 @@ ImuSensor read_imu(std::string_view text) {
 }  // namespace
 
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0, std::string_view cam1) {
-  return guarded([&] { return believed(read_euroc(cam0, cam1)); });
+  return guarded([&] { return plausible(read_euroc(cam0, cam1)); });
 }
 
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0) {
-  return guarded([&] { return believed(read_euroc_left(load(cam0))); });
+  return guarded([&] { return plausible(read_euroc_left(load(cam0))); });
 }
 
 Result<ImuSensor> parse_imu_calibration(std::string_view text) {

@@ -1,4 +1,4 @@
-// Whatever the text: every parser ends with a calibration that is plausible, or with a reason.
+// For any text, every parser returns a plausible calibration or a reason.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>

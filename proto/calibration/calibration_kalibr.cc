@@ -1,4 +1,4 @@
-// kalibr's camchain: cam0, cam1, ..., each with the transform from the one before it.
+// Parses kalibr's camchain: cam0, cam1, ..., each with the transform from the camera before it.
 #include "proto/calibration/calibration_yaml.h"
 
 namespace relmap {
@@ -38,7 +38,7 @@ StereoCalibration read_kalibr(std::string_view text) {
 }  // namespace
 
 Result<StereoCalibration> parse_kalibr_calibration(std::string_view text) {
-  return guarded([&] { return believed(read_kalibr(text)); });
+  return guarded([&] { return plausible(read_kalibr(text)); });
 }
 
 }  // namespace relmap

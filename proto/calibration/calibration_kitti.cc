@@ -16,7 +16,8 @@ std::string_view next_line(std::string_view& text) {
   return line;
 }
 
-// The numbers after "key:" on one of the lines; nullopt: no such line; empty: they are not all numbers.
+// The numbers on the line that begins with "key:". nullopt: there is no such line; empty: not all of it is numbers, or
+// there are more than 16.
 std::optional<std::vector<double>> numbers_of(std::string_view text, std::string_view key) {
   while (!text.empty()) {
     std::string_view line = next_line(text);
@@ -37,7 +38,7 @@ std::optional<std::vector<double>> numbers_of(std::string_view text, std::string
   return std::nullopt;
 }
 
-// A 3x4 projection matrix, f and c the same for both eyes: [f 0 cx tx; 0 f cy 0; 0 0 1 0].
+// CORRUPT unless `p` is a 3x4 projection matrix of a rectified camera, [f 0 cx tx; 0 f cy 0; 0 0 1 0].
 Status check_projection(const std::vector<double>& p, std::string_view key) {
   if (p.size() != 12) return refuse_calibration(Reason::CORRUPT, key, " is not 12 numbers");
   for (const std::size_t zero : {1u, 4u, 8u, 9u})
@@ -66,7 +67,8 @@ Result<StereoCalibration> parse_kitti_calibration(std::string_view text) {
   }
   if (const auto size = numbers_of(text, "S_rect_00")) {
     if (size->size() != 2 || !((*size)[0] >= 16 && (*size)[0] <= 16384 && (*size)[1] >= 16 && (*size)[1] <= 16384))
-      return {Reason::IMPLAUSIBLE_CALIBRATION, "S_rect_00 is no size of a picture"};
+      return {Reason::IMPLAUSIBLE_CALIBRATION,
+              "S_rect_00 is not the size of a picture; both sides must be 16..16384 px"};
     calibration.width = static_cast<int>((*size)[0]);
     calibration.height = static_cast<int>((*size)[1]);
   }

@@ -1,4 +1,4 @@
-// Which of the formats a file or folder is.
+// Finds the calibration in a file or folder, and which format it is of.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -32,7 +32,7 @@ bool is_file(const fs::path& path) {
 
 enum class Format { kNone, kKitti, kEuroc, kKalibr, kRos, kOpenCv };
 
-// By the names that only that format has.
+// The format, recognised by names that no other format has.
 Format format_of(std::string_view text) {
   const auto has = [&](std::string_view name) { return text.find(name) != text.npos; };
   if (has("T_BS") && has("camera_model")) return Format::kEuroc;
@@ -44,10 +44,10 @@ Format format_of(std::string_view text) {
 }
 
 struct EyeFiles {
-  std::string left, right;  // the same: a file of one camera
+  std::string left, right;  // the same path if the file is of one camera
 };
 
-// cam0/ and cam1/, cam0_sensor.yaml and cam1_sensor.yaml: by the last number of a camera in the path.
+// For cam0/ and cam1/, or cam0_sensor.yaml and cam1_sensor.yaml: replaces the last camera number in the path.
 EyeFiles euroc_files(const std::string& path) {
   EyeFiles files{path, path};
   const std::size_t at = path.rfind("cam");
@@ -56,7 +56,7 @@ EyeFiles euroc_files(const std::string& path) {
   return files;
 }
 
-// left.yaml and right.yaml, front_left.yaml and front_right.yaml.
+// For left.yaml and right.yaml, or front_left.yaml and front_right.yaml.
 EyeFiles ros_files(const std::string& path) {
   std::string stem = fs::path(path).stem().string();
   const auto beside = [&](const char* eye) {
@@ -104,7 +104,7 @@ Result<StereoCalibration> load_file(const std::string& path) {
           "EuRoC's (T_BS, camera_model) nor KITTI's (P0)"};
 }
 
-// The calibration among the files of any name. Several are not chosen from.
+// The only calibration among the .yaml and .yml files of `folder`. `looked_for` is for the message.
 Result<std::string> find_in(const fs::path& folder, const std::string& looked_for) {
   std::vector<std::string> found;
   std::error_code error;

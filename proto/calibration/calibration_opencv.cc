@@ -33,7 +33,7 @@ StereoCalibration read_opencv(std::string_view text) {
 }  // namespace
 
 Result<StereoCalibration> parse_opencv_calibration(std::string_view text) {
-  return guarded([&] { return believed(read_opencv(text)); });
+  return guarded([&] { return plausible(read_opencv(text)); });
 }
 
 }  // namespace relmap

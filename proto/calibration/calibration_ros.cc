@@ -1,5 +1,5 @@
-// ROS camera_info, a file for each eye: K and D of the raw picture, R that rectifies it, P = [f 0 cx Tx; 0 f cy Ty;
-// 0 0 1 0] of the rectified one, with Tx = -f B in the right eye's.
+// Parses ROS camera_info, one file for each eye. K and D describe the raw picture, R rectifies it, and
+// P = [f 0 cx Tx; 0 f cy Ty; 0 0 1 0] is of the rectified picture, with Tx = -f B for the right eye.
 #include "proto/calibration/calibration_yaml.h"
 
 namespace relmap {
@@ -11,7 +11,7 @@ using namespace calibration_yaml;
 struct Eye {
   RawCamera raw;
   Matrix3 R;                   // p_rectified = R p_raw
-  RawCamera rectified;         // of P
+  RawCamera rectified;         // from P
   Vector3 from_left{0, 0, 0};  // p_rectified = p_rectified_left + from_left, metres
   std::vector<double> size;
 };
@@ -19,7 +19,7 @@ struct Eye {
 Eye read_eye(std::string_view text, const char* what) {
   const YAML::Node root = load(text);
   const std::string lens = root["distortion_model"].as<std::string>("plumb_bob");
-  // The rational polynomial is plumb_bob where its other coefficients are 0, which set_distortion() sees to.
+  // The rational polynomial is plumb_bob if its other coefficients are 0, which set_distortion() checks.
   if (lens != "plumb_bob" && lens != "rational_polynomial")
     fail(Reason::UNSUPPORTED, what, ": distortion model '", lens, "'; known: plumb_bob");
   Eye eye;
@@ -38,7 +38,7 @@ Eye read_eye(std::string_view text, const char* what) {
   return eye;
 }
 
-// Nothing that a rectification would change.
+// True if rectification would change nothing.
 bool is_rectified(const Eye& eye) {
   return eye.raw == eye.rectified && eye.raw.fx == eye.raw.fy && eye.R.isIdentity(1e-9);
 }
@@ -66,11 +66,11 @@ StereoCalibration read_ros(std::string_view left_text, std::string_view right_te
 }  // namespace
 
 Result<StereoCalibration> parse_ros_calibration(std::string_view left, std::string_view right) {
-  return guarded([&] { return believed(read_ros(left, right)); });
+  return guarded([&] { return plausible(read_ros(left, right)); });
 }
 
 Result<StereoCalibration> parse_ros_calibration(std::string_view camera) {
-  return guarded([&] { return believed(read_ros_left(camera)); });
+  return guarded([&] { return plausible(read_ros_left(camera)); });
 }
 
 }  // namespace relmap

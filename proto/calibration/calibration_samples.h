@@ -5,8 +5,7 @@
 
 namespace relmap {
 
-// Baseline 0.12 m, and a little of everything that a calibration has; `scale`: of pictures of 160 x 120 so many times
-// as large.
+// Has a baseline of 0.12 m, and distortion and rotation in every parameter. Its pictures are 160 x 120 times `scale`.
 inline StereoCalibration sample_raw_calibration(int scale = 1) {
   StereoCalibration calibration;
   calibration.width = 160 * scale;

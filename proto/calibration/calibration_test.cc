@@ -56,7 +56,7 @@ TEST(KittiCalibration, GivesTheRectifiedCamera) {
   EXPECT_TRUE(camera.check_plausible().ok());
 }
 
-TEST(KittiCalibration, RawDataSetsNameTheirMatricesOtherwiseAndSayTheSize) {
+TEST(KittiCalibration, RawDataSetsHaveOtherMatrixNamesAndASize) {
   const auto c =
       parse_kitti_calibration("S_rect_00: 1.242000e+03 3.750000e+02\r\n" + replaced(kKittiRow0, "P0", "P_rect_00") +
                               replaced(kKittiRow1, "P1", "P_rect_01"));
@@ -72,7 +72,7 @@ TEST(KittiCalibration, OneCameraIsMono) {
   EXPECT_EQ(c->rectified_camera().baseline, 0);
 }
 
-TEST(KittiCalibration, WhatIsNoneIsNamed) {
+TEST(KittiCalibration, BadTextIsRefusedWithItsReason) {
   EXPECT_EQ(parse_kitti_calibration("").reason(), Reason::CORRUPT);
   EXPECT_EQ(parse_kitti_calibration("P0: 1 2 3\n").reason(), Reason::CORRUPT);
   EXPECT_EQ(parse_kitti_calibration("P0: a b c\n").reason(), Reason::CORRUPT);
@@ -98,7 +98,7 @@ TEST(OpenCvCalibration, GivesBothCamerasAndTheTransformBetweenThem) {
   EXPECT_EQ(c->height, 480);
 }
 
-TEST(OpenCvCalibration, TheSizeMayStandInTwoNumbersOrNotAtAll) {
+TEST(OpenCvCalibration, TheSizeMayBeTwoNumbersOrMissing) {
   const auto c =
       parse_opencv_calibration(replaced(kOpenCv, "imageSize: [ 640, 480 ]", "image_width: 640\nimage_height: 480"));
   ASSERT_TRUE(c.ok()) << c.status().to_string();
@@ -160,7 +160,7 @@ TEST(EurocCalibration, GivesTheTransformFromTheBodyFrames) {
   EXPECT_EQ(c->width, 752);
 }
 
-TEST(EurocCalibration, SaysWhereTheLeftCameraSitsInTheBody) {
+TEST(EurocCalibration, GivesThePoseOfTheLeftCameraInTheBody) {
   const std::string turned = "[0, -1, 0, 0.02,\n 1, 0, 0, 0.01,\n 0, 0, 1, 0,";
   const std::string left = replaced(euroc("0.02"), "[1, 0, 0, 0.02,\n 0, 1, 0, 0.01,\n 0, 0, 1, 0,", turned);
   const auto c = parse_euroc_calibration(left);
@@ -177,7 +177,7 @@ TEST(EurocCalibration, OneCameraIsMono) {
   EXPECT_EQ(c->width, 752);
 }
 
-TEST(EurocCalibration, WhatIsNoneIsNamed) {
+TEST(EurocCalibration, BadTextIsRefusedWithItsReason) {
   const auto left = euroc("0.02"), right = euroc("0.13");
   EXPECT_EQ(parse_euroc_calibration(left, "").reason(), Reason::CORRUPT);
   EXPECT_EQ(parse_euroc_calibration(right, left).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
@@ -218,7 +218,7 @@ TEST(KalibrCalibration, TheBodyIsTheInertialUnit) {
   const auto c = parse_kalibr_calibration("cam0:\n" + kalibr_camera(pose));
   ASSERT_TRUE(c.ok()) << c.status().to_string();
   EXPECT_TRUE(c->mono());
-  // A point of the inertial unit's x axis lies at (0.5, -1, 0) of the camera.
+  // The point (1, 0, 0) of the inertial unit is at (0.5, -1, 0) in the camera.
   EXPECT_LT((c->T_body_left * Vector3(0.5, -1, 0) - Vector3(1, 0, 0)).norm(), 1e-12);
 }
 
@@ -229,7 +229,7 @@ TEST(KalibrCalibration, MayBeWithoutDistortion) {
   EXPECT_EQ(c->left, (RawCamera{458.654, 457.296, 367.215, 248.375}));
 }
 
-TEST(KalibrCalibration, WhatIsNoneIsNamed) {
+TEST(KalibrCalibration, BadTextIsRefusedWithItsReason) {
   const auto reason = [](const std::string& text) { return parse_kalibr_calibration(text).reason(); };
   EXPECT_EQ(reason("cam1:\n" + kalibr_camera(kKalibrRight)), Reason::CORRUPT);
   EXPECT_EQ(reason(replaced(kKalibr, "pinhole", "omni")), Reason::UNSUPPORTED);
@@ -248,7 +248,7 @@ std::string ros_matrix(const std::string& name, const std::string& data) {
   return name + ":\n  rows: 3\n  cols: 3\n  data: [" + data + "]\n";
 }
 
-// An eye turned by `angle` radians about y against the rectified camera.
+// An eye that is turned by `angle` radians about y relative to the rectified camera.
 std::string ros(double angle, const std::string& tx, const std::string& distortion = "-0.35, 0.15, 0.001, 0.0, 0.0") {
   const std::string c = std::to_string(std::cos(angle)), s = std::to_string(std::sin(angle)),
                     minus_s = std::to_string(-std::sin(angle));
@@ -267,7 +267,7 @@ TEST(RosCalibration, TheTransformFollowsFromTheRectification) {
   EXPECT_FALSE(c->rectified);
   EXPECT_EQ(c->left, (RawCamera{500, 501, 320, 240, -0.35, 0.15, 0.001}));
   EXPECT_EQ(c->width, 640);
-  // What both eyes see stands, rectified, 54 / 450 m further left in the right one.
+  // After rectification, points are 54 / 450 m further to the left in the right eye.
   const auto turn = [](double angle) { return so3_exp({0, angle, 0}); };
   const Vector3 p(0.3, -0.2, 2);
   const Vector3 right = turn(-0.01).transpose() * (turn(0.02) * p + Vector3(-0.12, 0, 0));
@@ -280,7 +280,7 @@ TEST(RosCalibration, OneCameraIsMono) {
   EXPECT_TRUE(c->mono());
 }
 
-TEST(RosCalibration, PicturesThatAreRectifiedAlreadyAreKnown) {
+TEST(RosCalibration, RecognisesPicturesThatAreRectifiedAlready) {
   const auto plain = [](const std::string& tx) {
     return replaced(ros(0, tx, "0, 0, 0, 0, 0"), "500.0, 0, 320.0, 0, 501.0, 240.0",
                     "450.0, 0, 310.0, 0, 450.0, 235.0");
@@ -291,7 +291,7 @@ TEST(RosCalibration, PicturesThatAreRectifiedAlreadyAreKnown) {
   EXPECT_NEAR(c->rectified_camera().baseline, 0.12, 1e-12);
 }
 
-TEST(RosCalibration, WhatIsNoneIsNamed) {
+TEST(RosCalibration, BadTextIsRefusedWithItsReason) {
   const auto reason = [](const std::string& left, const std::string& right) {
     return parse_ros_calibration(left, right).reason();
   };
@@ -335,7 +335,7 @@ TEST_F(LoadCalibration, TellsTheFormatsApart) {
   EXPECT_NEAR(c->T_right_left.t.x(), -0.11, 1e-12);
 }
 
-TEST_F(LoadCalibration, WithoutItsOtherFileEurocIsOneCamera) {
+TEST_F(LoadCalibration, Cam0OfEurocAloneIsMono) {
   EXPECT_TRUE(load_calibration(write("cam0/sensor.yaml", euroc("0.02")))->mono());
   EXPECT_TRUE(load_calibration(write("camera.yaml", euroc("0.02")))->mono());
   EXPECT_EQ(load_calibration(write("alone/cam1/sensor.yaml", euroc("0.13"))).reason(), Reason::NO_SUCH_FILE);
@@ -350,7 +350,7 @@ TEST_F(LoadCalibration, FindsItInADataSet) {
   EXPECT_TRUE(load_calibration(folder_.string())->rectified);
 }
 
-TEST_F(LoadCalibration, EitherFileOfRosStandsForBoth) {
+TEST_F(LoadCalibration, EitherFileOfRosLoadsBoth) {
   const std::string left = write("front_left.yaml", kRosLeft), right = write("front_right.yaml", kRosRight);
   for (const std::string& path : {left, right, folder_.string()}) {
     const auto c = load_calibration(path);
@@ -362,7 +362,7 @@ TEST_F(LoadCalibration, EitherFileOfRosStandsForBoth) {
   EXPECT_EQ(load_calibration(write("other/right.yaml", kRosRight)).reason(), Reason::NO_SUCH_FILE);
 }
 
-TEST_F(LoadCalibration, AFolderMayHoldOneOfAnyName) {
+TEST_F(LoadCalibration, AFolderMayHoldOneCalibrationOfAnyName) {
   write("settings.yaml", "mode: format7.3\n");
   write("imu.yaml", "T_BS: [1, 0]\n");
   EXPECT_EQ(load_calibration(folder_.string()).reason(), Reason::NO_SUCH_FILE);
@@ -372,7 +372,7 @@ TEST_F(LoadCalibration, AFolderMayHoldOneOfAnyName) {
   const auto several = load_calibration(folder_.string());
   EXPECT_EQ(several.reason(), Reason::INVALID_ARGUMENT);
   EXPECT_NE(several.status().message().find("rig-camchain.yaml"), std::string::npos);
-  write("stereo.yaml", kOpenCv);  // a name of its own goes first
+  write("stereo.yaml", kOpenCv);  // a well-known name is preferred
   EXPECT_EQ(load_calibration(folder_.string())->width, 640);
 }
 
@@ -384,7 +384,7 @@ TEST_F(LoadCalibration, NamesTheFileThatIsWrong) {
   EXPECT_NE(c.status().message().find(path), std::string::npos);
 }
 
-TEST(RectifiedCalibration, IsHeldToWhatItSays) {
+TEST(RectifiedCalibration, MustHaveParallelEyesWithoutDistortion) {
   StereoCalibration c = *parse_kitti_calibration(kKittiRow0 + kKittiRow1);
   ASSERT_TRUE(c.check_plausible().ok());
   StereoCalibration spoilt = c;

@@ -6,10 +6,10 @@ namespace relmap::calibration_yaml {
 
 YAML::Node load(std::string_view text) {
   if (text.size() > kMaxCalibrationBytes) fail(Reason::CORRUPT, "too long for a calibration");
-  // "%YAML:1.0", as OpenCV and EuRoC write it, is no YAML directive.
+  // OpenCV and EuRoC begin with "%YAML:1.0", which is not a valid YAML directive.
   if (text.starts_with("%YAML")) text.remove_prefix(std::min(text.find('\n'), text.size()));
   YAML::Node root = YAML::Load(std::string(text));
-  if (!root.IsMap()) fail(Reason::CORRUPT, "no calibration: not a map of names");
+  if (!root.IsMap()) fail(Reason::CORRUPT, "no calibration: the YAML is not a map");
   return root;
 }
 
@@ -19,33 +19,37 @@ YAML::Node find(const YAML::Node& root, std::initializer_list<const char*> names
   return YAML::Node(YAML::NodeType::Undefined);
 }
 
-std::vector<double> numbers(const YAML::Node& node, const char* what, std::size_t least, std::size_t most) {
+std::vector<double> numbers(const YAML::Node& node, const char* what, std::size_t min_count, std::size_t max_count) {
   const YAML::Node list = node.IsMap() ? node["data"] : node;
   std::vector<double> values;
-  if (list.IsDefined() && list.IsSequence() && list.size() <= most)
+  if (list.IsDefined() && list.IsSequence() && list.size() <= max_count)
     for (const YAML::Node& item : list) {
       if (!item.IsSequence()) {
         values.push_back(item.as<double>());
         continue;
       }
       for (const YAML::Node& number : item)
-        if (values.size() <= most) values.push_back(number.as<double>());
+        if (values.size() <= max_count) values.push_back(number.as<double>());
     }
-  if (values.size() < least || values.size() > most)
-    fail(Reason::CORRUPT, what, " is not a list of ", least, least == most ? "" : " or more", " numbers");
+  if (values.size() < min_count || values.size() > max_count) {
+    const std::string count = std::to_string(min_count);
+    fail(Reason::CORRUPT, what, " is not a list of ",
+         min_count == max_count ? count : count + " to " + std::to_string(max_count), " numbers");
+  }
   return values;
 }
 
 void set_distortion(RawCamera& camera, const std::vector<double>& d, const char* what) {
   for (std::size_t i = 5; i < d.size(); ++i)
-    if (d[i] != 0) fail(Reason::UNSUPPORTED, what, " is of another model than k1, k2, p1, p2, k3");
+    if (d[i] != 0) fail(Reason::UNSUPPORTED, what, " has coefficients other than k1, k2, p1, p2, k3");
   const auto at = [&](std::size_t i) { return i < d.size() ? d[i] : 0.0; };
   camera.k1 = at(0), camera.k2 = at(1), camera.p1 = at(2), camera.p2 = at(3), camera.k3 = at(4);
 }
 
 void set_size(StereoCalibration& calibration, const std::vector<double>& size) {
   for (const double side : size)
-    if (!(side >= 16 && side <= 16384)) fail(Reason::IMPLAUSIBLE_CALIBRATION, "a picture with a side of ", side, " px");
+    if (!(side >= 16 && side <= 16384))
+      fail(Reason::IMPLAUSIBLE_CALIBRATION, "a side of the picture has ", side, " px; must be 16..16384");
   calibration.width = static_cast<int>(size[0]);
   calibration.height = static_cast<int>(size[1]);
 }
@@ -63,7 +67,7 @@ SE3 rigid(const std::vector<double>& r, const Vector3& t, const char* what) {
   SE3 T;
   for (int i = 0; i < 9; ++i) T.R(i / 3, i % 3) = r[static_cast<std::size_t>(i)];
   T.t = t;
-  // Calibrations carry a dozen digits or fewer; anything else is a mistake.
+  // Files hold a dozen digits or fewer; a larger deviation is a mistake.
   if (!T.R.allFinite() || (T.R * T.R.transpose()).isIdentity(1e-4) == false || T.R.determinant() < 0)
     fail(Reason::IMPLAUSIBLE_CALIBRATION, what, " is no rotation");
   return T.normalized();
@@ -74,7 +78,7 @@ SE3 rigid(const YAML::Node& matrix, const char* what) {
   return rigid({m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}, what);
 }
 
-StereoCalibration believed(StereoCalibration calibration) {
+StereoCalibration plausible(StereoCalibration calibration) {
   if (Status s = calibration.check_plausible(); !s.ok()) throw Unreadable{s};
   return calibration;
 }

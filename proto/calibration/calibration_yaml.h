@@ -1,4 +1,5 @@
-// What the parsers of calibrations in YAML share: numbers read out of it with care, and exceptions kept inside.
+// What the parsers of calibrations in YAML share. These functions throw where the text is malformed; guarded() turns
+// that into a status, so that no exception leaves a parser.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -14,7 +15,7 @@
 
 namespace relmap::calibration_yaml {
 
-// Thrown by what follows; guarded() answers with its status.
+// Thrown by the functions below; guarded() returns its status.
 struct Unreadable {
   Status status;
 };
@@ -24,27 +25,29 @@ template <typename... Parts>
   throw Unreadable{refuse_calibration(reason, parts...)};
 }
 
-// The map of names that the text is.
+// Parses `text`, whose root must be a map of names.
 YAML::Node load(std::string_view text);
 
-// The first of the names that is there, or an undefined node.
+// The node of the first of `names` that `root` has, or an undefined node.
 YAML::Node find(const YAML::Node& root, std::initializer_list<const char*> names);
 
-// least..most numbers: a list, a list of rows, or the `data` of a matrix.
-std::vector<double> numbers(const YAML::Node& node, const char* what, std::size_t least, std::size_t most);
+// Reads min_count to max_count numbers from a list, a list of rows, or the `data` of a matrix. `what` names them in the
+// message.
+std::vector<double> numbers(const YAML::Node& node, const char* what, std::size_t min_count, std::size_t max_count);
 
 void set_distortion(RawCamera& camera, const std::vector<double>& d, const char* what);  // k1, k2, p1, p2, k3
 void set_size(StereoCalibration& calibration, const std::vector<double>& size);          // width, height
 
-// A camera matrix of nine numbers; the distortion may be undefined.
+// Reads a camera from its matrix of nine numbers and its distortion, which may be undefined.
 RawCamera opencv_camera(const YAML::Node& matrix, const YAML::Node& distortion, const char* what);
 
 SE3 rigid(const std::vector<double>& r, const Vector3& t, const char* what);  // nine numbers, row by row
 SE3 rigid(const YAML::Node& matrix, const char* what);                        // 4 x 4
 
-StereoCalibration believed(StereoCalibration calibration);
+// Returns `calibration`, or throws what check_plausible() says of it.
+StereoCalibration plausible(StereoCalibration calibration);
 
-// yaml-cpp reports by exceptions; none leaves a parser.
+// What `read` returns, or the status of the exception that it or yaml-cpp throws.
 template <typename Read>
 auto guarded(Read read) -> Result<decltype(read())> {
   try {

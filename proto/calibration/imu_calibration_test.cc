@@ -15,7 +15,7 @@ std::string sensor(const std::string& noise = "1.6968e-04", const std::string& m
          noise + "     # [ rad / s / sqrt(Hz) ]\ngyroscope_random_walk: 1.9393e-05\n" + more;
 }
 
-TEST(ImuCalibration, IsEurocs) {
+TEST(ImuCalibration, IsReadFromEurocsFormat) {
   const auto imu = parse_imu_calibration(sensor());
   ASSERT_TRUE(imu.ok()) << imu.status().to_string();
   EXPECT_EQ(imu->gyro_noise, 1.6968e-04);
@@ -28,7 +28,7 @@ TEST(ImuCalibration, MaySayByHowMuchTheClocksDiffer) {
   EXPECT_EQ(parse_imu_calibration(sensor("1e-4", "timeshift_cam_imu: -0.0125\n"))->time_shift_s, -0.0125);
 }
 
-TEST(ImuCalibration, WhatIsNoneIsNamed) {
+TEST(ImuCalibration, BadTextIsRefusedWithItsReason) {
   EXPECT_EQ(parse_imu_calibration("").reason(), Reason::CORRUPT);
   EXPECT_EQ(parse_imu_calibration("just text").reason(), Reason::CORRUPT);
   EXPECT_EQ(parse_imu_calibration("gyroscope_noise_density: 1e-4\n").reason(), Reason::CORRUPT);

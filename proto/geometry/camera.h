@@ -1,4 +1,4 @@
-// The rectified stereo camera, and what it measures (docs/method.md, 1).
+// The rectified stereo camera and its measurements (docs/method.md, 1).
 #pragma once
 
 #include <cmath>
@@ -27,7 +27,7 @@ struct StereoCamera {
   bool operator==(const StereoCamera&) const = default;
   bool is_stereo() const { return baseline > 0; }
 
-  // h(p), p in the left camera's frame with p.z > 0.
+  // h(p), the pixels of p in the left camera's frame, p.z > 0.
   StereoPixel project(const Vector3& p) const {
     const double s = f / p.z();
     return {s * p.x() + cx, s * p.y() + cy, s * (p.x() - baseline) + cx};
@@ -46,13 +46,13 @@ struct StereoCamera {
   }
   bool in_picture(double u, double v) const { return u >= -0.5 && v >= -0.5 && u <= width - 0.5 && v <= height - 0.5; }
 
-  // IMPLAUSIBLE_CALIBRATION unless: 16..16384 pixels a side, f between 0.1 and 20 picture widths, the principal point
-  // inside the picture, baseline 0 or 5 mm .. 10 m, all finite.
+  // IMPLAUSIBLE_CALIBRATION unless all numbers are finite, each side has 16..16384 pixels, f is 0.1..20 picture widths,
+  // the principal point is inside the picture, and the baseline is 0 or 5 mm .. 10 m.
   Status check_plausible() const;
 };
 
-// Standard deviation of a coordinate found at a pyramid level, each level half the size of the one before: 1 px x
-// 2^level.
+// Standard deviation in pixels of a coordinate measured at a pyramid level: 2^level, since each level has half the size
+// of the one before.
 inline double pixel_sigma(int level) { return static_cast<double>(1 << level); }
 inline constexpr int kMaxPyramidLevel = 7;
 

@@ -8,18 +8,18 @@ namespace relmap {
 
 namespace {
 
-constexpr double kGrid = 0x1p46;  // far coarser than the error of matrix and back (a few 2^-53)
+constexpr double kGrid = 0x1p46;  // far coarser than the error of the conversion to a matrix and back (a few 2^-53)
 constexpr double kTie = 1e-9;     // components this close count as equal, so that noise does not choose between them
-constexpr double kUnitLength = 1e-6;  // tolerance of a length
+constexpr double kUnitLength = 1e-6;  // tolerance of a quaternion's length
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 QuaternionWxyz on_grid(const Matrix3& rotation) {
   const Eigen::Quaterniond e(rotation);
   QuaternionWxyz q = {e.w(), e.x(), e.y(), e.z()};
-  double most = 0;
-  for (const double c : q) most = std::max(most, std::abs(c));
+  double max_abs = 0;
+  for (const double c : q) max_abs = std::max(max_abs, std::abs(c));
   std::size_t largest = 0;
-  while (largest < 3 && !(std::abs(q[largest]) >= most - kTie)) ++largest;
+  while (largest < 3 && !(std::abs(q[largest]) >= max_abs - kTie)) ++largest;
 
   double rest = 1;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -40,7 +40,7 @@ QuaternionWxyz canonical_quaternion(const Matrix3& rotation) {
   if (!rotation.allFinite()) return {kNaN, kNaN, kNaN, kNaN};
   if (!is_rotation(rotation)) return {};
   QuaternionWxyz q = on_grid(rotation);
-  // Rounding can carry a pair of components over the edge of kTie; one more turn settles it.
+  // Rounding can move a pair of components across the threshold kTie; repeating reaches a fixed point.
   for (int i = 0; i < 4; ++i) {
     const QuaternionWxyz again = on_grid(rotation_of(q));
     if (again == q) break;

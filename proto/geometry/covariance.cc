@@ -35,7 +35,7 @@ Status check_covariance(const Matrix6& covariance) {
   if ((correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9)
     return {Reason::BAD_COVARIANCE, "covariance is not symmetric"};
   const Eigen::LLT<Matrix6> llt(correlation);
-  // A pivot is the share of a coordinate's variance that those before it leave unexplained.
+  // A squared diagonal element of L is the share of a coordinate's variance that those before it leave unexplained.
   if (llt.info() != Eigen::Success || llt.matrixLLT().diagonal().minCoeff() < 3.2e-5)
     return {Reason::BAD_COVARIANCE, "covariance is not positive definite"};
   return {};

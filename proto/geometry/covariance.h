@@ -1,4 +1,4 @@
-// Covariances of SE(3) from outside: plausibility, and the 21 numbers of their upper triangle.
+// Covariances of SE(3) that come from outside: their plausibility, and the 21 numbers of their upper triangle.
 #pragma once
 
 #include <array>
@@ -14,8 +14,9 @@ using UpperTriangle = std::array<double, 21>;
 UpperTriangle upper_triangle(const Matrix6& symmetric);
 Matrix6 from_upper_triangle(const UpperTriangle& values);
 
-// NOT_FINITE; BAD_COVARIANCE unless symmetric (within 1e-9 of its diagonal) and positive definite with correlations
-// that leave each coordinate at least 1e-9 of its variance given the others, standard deviations 1e-9 .. 1e6.
+// NOT_FINITE; BAD_COVARIANCE unless the covariance is symmetric (correlations within 1e-9), its standard deviations are
+// 1e-9 .. 1e6 m or rad, and it is positive definite: each coordinate keeps at least 1e-9 of its variance when those
+// before it are given.
 Status check_covariance(const Matrix6& covariance);
 
 }  // namespace relmap

@@ -54,7 +54,7 @@ Matrix3 so3_exp(const Vector3& phi) {
 }
 
 Vector3 so3_log(const Matrix3& rotation) {
-  // Through the quaternion: well conditioned at every angle.
+  // The quaternion is well conditioned at every angle.
   Eigen::Quaterniond q(rotation);
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   const double n = q.vec().norm();

@@ -1,4 +1,4 @@
-// SE(3), and the conventions that every part, message and file of relmap shares (stated here, once):
+// SE(3), and the conventions of all code, messages and files of relmap:
 //
 //   T_ab maps coordinates in frame b to frame a:  p_a = T_ab p_b.  Lengths in metres, angles in radians.
 //   A camera frame is x right, y down, z forward; a keyframe's frame is its rectified left camera.
@@ -41,7 +41,7 @@ struct SE3 {
   SE3 inverse() const { return {R.transpose(), -(R.transpose() * t)}; }
   Matrix6 adjoint() const;
   Eigen::Quaterniond quaternion() const { return Eigen::Quaterniond(R); }
-  // The same motion with R made orthonormal again.
+  // The same transform with R made orthonormal again.
   SE3 normalized() const { return {quaternion().normalized().toRotationMatrix(), t}; }
 
   SE3 operator*(const SE3& other) const { return {R * other.R, R * other.t + t}; }
@@ -52,7 +52,7 @@ struct SE3 {
 // Barfoot, "State Estimation for Robotics", 7.1.5.
 Matrix6 right_jacobian_inverse(const Vector6& r);
 
-// Covariance of T_ab T_bc when the two are independent: Ad(T_cb) S_ab Ad(T_cb)' + S_bc.
+// Covariance of T_ab T_bc if the two are independent: Ad(T_cb) S_ab Ad(T_cb)' + S_bc.
 Matrix6 compound_covariance(const Matrix6& s_ab, const SE3& T_bc, const Matrix6& s_bc);
 // Covariance of T_ba, given that of T_ab.
 Matrix6 inverse_covariance(const SE3& T_ab, const Matrix6& s_ab);

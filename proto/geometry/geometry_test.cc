@@ -25,7 +25,7 @@ std::vector<Vector6> twists() {
 double angle_of(const Vector6& xi) { return xi.tail<3>().norm(); }
 
 TEST(Se3, ExpIsTheSolutionOfItsDifferentialEquation) {
-  // d/ds Exp(s xi) = Exp(s xi) xi^, integrated by Runge and Kutta's fourth order.
+  // d/ds Exp(s xi) = Exp(s xi) xi^, integrated by the fourth-order Runge-Kutta method.
   for (const Vector6& xi : twists()) {
     Eigen::Matrix4d generator = Eigen::Matrix4d::Zero();
     generator.topLeftCorner<3, 3>() = skew(xi.tail<3>());
@@ -87,7 +87,7 @@ TEST(Se3, RightJacobianInverseIsTheDerivativeOfLog) {
 }
 
 TEST(Covariance, CompoundsAndInvertsToFirstOrder) {
-  // Column by column: how a perturbation of each factor shows on the right of the result.
+  // Column by column, the right perturbation of the result that a perturbation of each factor causes.
   const SE3 T_ab = SE3::exp(twists()[22]), T_bc = SE3::exp(twists()[25]);
   Matrix6 from_first, from_inverse;
   const double h = 1e-6;

@@ -1,5 +1,6 @@
-// The bytes of extensions (docs/storage-format.md, Extensions): u16 count, then of each, ascending by tag: u32 tag,
-// u32 length, bytes. A record's own fields of later versions stand among those that this version does not know.
+// The bytes of a record's extensions (docs/storage-format.md, Extensions): u16 count, then for each, ascending by tag,
+// u32 tag, u32 length, bytes. Fields that were added to a record later and extensions that this version does not know
+// stand in one list.
 #pragma once
 
 #include <cstdint>
@@ -10,26 +11,28 @@
 
 namespace relmap {
 
-// Of one record. What is unknown is held in memory and written again, so it has to be little.
+// Limits for one record. Unknown extensions are kept in memory and written again, so they must be small.
 inline constexpr std::size_t kMaxExtensions = 32;
-inline constexpr std::size_t kMaxExtensionBytes = 4096;  // as bytes, tags and lengths included
+inline constexpr std::size_t kMaxExtensionBytes = 4096;  // encoded, including count, tags and lengths
 
+// The size of the encoded extensions.
 std::size_t extension_bytes(const Extensions& extensions);
-// BAD_SIZE: more than a record may have. CORRUPT: tags are zero or do not ascend.
+// BAD_SIZE: above the limits of a record. CORRUPT: a tag is zero, or the tags do not ascend.
 Status check_extensions(const Extensions& extensions);
 
 void put_extensions(ByteWriter& w, const Extensions& extensions);
-// TRUNCATED, or what check_extensions() says of them.
+// TRUNCATED, or what check_extensions() answers.
 Result<Extensions> read_extensions(ByteReader& r);
-// The same, where a failure spends the reader.
+// The same, but on failure returns no extensions and leaves `r` not ok().
 Extensions get_extensions(ByteReader& r);
 
-// A field that this version knows leaves its record's extensions when they are read, and joins them when they are
-// written.
+// Removes the extension with `tag` and returns its bytes; nothing if there is none. Called after reading, for each
+// field that this version knows.
 std::optional<Bytes> take_extension(Extensions& extensions, std::uint32_t tag);
+// Adds an extension, or replaces the one with `tag`. Called before writing, for each field that this version knows.
 void add_extension(Extensions& extensions, std::uint32_t tag, Bytes bytes);
 
-// What they hold beyond their own size, for the budget.
+// The heap memory of `extensions`, for the budget.
 std::size_t heap_bytes(const Extensions& extensions);
 
 }  // namespace relmap

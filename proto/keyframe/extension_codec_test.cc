@@ -20,7 +20,7 @@ std::optional<Extensions> decoded(ByteSpan bytes) {
 
 const Extensions kSome = {{1, {}}, {7, {1, 2, 3}}, {0xffffffff, Bytes(100, 9)}};
 
-TEST(Extensions, AreGivenBackAsTheyWere) {
+TEST(Extensions, DecodeToWhatWasEncoded) {
   EXPECT_EQ(decoded(encoded({})), Extensions());
   EXPECT_EQ(decoded(encoded(kSome)), kSome);
   EXPECT_EQ(encoded(kSome).size(), extension_bytes(kSome));
@@ -29,12 +29,12 @@ TEST(Extensions, AreGivenBackAsTheyWere) {
   EXPECT_EQ(decoded(encoded(largest)), largest);
 }
 
-TEST(Extensions, AreRefusedWhereTheyAreNotWhole) {
+TEST(Extensions, AreRefusedIfTruncated) {
   const Bytes bytes = encoded(kSome);
   for (std::size_t size = 0; size < bytes.size(); ++size) EXPECT_FALSE(decoded(ByteSpan(bytes).first(size))) << size;
 }
 
-TEST(Extensions, OfOneRecordAreFewAndSmall) {
+TEST(Extensions, AreLimitedInNumberAndSize) {
   Extensions many;
   for (std::uint32_t tag = 1; tag <= kMaxExtensions + 1; ++tag) many.push_back({tag, {}});
   EXPECT_EQ(check_extensions(many).reason(), Reason::BAD_SIZE);
@@ -44,21 +44,21 @@ TEST(Extensions, OfOneRecordAreFewAndSmall) {
   const Extensions too_large = {{1, Bytes(kMaxExtensionBytes - 9, 5)}};
   EXPECT_EQ(check_extensions(too_large).reason(), Reason::BAD_SIZE);
   EXPECT_FALSE(decoded(encoded(too_large)));
-  ByteWriter w;  // says that it is long, and is not
+  ByteWriter w;  // announces more bytes than there are
   w.put(std::uint16_t{1});
   w.put(std::uint32_t{5});
   w.put(std::uint32_t{0xffffffff});
   EXPECT_FALSE(decoded(w.bytes()));
 }
 
-TEST(Extensions, StandOnceEachInOneOrder) {
+TEST(Extensions, MustAscendByTag) {
   for (const Extensions& bad : {Extensions{{0, {}}}, Extensions{{5, {}}, {5, {}}}, Extensions{{6, {}}, {5, {}}}}) {
     EXPECT_EQ(check_extensions(bad).reason(), Reason::CORRUPT);
     EXPECT_FALSE(decoded(encoded(bad)));
   }
 }
 
-TEST(Extensions, AKnownFieldLeavesTheOthersAndJoinsThem) {
+TEST(Extensions, KnownFieldsAreTakenOutAndAddedAgain) {
   Extensions some = kSome;
   EXPECT_EQ(take_extension(some, 7), (Bytes{1, 2, 3}));
   EXPECT_EQ(take_extension(some, 7), std::nullopt);

@@ -1,6 +1,6 @@
-// What a later version adds to a record: tagged, each with its length, behind the record's own fields
+// Extensions are what later versions add to a record: tagged bytes behind the record's own fields
 // (docs/storage-format.md, Extensions). A reader that does not know a tag keeps its bytes and writes them again, so
-// that a record loses nothing by passing through an older version.
+// that an older version passes on the whole record.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 namespace relmap {
 
 struct Extension {
-  std::uint32_t tag = 0;  // 1 and above; what it means is a matter of the record
+  std::uint32_t tag = 0;  // from 1; each kind of record has its own tags
   Bytes bytes;
 
   bool operator==(const Extension&) const = default;

@@ -36,7 +36,7 @@ Status check_part(const KeyframePart& part) {
     return refuse(Reason::BAD_SIZE, "part ", part.part, " of ", part.parts, "; at most ", kMaxParts);
   if (part.data.size() > kMaxPartBytes)
     return refuse(Reason::BAD_SIZE, "part of ", part.data.size(), " bytes; at most ", kMaxPartBytes);
-  // Every part but the last has one size; the last one has the rest, which is not more.
+  // All parts but the last have the same size; the last one has the rest, which is at most as large.
   const std::uint64_t size = part.data.size();
   const std::uint64_t end = part.offset + size;
   const bool last = part.part + 1 == part.parts;

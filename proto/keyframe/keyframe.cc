@@ -19,7 +19,7 @@ constexpr std::uint8_t kOneway = 1;              // the only flag
 constexpr std::size_t kTrackBytes = 4 + 4 + 3 * 4 + 1;
 constexpr std::size_t kFeatureBytes = 5 * 4 + 2 + 128;
 
-// One NaN for all, so that equal keyframes give equal bytes.
+// Every NaN is written as the same one, so that equal keyframes give equal bytes.
 float canonical(float value) { return std::isnan(value) ? std::numeric_limits<float>::quiet_NaN() : value; }
 
 void put_header(ByteWriter& out, const SessionHeader& session) {
@@ -114,7 +114,7 @@ Status get_extensions(ByteReader& in, Keyframe& k) {
   auto of_keyframe = read_extensions(in);
   if (!of_keyframe.ok()) return of_keyframe.status();
   if (of_header->empty() && of_keyframe->empty())
-    return {Reason::CORRUPT, "a keyframe of version 2 without extensions: there is one way to write it, version 1"};
+    return {Reason::CORRUPT, "a keyframe of version 2 without extensions; it must be written as version 1"};
   if (!set_header_extensions(k.session, std::move(*of_header)))
     return {Reason::CORRUPT, "the session's raw calibration is malformed"};
   k.unknown = std::move(*of_keyframe);

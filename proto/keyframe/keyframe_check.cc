@@ -1,4 +1,4 @@
-// check_keyframe: everything that can be said of a keyframe by itself.
+// check_keyframe(): what can be judged from a keyframe alone.
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -31,7 +31,7 @@ Status check_session(const SessionHeader& session) {
   if (Status s = session.camera.check_plausible(); !s.ok()) return s;
   if (!session.raw) return {};
   if (session.raw->rectified || session.raw->width == 0 || session.raw->height == 0)
-    return refuse(Reason::IMPLAUSIBLE_CALIBRATION, "the session's raw calibration is rectified, or of no size");
+    return refuse(Reason::IMPLAUSIBLE_CALIBRATION, "the session's raw calibration is rectified, or has no size");
   return session.raw->check_plausible();
 }
 
@@ -62,7 +62,8 @@ Status check_motion(const Keyframe& k) {
     return refuse(Reason::BAD_MOTION, "odometry pose ", T.t.norm(), " m from its origin");
   if (!k.step_covariance.allFinite()) return refuse(Reason::NOT_FINITE, "covariance of the step is not finite");
   if (k.source != MotionSource::kStart) return check_covariance(k.step_covariance);
-  if (!k.step_covariance.isZero(0)) return refuse(Reason::BAD_COVARIANCE, "the first keyframe has no step");
+  if (!k.step_covariance.isZero(0))
+    return refuse(Reason::BAD_COVARIANCE, "the first keyframe has no step, but a covariance");
   return {};
 }
 
@@ -90,7 +91,7 @@ Status check_unique(const std::vector<TrackMeasurement>& tracks) {
   std::sort(ids.begin(), ids.end());
   const auto twice = std::adjacent_find(ids.begin(), ids.end());
   if (twice == ids.end()) return {};
-  return refuse(Reason::BAD_TRACK, "track ", twice->sequence, '.', twice->index, " stands twice in the keyframe");
+  return refuse(Reason::BAD_TRACK, "track ", twice->sequence, '.', twice->index, " occurs twice in the keyframe");
 }
 
 Status check_feature(const AppearanceFeature& f, const Keyframe& k) {

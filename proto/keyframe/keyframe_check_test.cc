@@ -109,7 +109,7 @@ Reason reason_with_w(const Keyframe& k, double w) {
   return decoded.ok() ? check_keyframe(*decoded).reason() : decoded.reason();
 }
 
-TEST(KeyframeCheck, SeesThroughTheBytesAQuaternionThatIsNoRotation) {
+TEST(KeyframeCheck, RefusesBytesWhoseQuaternionIsNoRotation) {
   Keyframe k = sample_keyframe();
   k.session.robot = k.session.name = "a";
   k.T_odom_frame.R.setIdentity();
@@ -119,7 +119,7 @@ TEST(KeyframeCheck, SeesThroughTheBytesAQuaternionThatIsNoRotation) {
   EXPECT_EQ(reason_with_w(k, kNaN), Reason::NOT_FINITE);
 }
 
-TEST(KeyframeCheck, EncodingDoesNotMendAPose) {
+TEST(KeyframeCheck, EncodingDoesNotHideABadPose) {
   Keyframe k = sample_keyframe();
   k.T_odom_frame.R *= 1.01;
   EXPECT_EQ(check_keyframe(*decode_keyframe(encode_keyframe(k))).reason(), Reason::BAD_ROTATION);

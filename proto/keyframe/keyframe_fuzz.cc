@@ -1,4 +1,4 @@
-// Whatever the bytes: decoding ends, what it gives can be checked, and encodes to something that decodes again.
+// For any bytes: decoding terminates, its result can be checked, and can be encoded and decoded again.
 #include <cstdint>
 #include <cstdlib>
 

@@ -93,7 +93,7 @@ class KeyframeSampler {
   std::mt19937_64 random_;
 };
 
-// One with a step, and without extensions.
+// A keyframe that has a step, and no extensions.
 inline Keyframe sample_keyframe(std::uint64_t seed = 7) {
   Keyframe k = KeyframeSampler(seed).keyframe();
   k.source = MotionSource::kVision;

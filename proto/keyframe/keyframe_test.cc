@@ -79,8 +79,8 @@ TEST(KeyframeBytes, EveryTruncationIsNamed) {
   }
 }
 
-// So that older daemons go on.
-TEST(KeyframeBytes, AreOfVersion1WithoutExtensionsAndElseOfVersion2) {
+// So that older daemons accept keyframes without extensions.
+TEST(KeyframeBytes, AreOfVersion2OnlyIfThereAreExtensions) {
   Keyframe k = sample_keyframe();
   const Bytes first = encode_keyframe(k);
   EXPECT_EQ(first[4], 1);
@@ -90,7 +90,7 @@ TEST(KeyframeBytes, AreOfVersion1WithoutExtensionsAndElseOfVersion2) {
   EXPECT_EQ(Bytes(second.begin() + 6, second.begin() + static_cast<std::ptrdiff_t>(first.size())),
             Bytes(first.begin() + 6, first.end()));
   EXPECT_EQ(decode_keyframe(second)->session.unknown, k.session.unknown);
-  second.resize(first.size());  // there is one way only to write a keyframe
+  second.resize(first.size());  // a keyframe has only one encoding
   second.insert(second.end(), 4, 0);
   EXPECT_EQ(decode_keyframe(second).reason(), Reason::CORRUPT);
 }
@@ -114,7 +114,7 @@ TEST(KeyframeBytes, HoldTheRawCalibrationOfTheSession) {
   EXPECT_EQ(decode_keyframe(encode_keyframe(k)).reason(), Reason::CORRUPT);
 }
 
-TEST(KeyframeBytes, LimitWhatIsUnknown) {
+TEST(KeyframeBytes, WithTooManyUnknownExtensionsAreRefused) {
   Keyframe k = sample_keyframe();
   k.unknown = {{5, Bytes(5000, 1)}};
   EXPECT_EQ(decode_keyframe(encode_keyframe(k)).reason(), Reason::BAD_SIZE);
@@ -150,7 +150,7 @@ TEST(KeyframeBytes, MoreThanTheLimitIsABadSize) {
   k.tracks.clear();
   k.appearance.clear();
   k.picture.clear();
-  for (const std::size_t from_end : {6u, 4u, 2u}) {  // the three counts stand last
+  for (const std::size_t from_end : {6u, 4u, 2u}) {  // the three counts are the last fields
     Bytes bytes = encode_keyframe(k);
     bytes[bytes.size() - from_end] = 0xff;
     bytes[bytes.size() - from_end + 1] = 0xff;
@@ -170,7 +170,7 @@ TEST(KeyframeBytes, TheLargestKeyframeFits) {
   EXPECT_TRUE(decode_keyframe(bytes).ok());
 }
 
-// The format is on disks and in logs: this sum may change only together with kKeyframeVersion.
+// Keyframes are on disks and in logs, so this checksum may only change together with kKeyframeVersion.
 TEST(KeyframeBytes, LayoutIsFrozen) {
   Keyframe k;
   k.session.uuid = *SessionUuid::parse("00112233-4455-6677-8899-aabbccddeeff");

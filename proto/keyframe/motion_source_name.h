@@ -1,4 +1,4 @@
-// Words for where a motion comes from.
+// Names of motion sources, for display.
 #pragma once
 
 #include "proto/keyframe/keyframe.h"

@@ -1,4 +1,4 @@
-// The way back from cut_part(): one version of a keyframe, from its parts in any order, doubled ones among them.
+// Reassembles one version of a keyframe from the parts that cut_part() made, in any order, with repeats.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,16 @@ namespace relmap {
 
 class PartAssembly {
  public:
-  // For the keyframe of this part, which has passed check_part() and is yet to be added.
+  // For the keyframe of `part`, which must have passed check_part(). Does not add the part.
   explicit PartAssembly(const KeyframePart& part);
 
-  // False: the same version cut into other parts, by a front-end that was started again with other options.
+  // False if `part` cuts the keyframe differently: a front-end was restarted with other options.
   bool fits(const KeyframePart& part) const;
-  // A part that fits. True if it was the last one missing: bytes() is the payload, its checksum not compared yet.
+  // Adds a part that fits(). True if it was the last one missing: bytes() is then the payload, whose checksum the
+  // caller has to compare.
   bool add(const KeyframePart& part);
 
-  const std::vector<bool>& present() const { return present_; }  // by part
+  const std::vector<bool>& present() const { return present_; }  // for each part, whether it was added
   Bytes& bytes() { return bytes_; }
 
  private:

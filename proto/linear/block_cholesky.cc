@@ -19,7 +19,7 @@ struct BlockCholesky::State {
 #else
     common.supernodal = CHOLMOD_SIMPLICIAL;
 #endif
-    common.final_ll = 1;  // LL' finds out what is not positive definite; LDL' does not
+    common.final_ll = 1;  // LL' detects a matrix that is not positive definite; LDL' does not
     common.print = 0;
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_AMD;
@@ -33,7 +33,7 @@ struct BlockCholesky::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
-  // Where block (i, j), i <= j, begins in each of its six columns.
+  // The position of block (i, j), i <= j, within the entries of each of its six columns.
   int row_offset(int i, int j) const {
     const auto begin = rows[j].begin();
     const auto found = std::lower_bound(begin, rows[j].end(), i);
@@ -42,14 +42,14 @@ struct BlockCholesky::State {
   }
   double* values(cholmod_sparse* m) const { return static_cast<double*>(m->x); }
   int column_start(int column) const { return static_cast<const int*>(matrix->p)[column]; }
-  // The diagonal block is the last of its column.
+  // The diagonal block is the last one in its column.
   int diagonal_position(int column) const {
     const int block = column / kSide;
     return column_start(column) + kSide * (static_cast<int>(rows[block].size()) - 1) + column % kSide;
   }
 
   cholmod_common common;
-  std::vector<std::vector<int>> rows;  // of each block column: its blocks in the upper triangle, ascending
+  std::vector<std::vector<int>> rows;  // for each block column, its blocks in the upper triangle, ascending
   cholmod_sparse* matrix = nullptr;
   cholmod_sparse* damped = nullptr;
   cholmod_factor* factor = nullptr;

@@ -1,4 +1,4 @@
-// A sparse symmetric positive definite system of 6x6 blocks, solved by CHOLMOD.
+// Solves sparse symmetric positive definite systems of 6x6 blocks with CHOLMOD.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,27 +10,27 @@
 
 namespace relmap {
 
-// The pattern is fixed when it is made and analysed once; values may be set and factorised again and again.
+// The sparsity pattern is fixed and analysed by the constructor; values may be set and factorised any number of times.
 // Not thread-safe; different objects may be used by different threads.
 class BlockCholesky {
  public:
-  // `pairs`: the blocks (i, j), i != j, that may be non-zero, in either order, repeated or not.
+  // `pairs`: the blocks (i, j), i != j, that may be non-zero; (i, j) and (j, i) are the same, and repeats are allowed.
   BlockCholesky(int blocks, const std::vector<std::pair<int, int>>& pairs);
   ~BlockCholesky();
   BlockCholesky(const BlockCholesky&) = delete;
   BlockCholesky& operator=(const BlockCholesky&) = delete;
 
   void set_zero();
-  // Adds `block` at (i, j) and, for i != j, its transpose at (j, i). Of a block on the diagonal the upper triangle
-  // counts.
+  // Adds `block` at (i, j) and, for i != j, its transpose at (j, i). Only the upper triangle of a block on the diagonal
+  // is used.
   void add(int i, int j, const Matrix6& block);
   Eigen::VectorXd diagonal() const;
-  // Of the matrix plus the diagonal matrix `extra`. False: not positive definite, or no memory.
+  // Factorises the matrix plus diag(`extra`). False: not positive definite, or out of memory.
   bool factorise(const Eigen::VectorXd& extra);
-  // After factorise() has returned true.
+  // Solves with the last factorisation; factorise() must have returned true.
   Eigen::VectorXd solve(const Eigen::VectorXd& right_side) const;
 
-  // The matrix as it was added up, whole: for tests.
+  // The matrix, both triangles, without `extra`. For tests.
   Eigen::MatrixXd dense() const;
 
  private:

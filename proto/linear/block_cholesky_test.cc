@@ -14,7 +14,7 @@ TEST(BlockCholesky, AgreesWithADenseSolve) {
   const std::vector<std::pair<int, int>> pairs{{0, 1}, {1, 2}, {5, 2}, {3, 9}, {9, 3}, {11, 0}, {4, 10}, {7, 8}};
   BlockCholesky sparse(blocks, pairs);
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(6 * blocks, 6 * blocks);
-  sparse.add(0, 0, Matrix6::Constant(1e9));  // forgotten by set_zero()
+  sparse.add(0, 0, Matrix6::Constant(1e9));  // cleared by set_zero()
   sparse.set_zero();
   for (int i = 0; i < blocks; ++i) {
     const Matrix6 m = Matrix6::Random();

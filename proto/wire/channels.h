@@ -1,4 +1,4 @@
-// LCM channels and the version of the protocol that runs on them and over RPC.
+// The LCM channels, and the version of the protocol over LCM and RPC.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ inline constexpr char kPoseChannel[] = "RELMAP_POSE";          // pose_t, daemon
 inline constexpr char kMapChannel[] = "RELMAP_MAP";            // map_identity_t, daemon to all
 inline constexpr char kStatusChannel[] = "RELMAP_STATUS";      // status_t, daemon to all
 
-// Peers of another major version do not understand each other: UNKNOWN_PROTOCOL_VERSION. A minor one only adds.
+// A peer with another major version is refused: UNKNOWN_PROTOCOL_VERSION. A new minor version only adds.
 inline constexpr std::uint16_t kProtocolMajor = 1;
 inline constexpr std::uint16_t kProtocolMinor = 0;
 

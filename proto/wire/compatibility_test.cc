@@ -1,4 +1,4 @@
-// What was once in the protocol stays: the .proto files against the descriptor set that is checked in beside them.
+// Compares the .proto files with the checked-in descriptor set: what was once in the protocol stays.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 #include <gtest/gtest.h>
@@ -67,7 +67,7 @@ void compare_service(const google::protobuf::ServiceDescriptor& was, const Descr
   }
 }
 
-// Names of all that `was` had and `now` has not, or has otherwise.
+// Names of all that `was` had and `now` does not have, or has with another number or type.
 Broken compare(const FileDescriptorSet& files, const DescriptorPool& was, const DescriptorPool& now) {
   Broken broken;
   for (const auto& proto : files.file()) {

@@ -1,8 +1,8 @@
 // FOR ADAPTERS ONLY: the one header of relmap that shows generated code. Include it from .cc files (server/ingest,
 // server/rpc, frontend/publishing, client), never from a public header.
 //
-// proto/ types to and from protobuf and LCM. What comes from outside is checked here for shape only (sizes, finite
-// numbers, unit quaternions); what it means is checked by whom it concerns.
+// Converts the types of proto/ to and from protobuf and LCM. Only the form of what comes from outside is checked here
+// (sizes, finite numbers, unit quaternions); its users check what it means.
 #pragma once
 
 #include <array>
@@ -24,22 +24,23 @@
 
 namespace relmap {
 
-// ---- Reasons. Equal numbers, by test. A number that is none of ours reads as INTERNAL.
+// ---- Reasons. The numbers are equal, which a test checks. An unknown number becomes INTERNAL.
 v1::Reason to_wire(Reason reason);
 Reason reason_from_wire(int number);
 
-// ---- Identities. INVALID_ARGUMENT for a frame of session 0.
+// ---- Identifiers. INVALID_ARGUMENT for a frame of session 0.
 v1::FrameId to_wire(FrameId id);
 v1::EdgeId to_wire(EdgeId id);
 v1::LandmarkId to_wire(LandmarkId id);
 Result<FrameId> from_wire(const v1::FrameId& id);
 Result<EdgeId> from_wire(const v1::EdgeId& id);
 
-// 16 bytes; INVALID_ARGUMENT for another number of them, or nil.
+// The 16 bytes of a UUID. INVALID_ARGUMENT if there are not 16, or all are 0.
 std::string uuid_to_wire(const SessionUuid& uuid);
 Result<SessionUuid> uuid_from_wire(std::string_view bytes);
 
-// ---- Geometry. The quaternion sent is the canonical one. NOT_FINITE, BAD_ROTATION; BAD_SIZE, BAD_COVARIANCE.
+// ---- Geometry. Rotations are sent as canonical quaternions. NOT_FINITE, BAD_ROTATION; for covariances BAD_SIZE,
+// BAD_COVARIANCE.
 v1::Vector3 to_wire(const Vector3& v);
 v1::Transform to_wire(const SE3& T);
 v1::Covariance to_wire(const Matrix6& covariance);

@@ -22,7 +22,7 @@ TEST(WireReasons, UnknownNumbersReadAsInternal) {
   EXPECT_EQ(reason_from_wire(65536 + 1), Reason::INTERNAL);
 }
 
-TEST(WireIds, GoBothWays) {
+TEST(WireIds, RoundTrip) {
   const EdgeId id{{3, 4294967295u}, 7};
   EXPECT_EQ(*from_wire(to_wire(id)), id);
   EXPECT_EQ(*from_wire(to_wire(id.frame)), id.frame);
@@ -34,7 +34,7 @@ TEST(WireIds, GoBothWays) {
   EXPECT_EQ(uuid_from_wire(std::string(16, '\0')).reason(), Reason::INVALID_ARGUMENT);
 }
 
-TEST(WireGeometry, TransformsGoBothWays) {
+TEST(WireGeometry, TransformsRoundTrip) {
   KeyframeSampler random(5);
   for (int i = 0; i < 100; ++i) {
     const SE3 T = random.pose();
@@ -45,7 +45,7 @@ TEST(WireGeometry, TransformsGoBothWays) {
   }
 }
 
-TEST(WireGeometry, WhatIsNoTransformIsNamed) {
+TEST(WireGeometry, BadTransformsAreRefusedWithTheirReason) {
   EXPECT_EQ(from_wire(v1::Transform()).reason(), Reason::BAD_ROTATION);
   v1::Transform T = to_wire(SE3());
   T.mutable_translation()->set_y(kNaN);
@@ -55,7 +55,7 @@ TEST(WireGeometry, WhatIsNoTransformIsNamed) {
   EXPECT_EQ(from_wire(T).reason(), Reason::BAD_ROTATION);
 }
 
-TEST(WireGeometry, CovariancesGoBothWaysAndAreChecked) {
+TEST(WireGeometry, CovariancesRoundTripAndAreChecked) {
   const Matrix6 m = KeyframeSampler(1).covariance();
   EXPECT_EQ(*from_wire(to_wire(m)), m);
   v1::Covariance wire = to_wire(m);
@@ -65,7 +65,7 @@ TEST(WireGeometry, CovariancesGoBothWaysAndAreChecked) {
   EXPECT_EQ(from_wire(wire).reason(), Reason::BAD_SIZE);
 }
 
-TEST(WireCameras, GoBothWaysAndAreChecked) {
+TEST(WireCameras, RoundTripAndAreChecked) {
   const StereoCamera camera{400, 256, 192, 0.12, 512, 384};
   EXPECT_EQ(*from_wire(to_wire(camera)), camera);
   v1::Camera wire = to_wire(camera);
@@ -73,7 +73,7 @@ TEST(WireCameras, GoBothWaysAndAreChecked) {
   EXPECT_EQ(from_wire(wire).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
-TEST(WireCameras, RawStereoGoesBothWaysAndIsChecked) {
+TEST(WireCameras, RawStereoRoundTripsAndIsChecked) {
   StereoCalibration c;
   c.left = {400, 401, 256, 192, -0.1, 0.01, 1e-4, 2e-4, 0};
   c.right = {402, 403, 255, 191, -0.1, 0.02, 0, 0, 1e-3};
@@ -93,7 +93,7 @@ TEST(WireCameras, RawStereoGoesBothWaysAndIsChecked) {
   EXPECT_EQ(from_wire(to_wire(c)).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
-TEST(WireFeatures, GoBothWaysAndAreChecked) {
+TEST(WireFeatures, RoundTripAndAreChecked) {
   const std::vector<AppearanceFeature> features = KeyframeSampler(3).keyframe().appearance;
   const auto back = from_wire(to_wire(features));
   ASSERT_TRUE(back.ok());
@@ -112,7 +112,7 @@ TEST(WireFeatures, GoBothWaysAndAreChecked) {
   EXPECT_EQ(from_wire(to_wire(std::vector<AppearanceFeature>(kMaxAppearance + 1))).reason(), Reason::BAD_SIZE);
 }
 
-TEST(WirePoses, GoBothWaysAndAreChecked) {
+TEST(WirePoses, RoundTripAndAreChecked) {
   KeyframeSampler random(8);
   const SE3 T = random.pose();
   const Matrix6 covariance = random.covariance();

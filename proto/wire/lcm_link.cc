@@ -14,7 +14,7 @@
 namespace relmap {
 
 namespace {
-// LCM counts messages, of up to 64 KiB. Its own default, 30, is soon lost.
+// LCM limits its queue by the number of messages, of up to 64 KiB each. Its default of 30 is soon exceeded.
 constexpr std::size_t kMessageBytes = 64 * 1024;
 constexpr std::size_t kMinMessages = 30, kMaxMessages = 1000;
 }  // namespace

@@ -18,8 +18,8 @@ namespace relmap {
 
 namespace {
 
-// LCM's numbers are big-endian. As ByteReader: bad for good once it was asked for more than there is, or found a number
-// that it should not.
+// Reads LCM's big-endian numbers. Like ByteReader, it is not ok() any more once it was asked for more bytes than there
+// are, or a number was out of range.
 class LcmReader {
  public:
   explicit LcmReader(ByteSpan bytes) : in_(bytes) {}
@@ -32,7 +32,7 @@ class LcmReader {
   std::int16_t i16() { return static_cast<std::int16_t>(unsigned_of(2)); }
   std::int64_t i64() { return static_cast<std::int64_t>(unsigned_of(8)); }
   double f64() { return std::bit_cast<double>(unsigned_of(8)); }
-  // An int64_t that must be a uint32.
+  // An int64_t whose value must fit a uint32.
   std::uint32_t u32_of_i64() { return narrow(unsigned_of(8)); }
   // An int32_t that must not be negative.
   std::uint32_t count() {
@@ -40,7 +40,7 @@ class LcmReader {
     if (value > std::numeric_limits<std::int32_t>::max()) good_ = false;
     return static_cast<std::uint32_t>(value);
   }
-  // A count of things of at least `size` bytes each, at most `limit`; 0 if it is not.
+  // A count, at most `limit`, of items of at least `size` bytes each that follow; 0 if it is out of range.
   std::uint32_t count_of(std::size_t size, std::size_t limit) {
     const std::uint32_t value = count();
     if (value > limit || !in_.fits(value, size)) good_ = false;
@@ -61,7 +61,7 @@ class LcmReader {
   }
   bool at_end() const { return good_ && in_.at_end(); }
 
-  // Fingerprint and version; not OK if this is another message, or another protocol's.
+  // Reads fingerprint and version; not OK if the message is of another type or protocol version.
   Status begin(std::int64_t fingerprint) {
     if (unsigned_of(8) != static_cast<std::uint64_t>(fingerprint))
       return {Reason::CORRUPT, "no message of the type of its channel"};

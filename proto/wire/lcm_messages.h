@@ -1,5 +1,5 @@
-// LCM messages as plain values. Encoding goes through the generated types; decoding does not: their decoders believe
-// every count that they read, and a hundred bytes from anybody would take gigabytes.
+// LCM messages as plain values. Encoding uses the generated types. Decoding does not: the generated decoders trust
+// every count, so a hundred bytes from anybody could make them allocate gigabytes.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace relmap {
 
-// CORRUPT (not exactly one message of this kind, or a number out of range), UNKNOWN_PROTOCOL_VERSION.
+// CORRUPT (the bytes are not exactly one message of this type, or a number is out of range), UNKNOWN_PROTOCOL_VERSION.
 Result<KeyframePart> decode_lcm_part(ByteSpan message);
 Result<Gap> decode_lcm_gap(ByteSpan message);
 Result<SessionEnd> decode_lcm_end(ByteSpan message);
 Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message);
-// Also BAD_ROTATION, NOT_FINITE and what else check_covariance() finds.
+// Also BAD_ROTATION, NOT_FINITE, and what check_covariance() answers.
 Result<PoseNews> decode_lcm_pose(ByteSpan message);
 Result<DaemonIdentity> decode_lcm_map(ByteSpan message);
 
@@ -33,7 +33,7 @@ struct DaemonStatus {
   std::uint64_t sessions = 0, keyframes = 0, refused = 0, closures_accepted = 0;
   std::uint64_t durable_sequence = 0, applied_sequence = 0;
   std::uint64_t memory_used = 0, memory_budget = 0;
-  Reason reason = Reason::OK;  // why nothing is taken in
+  Reason reason = Reason::OK;  // not OK: why the daemon accepts nothing
 };
 Bytes encode_lcm(const DaemonStatus& status);
 

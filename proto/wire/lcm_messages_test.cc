@@ -70,7 +70,7 @@ TEST(LcmMessages, PartsComeBackAsTheyWere) {
   EXPECT_TRUE(check_part(*back).ok());
   EXPECT_EQ(back->sequence, part.sequence);
   EXPECT_EQ(back->data, part.data);
-  // What others decode by the published type.
+  // Other programs decode it with the published type.
   relmap_lcm::keyframe_part_t generated;
   const Bytes bytes = encode_lcm(part);
   ASSERT_EQ(generated.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
@@ -161,7 +161,7 @@ TEST(LcmMessages, TheEndOfASessionKeepsItsMeaning) {
   EXPECT_EQ(decode_lcm_pose(encode_lcm(ended))->kind, PoseNews::Kind::kEnded);
 }
 
-TEST(LcmMessages, PosesThatCannotBeAreRefused) {
+TEST(LcmMessages, ImpossiblePosesAreRefused) {
   PoseNews news = sample_news();
   news.kind = static_cast<PoseNews::Kind>(7);
   EXPECT_EQ(decode_lcm_pose(encode_lcm(news)).reason(), Reason::CORRUPT);
@@ -208,7 +208,7 @@ TEST(LcmMessages, EveryCutAndEveryFlippedBitIsSurvivedAndCutsAreRefused) {
   EXPECT_EQ(decode_lcm_part(longer).reason(), Reason::CORRUPT);
 }
 
-TEST(LcmMessages, AnotherMajorVersionIsNamed) {
+TEST(LcmMessages, AnotherMajorVersionIsRefusedWithItsReason) {
   Bytes part = encode_lcm(sample_part());
   part[9] = kProtocolMajor + 1;
   EXPECT_EQ(decode_lcm_part(part).reason(), Reason::UNKNOWN_PROTOCOL_VERSION);
@@ -232,9 +232,9 @@ TEST(LcmMessages, StatusAndPoseAreOfThePublishedTypes) {
   EXPECT_EQ(pose.translation[2], 3);
 }
 
-// Robots in the field speak these types. One in which a field is added, renamed or moved has another hash, and whoever
-// has the old one drops its messages: what a message lacks is a type of its own, on a channel of its own.
-TEST(LcmMessages, TheTypesAreThoseThatRobotsInTheFieldSpeak) {
+// Robots in the field use these types. Adding, renaming or moving a field changes a type's hash, and receivers with the
+// old hash drop the messages. New fields therefore go into a new type on a new channel.
+TEST(LcmMessages, TypesNeverChange) {
   struct Type {
     std::int64_t now;
     std::uint64_t published;

@@ -32,7 +32,7 @@ bool within(std::string_view text, Number low, Number high) {
   return value && *value >= low && *value <= high;
 }
 
-// GROUP:PORT, GROUP, or nothing, which are LCM's own.
+// Accepts GROUP:PORT, GROUP (LCM's default port), or nothing (LCM's default group and port).
 Status check_group(const std::string& network) {
   if (network.empty()) return {};
   const std::size_t colon = network.find(':');

@@ -1,4 +1,4 @@
-// The parts of an LCM URL: provider://network?option=value&...
+// Parses and checks LCM URLs: provider://network?option=value&...
 #pragma once
 
 #include <string>
@@ -9,21 +9,21 @@ namespace relmap {
 
 struct LcmUrl {
   std::string provider;  // udpm, file, memq
-  std::string network;   // udpm: GROUP:PORT; file: the path of a log; memq: nothing
+  std::string network;   // udpm: GROUP:PORT; file: the path of a log; memq: empty
   std::string options;   // without the question mark
 };
-// INVALID_ARGUMENT: no URL, or of another provider.
+// INVALID_ARGUMENT: not a URL, or of another provider.
 Result<LcmUrl> parse_lcm_url(const std::string& url);
 
-// Whether LCM would take all of it as it is meant; by itself LCM only warns of what it cannot read, and goes on with
-// its defaults. INVALID_ARGUMENT, with what is wrong: a group that is no IPv4 multicast address, a port, a path that is
-// missing, an option that is unknown, given twice, or has a value that it cannot have.
+// Checks all parts of a URL, since LCM only warns of what it cannot read and continues with its defaults.
+// INVALID_ARGUMENT, with what is wrong: a group that is no IPv4 multicast address, a bad port, a missing path, or an
+// option that is unknown, given twice, or out of range.
 Status check_lcm_url(const LcmUrl& url);
 
-// "" if it is not there.
+// The value of an option; "" if it is not given.
 std::string lcm_option(const LcmUrl& url, const std::string& name);
 
-// A log that is being read.
+// True if the URL reads a log.
 bool is_replay(const std::string& url);
 
 }  // namespace relmap

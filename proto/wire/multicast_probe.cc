@@ -1,4 +1,4 @@
-// LCM 1.3.1 opens without a multicast route and then hears nothing, or waits ten seconds to say so: asked here first.
+// Without a multicast route, LCM 1.3.1 opens and receives nothing, or takes ten seconds to fail. This finds out first.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -43,7 +43,7 @@ Status probe_multicast(const std::string& complete_url) {
   if (::inet_aton(group.c_str(), &address) == 0 || (ntohl(address.s_addr) >> 28) != 14)
     return {Reason::INVALID_ARGUMENT, "'" + group + "' is no multicast group"};
 
-  // A port of our own: nobody who listens to the group is disturbed.
+  // A port of its own, so that others who listen to the group do not receive the probe.
   const Socket socket;
   sockaddr_in to{};
   to.sin_family = AF_INET;

@@ -20,7 +20,7 @@ std::string receive_buffer_advice(const std::string& complete_url) {
   const bool known = ::setsockopt(file, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted) == 0 &&
                      ::getsockopt(file, SOL_SOCKET, SO_RCVBUF, &granted, &length) == 0;
   ::close(file);
-  granted /= 2;  // the kernel counts its own overhead in
+  granted /= 2;  // the kernel reports twice the size, which includes its overhead
   if (!known || granted >= wanted) return {};
   return "the system grants LCM a receive buffer of " + std::to_string(granted) + " bytes of the " +
          std::to_string(wanted) +
