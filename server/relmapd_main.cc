@@ -24,20 +24,21 @@ constexpr const char* kFooter = R"(examples:
   relmapd --data /srv/map
   relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0'
   relmapd --config /etc/relmapd.yaml --check-config
-  relmapd --data map --listen 0.0.0.0:50070 --insecure   # everyone who reaches it may edit the map
+  relmapd --data map --listen 0.0.0.0:50070 --insecure   # anyone who can reach the port may edit the map
 
-Settings of the configuration file alone: ingest.* (which robots, and how much each may send), rpc.*, routes.mixes,
-rba.*, disk_low_water_mb, commit_interval_ms (server/README.md).
+Settings that only the configuration file has: ingest.* (which robots, and how much each may send), rpc.*,
+routes.mixes, rba.*, disk_low_water_mb, commit_interval_ms (server/README.md).
 
-Stops on SIGTERM or SIGINT once everything acknowledged is applied and committed; a second signal ends it at once.
+On SIGTERM or SIGINT the daemon applies and commits everything acknowledged, then stops; a second signal ends it at
+once.
 
 exit codes:
-  0  stopped as asked, or the configuration is sound (--check-config)
-  1  the last commit failed (nothing acknowledged is lost), or an error of ours
-  2  BAD_CONFIG, or a command line that cannot be read
+  0  stopped by a signal, or the configuration is sound (--check-config)
+  1  the last commit failed (nothing acknowledged is lost), or an internal error
+  2  BAD_CONFIG, or an invalid command line
   3  FOLDER_LOCKED: another daemon owns the data folder
   4  PORT_IN_USE
-  5  the data folder cannot be used: NOT_A_MAP (it is neither empty nor a map's), IO_ERROR, DISK_FULL, READ_ONLY,
+  5  the data folder cannot be used: NOT_A_MAP (it holds something other than a map), IO_ERROR, DISK_FULL, READ_ONLY,
      DATA_LOSS, UNKNOWN_FORMAT_VERSION
   6  the vocabulary cannot be used: NO_SUCH_FILE, CORRUPT, WRONG_VOCABULARY)";
 
@@ -67,7 +68,7 @@ int exit_code(Reason reason) {
   }
 }
 
-// What the command line says; what it does not say is left to the file.
+// The options given on the command line. Options that are not given leave the file's settings as they are.
 struct CommandLine {
   std::string config_file;
   std::optional<std::string> data, listen, lcm, vocabulary, log_level;
@@ -75,25 +76,28 @@ struct CommandLine {
   bool deterministic = false, insecure = false, no_closures = false, check_config = false;
 
   void declare(CLI::App& app) {
-    app.add_option("--data", data, "Folder of the map, and of nothing else; made if there is none")->type_name("DIR");
-    app.add_option("--config", config_file, "YAML file; the command line wins")->type_name("FILE");
+    app.add_option("--data", data, "Data folder, which holds the map and nothing else; created if it does not exist")
+        ->type_name("DIR");
+    app.add_option("--config", config_file, "YAML file with settings; the command line takes precedence")
+        ->type_name("FILE");
     app.add_option("--listen", listen,
-                   "HOST:PORT of gRPC (default 127.0.0.1:50070); port 0: any free one, see "
+                   "Address at which gRPC is served (default 127.0.0.1:50070); port 0: any free port, which is then in "
                    "DIR/endpoint")
         ->type_name("HOST:PORT");
     app.add_option(
            "--lcm", lcm,
-           "LCM URL to take keyframes from: udpm://GROUP:PORT?ttl=N, or file://PATH, a log to replay; none: off "
+           "LCM URL to take keyframes from: udpm://GROUP:PORT?ttl=N, or file://PATH for a log to replay; none: off "
            "(default)")
         ->type_name("URL");
-    app.add_option("--memory-budget-mb", memory_budget_mb, "Memory for all that grows, MB (default 1024, at least 32)");
-    app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
+    app.add_option("--memory-budget-mb", memory_budget_mb,
+                   "Memory for everything that grows with the map and its users, in MB (default 1024, at least 32)");
+    app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the shipped one)")->type_name("FILE");
     app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)");
     app.add_flag("--deterministic", deterministic,
-                 "Look up places and relax at fixed points: the same input gives the same map; slower");
-    app.add_flag("--no-closures", no_closures, "Recognise no places (to measure what loop closures mend)");
-    app.add_flag("--insecure", insecure, "Allow to listen beyond loopback without TLS");
-    app.add_flag("--check-config", check_config, "Say whether the daemon could start so, and exit");
+                 "Look up places and relax at fixed points, so that the same input gives the same map; slower");
+    app.add_flag("--no-closures", no_closures, "Do not recognise places (to measure what loop closures improve)");
+    app.add_flag("--insecure", insecure, "Allow listening beyond loopback although there is no TLS");
+    app.add_flag("--check-config", check_config, "Tell whether the daemon could start with these settings, and exit");
     relmap::terminal::add_version(app);
   }
 
@@ -138,10 +142,10 @@ int run(const Config& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // gRPC's own words on a port in use and the like; what matters comes through ours.
+  // Silences gRPC's own messages on a port in use and the like: this program reports what matters.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   spdlog::set_default_logger(spdlog::stderr_color_mt("relmapd"));
-  CLI::App app("relmapd: a map server for fleets of robots that see in stereo", "relmapd");
+  CLI::App app("relmapd: a map server for fleets of stereo robots", "relmapd");
   app.footer(kFooter);
   CommandLine line;
   line.declare(app);

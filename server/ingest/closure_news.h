@@ -1,4 +1,4 @@
-// What the robot that saw the newer end of a closure is told of it.
+// News of a closure for the robot whose keyframe is its newer end.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace relmap::ingest {
 
-// `closure` as Mapper's watcher gets it. Nothing for a place without a transform (verified by appearance alone).
+// `map` and `closure` are as passed to Mapper's watcher. Nullopt if the closure has no transform in metres.
 std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure);
 
 }  // namespace relmap::ingest

@@ -1,5 +1,5 @@
-// Any bytes on the channels of ingest: decoded and taken in, as by the daemon. The first byte chooses the message and
-// whether checksums are made right, without which hardly anything would come far.
+// Decodes and takes in arbitrary bytes from the channels of ingest, as the daemon does. The first byte chooses the kind
+// of message, and whether its checksums are corrected; with wrong checksums hardly anything gets far.
 #include "proto/base/crc32c.h"
 #include "proto/wire/lcm_messages.h"
 #include "server/intake/intake.h"

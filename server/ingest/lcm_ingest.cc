@@ -18,7 +18,7 @@ namespace relmap::ingest {
 namespace {
 
 constexpr std::chrono::seconds kStatusInterval{1};
-constexpr std::chrono::milliseconds kMapInterval{100};  // while there is something to acknowledge
+constexpr std::chrono::milliseconds kMapInterval{100};  // while acknowledgements are sent
 
 template <typename Message>
 LcmLink::Handler handler(intake::IngestServer& server, Result<Message> (*decode)(ByteSpan),
@@ -38,7 +38,7 @@ struct LcmIngest::Impl {
   Impl(intake::IngestServer& s, StatusSource source, std::unique_ptr<LcmLink> l)
       : server(s), status(std::move(source)), link(std::move(l)) {}
 
-  // By the server's thread. No acknowledgement is believed before it is known of which map it speaks.
+  // Called by the server's thread. Robots believe no acknowledgement before they know which map it is about.
   void acknowledge(const Acknowledgement& ack) {
     const auto now = std::chrono::steady_clock::now();
     if (now - map_said >= kMapInterval) {
@@ -74,7 +74,7 @@ struct LcmIngest::Impl {
   const StatusSource status;
   const std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   const std::unique_ptr<LcmLink> link;
-  std::chrono::steady_clock::time_point map_said{};  // of the server's thread
+  std::chrono::steady_clock::time_point map_said{};  // used by the server's thread only
   std::unique_ptr<intake::IngestServer::Subscription> said;
   std::mutex mutex;
   std::condition_variable stopped;

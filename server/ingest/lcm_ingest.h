@@ -1,4 +1,4 @@
-// Ingest over LCM: parts and gaps in; acknowledgements, status and poses out.
+// Ingest over LCM: receives parts, gaps and ends of sessions; sends acknowledgements, status and poses.
 #pragma once
 
 #include <functional>
@@ -13,19 +13,20 @@ namespace relmap::ingest {
 // Thread-safe.
 class LcmIngest {
  public:
-  // What RELMAP_STATUS says, once a second; boot id, time and uptime are filled in here.
+  // The content of RELMAP_STATUS, which is sent once a second; boot id, time and uptime are filled in here.
   using StatusSource = std::function<DaemonStatus()>;
 
-  // `server` outlives it. `queue_bytes`: of messages that LCM has received and nobody has looked at. INVALID_ARGUMENT
-  // (no LCM URL), NO_MULTICAST_ROUTE (with the commands that mend it), IO_ERROR.
+  // Starts receiving. `server` must outlive the result. `queue_bytes` bounds the messages that LCM has received and
+  // `server` has not taken yet. INVALID_ARGUMENT (no LCM URL), NO_MULTICAST_ROUTE (with the commands that add one),
+  // IO_ERROR.
   static Result<std::unique_ptr<LcmIngest>> start(const std::string& url, intake::IngestServer& server,
                                                   StatusSource status, std::size_t queue_bytes = std::size_t{64} << 20);
-  // As stop().
+  // Calls stop().
   ~LcmIngest();
 
-  // A log that was given as URL has been replayed.
+  // Whether the log that was given as URL has been replayed to its end.
   bool at_end() const;
-  // Takes nothing more from LCM, then says nothing more.
+  // Stops receiving, then stops sending.
   void stop();
 
  private:

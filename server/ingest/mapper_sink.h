@@ -1,4 +1,4 @@
-// The intake's way into the map.
+// The map as a sink of the intake.
 #pragma once
 
 #include "server/intake/keyframe_sink.h"
@@ -6,7 +6,7 @@
 
 namespace relmap::ingest {
 
-// `mapper` outlives it.
+// `mapper` must outlive it.
 class MapperSink final : public intake::KeyframeSink {
  public:
   explicit MapperSink(map::Mapper& mapper) : mapper_(mapper) {}

@@ -1,5 +1,5 @@
-// When a session's acknowledgement is due: at once when there is news; soon while something is missing; now and then
-// while the robot is there, because acknowledgements are lost like anything else.
+// Decides when a session's acknowledgement is due: at once when there is news, soon while something is missing, and
+// regularly while the robot is active, because acknowledgements may be lost.
 #pragma once
 
 #include <chrono>
@@ -9,10 +9,10 @@ namespace relmap::intake {
 using SteadyTime = std::chrono::steady_clock::time_point;
 
 struct AcknowledgementTimes {
-  std::chrono::milliseconds spacing{5};     // between two, at least
-  std::chrono::milliseconds imperfect{40};  // while parts or sequences are missing
-  std::chrono::milliseconds regular{100};
-  std::chrono::milliseconds active{5000};  // after the robot's last message
+  std::chrono::milliseconds spacing{5};     // minimum time between two acknowledgements
+  std::chrono::milliseconds imperfect{40};  // interval while parts or sequences are missing
+  std::chrono::milliseconds regular{100};   // interval otherwise
+  std::chrono::milliseconds active{5000};   // a robot is active for so long after its last message
 };
 
 class AcknowledgementSchedule {
@@ -27,7 +27,7 @@ class AcknowledgementSchedule {
   }
 
   SteadyTime last_heard() const { return heard_; }
-  // SteadyTime::max() if the robot has to speak first.
+  // When the next acknowledgement is due; SteadyTime::max() if not before the robot sends something.
   SteadyTime due(bool imperfect) const;
 
  private:

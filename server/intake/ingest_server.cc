@@ -19,7 +19,7 @@ namespace {
 SteadyTime now() { return std::chrono::steady_clock::now(); }
 }  // namespace
 
-constexpr int kPartsAtOnce = 64;  // looked at before anybody else may come in between
+constexpr int kPartsAtOnce = 64;  // taken in under one lock
 constexpr std::size_t kMaxNews = 4096;
 
 // Locks are taken in the order subscribers_mutex, mutex, and wake_mutex or queue_mutex last.
@@ -157,20 +157,20 @@ struct IngestServer::Impl {
   std::mutex subscribers_mutex;
   std::map<std::uint64_t, Listener> subscribers;
   std::uint64_t next_subscriber = 1;
-  bool all_said = false;  // guarded by subscribers_mutex: those that come now are told so at once
+  bool all_said = false;  // guarded by subscribers_mutex: new subscribers are told `stopping` at once
 
   mutable std::mutex queue_mutex;
   std::condition_variable queue_condition;
   PartQueue queue;
   std::set<SessionUuid> begun;  // each has a queue of its own
-  ReasonCounts unsound{};       // parts that were none
+  ReasonCounts unsound{};       // parts that check_part() refused
   bool queue_stopping = false;
 
   mutable std::mutex mutex;
   Intake intake;
   std::uint64_t begun_version = 0;
   bool stopped = false;
-  SteadyTime planned = SteadyTime::min();  // when the thread looks again by itself
+  SteadyTime planned = SteadyTime::min();  // when the thread polls next without being woken
 
   std::thread thread, parts_thread;
 };
@@ -254,7 +254,7 @@ const DaemonIdentity& IngestServer::identity() const { return impl_->identity; }
 void IngestServer::tell(PoseNews news) {
   {
     const std::lock_guard lock(impl_->wake_mutex);
-    if (impl_->told.size() >= kMaxNews) return;  // news may be lost, as on every way
+    if (impl_->told.size() >= kMaxNews) return;  // news are not reliable: transports may lose them too
     impl_->told.push_back(std::move(news));
   }
   impl_->wake();

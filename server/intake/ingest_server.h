@@ -1,5 +1,5 @@
-// Ingest as the transports see it: thread-safe, with the thread that says what there is to be said. LCM and the Ingest
-// service feed it the same way; neither is known here.
+// The interface of ingest for transports: an Intake made thread-safe, with the threads that take in parts and send
+// answers. LCM and the Ingest service use it in the same way; it knows neither.
 #pragma once
 
 #include <functional>
@@ -11,22 +11,23 @@
 namespace relmap::intake {
 
 struct IngestServerOptions : IntakeOptions {
-  // Parts that wait to be looked at; charged to Share::kReassembly while the server runs.
+  // Capacity for parts that wait to be taken in; charged to Share::kReassembly while the server runs.
   std::size_t part_queue_bytes = std::size_t{4} << 20;
-  MapIdentity map = {};  // that the keyframes go into, for robots to be told
+  MapIdentity map = {};  // the map that the keyframes go into; robots are told
 };
 
 class IngestServer {
  public:
-  // Starts two threads. `sink` and `budget` outlive it.
+  // Starts two threads. `sink` and `budget` must outlive the server.
   IngestServer(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IngestServerOptions options = {});
-  // As stop().
+  // Calls stop().
   ~IngestServer();
 
-  // Any thread. A part is checked, and waits in its sender's queue (part_queue.h): for transports without flow control.
-  // Returns at once.
+  // All methods but stop() are thread-safe.
+
+  // For transports without flow control: checks the part, queues it for its sender (part_queue.h) and returns at once.
   void take_part(KeyframePart part);
-  // As Intake's. Any thread; they may wait while a session begins.
+  // As Intake's. They may block while a session begins.
   void take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload);
   void take_gap(Gap gap);
   void take_end(SessionEnd end);
@@ -34,16 +35,16 @@ class IngestServer {
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
   std::vector<RobotStats> robots() const;
-  // What robots are told first.
+  // What robots are told before anything else.
   const DaemonIdentity& identity() const;
 
-  // News of a keyframe from elsewhere (a closure), to be told to whoever listens. Any thread; returns at once. Boot id
-  // and time are filled in here.
+  // Passes news of a keyframe (a closure) on to the listeners, with boot id and time filled in. Returns at once. News
+  // are dropped if too many wait.
   void tell(PoseNews news);
 
-  // All that is to be said to robots from now on, from this object's thread, one at a time. The callbacks must not call
-  // back and must not wait; they have returned for the last time when the Subscription is gone. `stopping`: the server
-  // takes nothing more and has said all it had to.
+  // Calls the listener from now on with everything that robots are to be told, from this object's thread, one call at a
+  // time. The callbacks must neither block nor call back. None of them runs any more once the Subscription is
+  // destroyed. `stopping` is called once the server takes nothing more and has told everything.
   struct Listener {
     std::function<void(const Acknowledgement&)> acknowledged;
     std::function<void(const PoseNews&)> news;
@@ -56,7 +57,7 @@ class IngestServer {
   };
   std::unique_ptr<Subscription> subscribe(Listener listener);
 
-  // Looks at what waits, says the last acknowledgements and ends the threads; what comes later is not taken.
+  // Takes in the parts that wait, sends the last acknowledgements and ends the threads. Later messages are ignored.
   void stop();
 
  private:

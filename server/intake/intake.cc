@@ -12,17 +12,17 @@
 namespace relmap::intake {
 
 namespace {
-constexpr std::chrono::milliseconds kQueueFull{20};  // until the sink is asked again
-constexpr std::chrono::milliseconds kSinkFails{200};
+constexpr std::chrono::milliseconds kQueueFull{20};   // retry interval while the sink's queue is full
+constexpr std::chrono::milliseconds kSinkFails{200};  // retry interval while the sink fails otherwise
 constexpr std::chrono::milliseconds kIdle{1000};
-constexpr std::chrono::seconds kHeldBack{1};         // before a robot is told to slow down
-constexpr std::chrono::seconds kToldAgain{5};        // and while that lasts, since it may not have heard
+constexpr std::chrono::seconds kHeldBack{1};         // a robot is told to slow down after being held back so long
+constexpr std::chrono::seconds kToldAgain{5};        // the message is repeated, since it may have been lost
 constexpr double kNearLimit = 0.2;                   // seconds' worth of keyframes
-constexpr std::chrono::milliseconds kStranger{500};  // that one who has not begun is spoken to after its last part
-constexpr double kSlowest = 0.1;                     // keyframes a second that a robot is asked for
-constexpr std::chrono::seconds kLive{5};             // since it was heard last: a robot is there
-constexpr std::chrono::seconds kLookForNames{1};     // how often at most
-constexpr std::int64_t kNoLag = 86'400'000'000;      // us: a recording's stamps say nothing of how late it is
+constexpr std::chrono::milliseconds kStranger{500};  // a session that has not begun is answered so long after a message
+constexpr double kSlowest = 0.1;                     // keyframes per second: the lowest rate that a robot is told
+constexpr std::chrono::seconds kLive{5};             // a robot heard within this time is present
+constexpr std::chrono::seconds kLookForNames{1};     // interval of looking for robots of the same name
+constexpr std::int64_t kNoLag = 86'400'000'000;      // us: so old a time stamp is a recording's and tells no lag
 }  // namespace
 
 Intake::Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IntakeOptions options,
@@ -56,7 +56,7 @@ Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
              .emplace(session, Entry{SessionIntake(session, sink_, std::move(submit), stats_, options_.robots),
                                      AcknowledgementSchedule(options_.times)})
              .first;
-    it->second.schedule.news();  // the robot learns where the daemon stands
+    it->second.schedule.news();  // tells the robot what the daemon has
     it->second.begun = it->second.intake.begun();
     it->second.heard_first = now;
     silent_.erase(session);
@@ -81,16 +81,16 @@ bool Intake::make_room(SteadyTime now) {
 }
 
 bool Intake::drop_waiting(std::size_t more_than) {
-  SessionIntake* most = nullptr;
+  SessionIntake* largest = nullptr;
   for (auto& [session, entry] : sessions_)
-    if (!most || entry.intake.waiting_bytes() > most->waiting_bytes()) most = &entry.intake;
-  if (!most || most->waiting_bytes() <= more_than) return false;
-  most->drop_last_waiting();
+    if (!largest || entry.intake.waiting_bytes() > largest->waiting_bytes()) largest = &entry.intake;
+  if (!largest || largest->waiting_bytes() <= more_than) return false;
+  largest->drop_last_waiting();
   return true;
 }
 
-// A robot that is gone must not keep the share of those that are there. What it had sent and nobody was told to be
-// durable is as if it had never come; should it come back, it will be asked for it.
+// A robot that is gone must not hold memory that others need. What it sent and was not told to be durable is dropped;
+// if it comes back, it is asked for that again.
 void Intake::forget_silent(SteadyTime now) {
   for (auto it = sessions_.begin(); it != sessions_.end();) {
     auto& [session, entry] = *it;
@@ -107,7 +107,8 @@ void Intake::forget_silent(SteadyTime now) {
   std::erase_if(silent_, [&](const auto& item) { return item.second.heard + options_.remember <= now; });
 }
 
-// Whoever is missing is looked for in the list of robots. Strangers are not kept there: they may be rubbish.
+// Keeps a silent robot in the list of robots, where an operator looks for it. Sessions that have not begun are not
+// kept: they may be garbage.
 void Intake::remember(const SessionUuid& session, Entry& entry, SteadyTime now) {
   if (!entry.begun || entry.intake.ended()) return;
   if (silent_.size() >= options_.max_sessions)
@@ -132,8 +133,8 @@ void Intake::note(RobotEvent::Kind kind, const SessionUuid& session, const Entry
   event.silent = std::chrono::duration_cast<std::chrono::seconds>(now - entry.schedule.last_heard());
 }
 
-// Two robots that bear one name, each with a session of its own: both are heard, each since the other was heard first.
-// A front-end that was begun anew with another session is not heard with the former one any more.
+// Finds robots of one name that send different sessions at the same time: each is heard after the other was first
+// heard. A front-end that was restarted with a new session is not meant, because its former session is heard no more.
 Intake::Namesakes Intake::namesakes(SteadyTime now) const {
   using Live = std::pair<const SessionUuid, Entry>;
   std::map<std::string_view, std::vector<const Live*>> by_name;
@@ -184,7 +185,7 @@ bool Intake::wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc) {
       count_part(entry, Reason::SEQUENCE_TOO_FAR);
       break;
   }
-  entry.schedule.news();  // the robot does not know, or it would not have sent this
+  entry.schedule.news();  // the robot would not have sent this if it knew
   return false;
 }
 
@@ -263,7 +264,7 @@ void Intake::take_end(const SessionEnd& end, SteadyTime now) try {
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
 
 void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
-  take_outcomes(now);  // what failed first is to be submitted first
+  take_outcomes(now);  // records that failed must be submitted again before later ones
   entry.intake.advance();
   if (!entry.begun && entry.intake.begun()) {
     entry.begun = true;
@@ -308,16 +309,16 @@ std::vector<PoseNews> Intake::take_news() { return std::exchange(news_, {}); }
 
 std::vector<RobotEvent> Intake::take_events() { return std::exchange(events_, {}); }
 
-// What a session may bring grows with time, and is saved up for a moment only.
+// Token bucket: what a session may send grows with time, up to a bound.
 void Intake::replenish(Entry& entry, SteadyTime now) {
   const double rate = options_.max_keyframes_per_s;
   if (rate <= 0 || !entry.by_parts) return;
   const auto next = static_cast<double>(entry.intake.next_sequence());
-  const double most = next + std::max<double>(kIntakeWindow, 2 * rate);
-  if (entry.paced_at == SteadyTime{}) entry.paced_end = most;
+  const double max_end = next + std::max<double>(kIntakeWindow, 2 * rate);
+  if (entry.paced_at == SteadyTime{}) entry.paced_end = max_end;
   entry.paced_end += rate * std::chrono::duration<double>(now - std::max(entry.paced_at, now - kIdle)).count();
   entry.paced_at = now;
-  entry.paced_end = std::clamp(entry.paced_end, next, most);
+  entry.paced_end = std::clamp(entry.paced_end, next, max_end);
   if (entry.paced_end < next + kNearLimit * rate) entry.limited_at = now;
 }
 
@@ -329,7 +330,7 @@ bool Intake::paced(Entry& entry, std::uint32_t sequence, SteadyTime now) {
   return false;
 }
 
-// Where there is not room for all, each poll begins with the session behind the one that the last began with.
+// Each poll begins with the session after the one that the last poll began with, so that scarce room is given in turn.
 std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   take_outcomes(now);
   forget_silent(now);
@@ -354,7 +355,7 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   return due;
 }
 
-// A robot that brings more than is taken in is told so, and told again, until that has passed.
+// Tells a robot that sends more than is taken in to slow down, repeatedly while that lasts, and then to resume.
 void Intake::tell_pace(const SessionUuid& session, Entry& entry, SteadyTime now) {
   replenish(entry, now);
   const bool limited = entry.limited_at != SteadyTime{} && now - entry.limited_at < kHeldBack;
@@ -385,14 +386,14 @@ SteadyTime Intake::next_due(SteadyTime now) const {
   return next;
 }
 
-// Of a session that has not begun it is not asked for parts so often: it may be rubbish, which must not be answered
-// with floods.
+// A session that has not begun is asked for missing parts only at the regular interval: it may be garbage, which must
+// not be answered with floods.
 bool Intake::imperfect(const SessionUuid& session, const Entry& entry) const {
   return entry.begun && (entry.intake.has_missing() || reassembly_.has_incomplete(session));
 }
 
-// What is there already, and as much more as there is room for, shared among the sessions. Never less than one, or
-// nothing would ever be asked for again.
+// The keyframes that have come already, and as many more as there is room for, shared among the sessions. At least one
+// unless the sink fails or the rate limit is reached; otherwise nothing would ever be sent again.
 std::uint32_t Intake::credits(const SessionUuid& session, const Entry& entry) const {
   const Status& blocked = entry.intake.blocked();
   if (!blocked.ok() && blocked.reason() != Reason::BUDGET_EXCEEDED) return 0;

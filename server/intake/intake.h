@@ -1,5 +1,5 @@
-// All sessions on their way in: parts and gaps to records for the journal, outcomes to acknowledgements. Pure but for
-// its sink: time is an argument. Single-threaded; IngestServer puts a lock and a thread round it.
+// Takes in all sessions: turns parts and gaps into records for the journal, and their outcomes into acknowledgements.
+// Deterministic apart from the sink, since time is an argument. Not thread-safe; IngestServer adds a lock and threads.
 #pragma once
 
 #include <functional>
@@ -18,18 +18,18 @@
 
 namespace relmap::intake {
 
-inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // in one message
+inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // of one gap message
 
 struct IntakeOptions {
   AcknowledgementTimes times;
-  std::size_t max_sessions =
-      1024;  // at a time; the one that was silent longest makes room if it has not begun or is settled
-  std::chrono::seconds patience{60};   // with a robot that says no more: then what it left unfinished is let go of
-  std::chrono::seconds remember{600};  // since it was heard last: so long robots() tells of one that did not end
-  // What a session may bring in parts, keyframes a second in the long run; what was saved up while it brought less may
-  // come at once (kIntakeWindow, or two seconds' worth). 0: any number.
+  // Sessions at a time. A new one replaces the longest silent of those that have not begun or have nothing pending.
+  std::size_t max_sessions = 1024;
+  std::chrono::seconds patience{60};   // after so long a silence a robot's unfinished keyframes are dropped
+  std::chrono::seconds remember{600};  // robots() lists a robot that did not end for so long after it was last heard
+  // Mean number of keyframes that a session may send in parts, per second; 0: no limit. A session that sent less may
+  // catch up by kIntakeWindow keyframes or two seconds' worth, whichever is more.
   double max_keyframes_per_s = 0;
-  std::set<std::string> robots;  // whose keyframes are taken, by name; empty: all
+  std::set<std::string> robots;  // names of the robots whose keyframes are taken; empty: all
 };
 
 class Intake {
@@ -39,60 +39,60 @@ class Intake {
          std::function<void()> wake);
   ~Intake();
 
-  // None of these fails: what is wrong is counted by its reason, and the acknowledgement says what is to be done.
+  // None of these fails. Errors are counted by reason, and the next acknowledgement tells the robot what to do.
   void take_part(const KeyframePart& part, SteadyTime now);
   void take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
                     SteadyTime now);
   void take_gap(const Gap& gap, SteadyTime now);
   void take_end(const SessionEnd& end, SteadyTime now);
-  // Something arrived that is no message (CORRUPT) or one of another protocol (UNKNOWN_PROTOCOL_VERSION).
+  // Counts bytes that are no message (CORRUPT) or a message of another protocol (UNKNOWN_PROTOCOL_VERSION).
   void count_foreign(Reason reason);
 
-  // Takes in the outcomes of what was journalled, tries again what was blocked, and returns what is to be said now.
+  // Handles the outcomes of journalled records, retries what was blocked, and returns the acknowledgements to send now.
   std::vector<Acknowledgement> poll(SteadyTime now);
-  // And what robots are to be told besides: that their session has ended, at what pace to go on. Since the last call.
+  // Other news for robots since the last call: that their session has ended, at what rate to go on.
   std::vector<PoseNews> take_news();
-  // What is to be logged of robots, since the last call.
+  // Events for the log since the last call.
   std::vector<RobotEvent> take_events();
-  // When poll() has something to do, if nothing happens before.
+  // When to call poll() next, if nothing happens before.
   SteadyTime next_due(SteadyTime now) const;
 
-  // NO_SUCH_SESSION if nothing is known of it.
+  // The session's present acknowledgement. NO_SUCH_SESSION if neither the intake nor the map knows it.
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
-  // Of all sessions that are being taken in, and of robots that fell silent without an end, in no order.
+  // All sessions that are being taken in, and robots that fell silent without an end, in no particular order.
   std::vector<RobotStats> robots(SteadyTime now);
-  // Sessions that answer for what they send: they have begun.
+  // Sessions that have begun. Only these have memory and queues of their own.
   std::set<SessionUuid> begun() const;
-  // Another number whenever begun() may be another set.
+  // Changes whenever begun() may have changed.
   std::uint64_t begun_version() const { return begun_version_; }
 
  private:
   struct Entry {
     SessionIntake intake;
     AcknowledgementSchedule schedule;
-    double payload_bytes = 64 * 1024;  // running mean
+    double payload_bytes = 64 * 1024;  // running mean of keyframe sizes
     RateMeter keyframes{}, bytes{};
     std::int64_t lag_us = -1;
     std::map<Reason, std::uint64_t> not_taken{};
-    bool by_parts = false;  // comes over a transport that has no flow control of its own
-    double paced_end = 0;   // 1 + the highest sequence that may come now
-    SteadyTime paced_at{};
-    SteadyTime limited_at{};       // that was in its way last
-    SteadyTime held_back_since{};  // it wants to bring more than is taken; epoch: it does not
-    SteadyTime slowed_at{};        // it was told so; epoch: it was not
+    bool by_parts = false;         // it comes over a transport without flow control
+    double paced_end = 0;          // 1 + the highest sequence that the rate limit admits now
+    SteadyTime paced_at{};         // when paced_end was computed
+    SteadyTime limited_at{};       // when the rate limit last held it back
+    SteadyTime held_back_since{};  // since when it sends more than is taken; epoch: it does not
+    SteadyTime slowed_at{};        // when it was last told to slow down; epoch: never, or told to resume
     SteadyTime heard_first{};
     bool begun = false;
-    bool announced = false;      // there was an event: it is heard,
-    bool namesake_told = false;  // another of its name is
+    bool announced = false;      // kHeard has been logged
+    bool namesake_told = false;  // kSameName has been logged
   };
-  // A robot that fell silent without an end, as it was heard last.
+  // A robot that fell silent without an end, as it was last heard.
   struct Silent {
     RobotStats stats;
     SteadyTime heard;
   };
   using Namesakes = std::map<SessionUuid, std::vector<SessionUuid>>;
-  // What the sink has said about submitted records, until poll().
+  // Outcomes of submitted records, from the sink's threads until poll().
   struct Outcomes {
     struct Outcome {
       SessionUuid session;
@@ -139,9 +139,9 @@ class Intake {
   IngestStats stats_;
   Reassembly reassembly_;
   std::map<SessionUuid, Entry> sessions_;
-  std::map<SessionUuid, Silent> silent_;  // of none of sessions_
+  std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};
-  SessionUuid first_served_;  // from which session on room is given out next
+  SessionUuid first_served_;  // the session with which the last poll() began
   std::vector<PoseNews> news_;
   std::vector<RobotEvent> events_;
   std::uint64_t begun_version_ = 0;

@@ -1,4 +1,4 @@
-// Every way for keyframes to be wrong, and for the sink to be slow, broken or behind.
+// Keyframes that are wrong in every way, and sinks that are slow, broken or behind.
 #include "server/intake/intake.h"
 
 #include <gtest/gtest.h>
@@ -103,9 +103,9 @@ TEST_F(IntakeTest, IncompleteKeyframesAreAskedForByPart) {
   EXPECT_TRUE(ack.missing.empty());
 }
 
-// A robot's front-end may be brought up to date, or back, in the midst of a session: what is not known of its header
-// is no other calibration, and the session keeps what its first keyframe said.
-TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
+// A robot's front-end may be upgraded or downgraded in the middle of a session. Unknown extensions of its header are no
+// other calibration, and the session keeps those of its first keyframe.
+TEST_F(IntakeTest, UnknownExtensionsOfAHeaderDoNotInterruptASession) {
   const Extensions unknown[] = {{}, {{1000, {1, 2}}}, {{1000, {3}}, {2000, {}}}, {}};
   for (const std::uint32_t begun : {0U, 1U}) {
     if (begun > 0) uuid_.bytes[0] ^= 0x40;
@@ -131,7 +131,7 @@ TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
     EXPECT_EQ(decode_keyframe(keyframes[i].payload)->unknown, unknown[i % 4]);
 }
 
-TEST_F(IntakeTest, ASessionsRawCalibrationMayNotChange) {
+TEST_F(IntakeTest, TheRawCalibrationOfASessionMayNotChange) {
   Keyframe k = keyframe(0);
   k.session.raw = sample_raw_calibration(1);
   send(k);
@@ -144,7 +144,7 @@ TEST_F(IntakeTest, ASessionsRawCalibrationMayNotChange) {
   EXPECT_EQ(ack.refused[0].reason, Reason::CALIBRATION_CHANGED);
 }
 
-TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
+TEST_F(IntakeTest, BadKeyframesAreRefusedOnceAndOthersGoOn) {
   send(0);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<std::pair<Reason, std::function<void(Keyframe&)>>> cases = {
@@ -177,7 +177,7 @@ TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
   EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 2u);
 }
 
-TEST_F(IntakeTest, BytesThatAreNoKeyframeAreRefusedAndSettled) {
+TEST_F(IntakeTest, BytesThatAreNoKeyframeAreRefusedForGood) {
   send(0);
   send_bytes(1, Bytes(2000, 0xee));
   Bytes cut = encode_keyframe(keyframe(2));
@@ -242,7 +242,7 @@ TEST_F(IntakeTest, ConflictsAreRefusedAndSettleNothing) {
   EXPECT_EQ(ack.refused[0].payload_crc, crc32c(encode_keyframe(other)));
   EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 1u);
   EXPECT_EQ(sink_.journal().size(), 2u);
-  // Also with what waits for its turn, and after a restart, from the map alone.
+  // Also a conflict with a keyframe that waits for its turn, and, after a restart, with one that only the map knows.
   send(3);
   Keyframe other3 = keyframe(3);
   other3.standing_us += 1;
@@ -253,7 +253,7 @@ TEST_F(IntakeTest, ConflictsAreRefusedAndSettleNothing) {
   EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 1u);
 }
 
-TEST_F(IntakeTest, GapsAreJournalledAndDoNotOverruleWhatCame) {
+TEST_F(IntakeTest, GapsAreJournalledExceptForSequencesThatCame) {
   send(0);
   send(4);
   intake_->take_gap({uuid_, 1, 6, Reason::MAP_RESTORED}, now_);
@@ -271,7 +271,7 @@ TEST_F(IntakeTest, GapsAreJournalledAndDoNotOverruleWhatCame) {
   EXPECT_EQ(intake_->stats().sequences_given_up, 5u);
 }
 
-TEST_F(IntakeTest, GapsThatCannotBeAreRefused) {
+TEST_F(IntakeTest, InvalidGapsAreRefused) {
   intake_->take_gap({uuid_, 3, 1, Reason::DROPPED_BY_ROBOT}, now_);
   intake_->take_gap({uuid_, 0, 1, Reason::NOT_FINITE}, now_);
   intake_->take_gap({uuid_, 0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
@@ -288,7 +288,7 @@ TEST_F(IntakeTest, SequencesBeyondTheWindowWait) {
   EXPECT_EQ(acknowledge().missing, (std::vector<SequenceRange>{{0, kIntakeWindow - 2}}));
 }
 
-TEST_F(IntakeTest, RefusalsOfASessionThatHasNotBegunAreCountedApartUntilTheyAreJournalled) {
+TEST_F(IntakeTest, RefusalsBeforeASessionBeginsAreCountedSeparately) {
   const auto waiting = [&] { return intake_->stats().refused_before_begin[index_of(Reason::IMPLAUSIBLE_CALIBRATION)]; };
   for (std::uint32_t s = 0; s < 2; ++s) {
     Keyframe k = keyframe(s);
@@ -321,7 +321,7 @@ TEST_F(IntakeTest, SessionThatBeginsWithRefusalsKeepsThemInTheJournal) {
   EXPECT_TRUE(sink_.faults.empty());
 }
 
-TEST_F(IntakeTest, RestartTakesUpWhatTheMapKnows) {
+TEST_F(IntakeTest, ARestartContinuesFromWhatTheMapKnows) {
   send(0);
   Keyframe bad = keyframe(1);
   bad.driven_us = -1;
@@ -380,7 +380,7 @@ TEST_F(IntakeTest, JournalThatFailsIsNotAcknowledgedAndAskedForAgain) {
   EXPECT_TRUE(sink_.faults.empty());
 }
 
-TEST_F(IntakeTest, WhatWasRefusedBeforeTheSessionBeganIsJournalledInTheEndThoughTheJournalFails) {
+TEST_F(IntakeTest, RefusalsBeforeTheSessionBeganAreJournalledDespiteFailures) {
   Keyframe bad = keyframe(0);
   bad.session.camera.f = 1;
   send(bad);
@@ -397,7 +397,7 @@ TEST_F(IntakeTest, WhatWasRefusedBeforeTheSessionBeganIsJournalledInTheEndThough
   EXPECT_TRUE(sink_.faults.empty());
 }
 
-TEST_F(IntakeTest, AFullDiskHoldsWhatCameAndSettlesNothing) {
+TEST_F(IntakeTest, WithAFullDiskKeyframesWaitAndNothingIsSettled) {
   send(0);
   settle();
   sink_.refuse_submit = {Reason::DISK_FULL, "the disk is full"};
@@ -416,8 +416,8 @@ TEST_F(IntakeTest, AFullDiskHoldsWhatCameAndSettlesNothing) {
   EXPECT_GT(after.credits, 0u);
 }
 
-// Between a failure and the poll() that hears of it the journal may be well again.
-TEST_F(IntakeTest, WhatComesAfterAFailureDoesNotOvertakeIt) {
+// The journal may have recovered before poll() learns of the failure.
+TEST_F(IntakeTest, KeyframesAfterAFailureDoNotOvertakeEarlierOnes) {
   send(0);
   settle();
   send(1);
@@ -440,7 +440,7 @@ TEST_F(IntakeTest, ReadOnlySinkGivesNoCreditsAndSaysWhy) {
   EXPECT_EQ(settle().next_sequence, 1u);
 }
 
-TEST_F(IntakeTest, AcknowledgesNowAndThenWhileTheRobotIsThere) {
+TEST_F(IntakeTest, AcknowledgesRegularlyWhileTheRobotIsActive) {
   send(0);
   sink_.sync();
   std::size_t said = 0;
@@ -479,7 +479,7 @@ TEST_F(IntakeTest, WholePayloadsTakeTheSameWay) {
   EXPECT_EQ(intake_->acknowledgement(unknown).reason(), Reason::NO_SUCH_SESSION);
 }
 
-TEST_F(IntakeTest, ARobotThatIsGoneHoldsNoMemory) {
+TEST_F(IntakeTest, ASilentRobotHoldsNoMemory) {
   send(0);
   settle();
   for (std::uint32_t s = 2; s < 6; ++s) send(s);  // 1 never comes
@@ -511,12 +511,12 @@ TEST_F(IntakeTest, SessionsThatNeverBeginLockNobodyOut) {
   EXPECT_EQ(settle().next_sequence, 1u);
 }
 
-TEST_F(IntakeTest, ALastSequenceHasANextOne) {
+TEST_F(IntakeTest, TheLastPossibleSequenceHasASuccessor) {
   intake_->take_gap({uuid_, 0xfffffff0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
   EXPECT_EQ(intake_->stats().messages_refused[index_of(Reason::INVALID_ARGUMENT)], 1u);
 }
 
-TEST_F(IntakeTest, OnlyRobotsOnTheListAreTakenAndOthersRefusedByName) {
+TEST_F(IntakeTest, OnlyRobotsOnTheListAreTaken) {
   IntakeOptions options;
   options.robots = {"friend"};
   restart(options);
@@ -531,7 +531,7 @@ TEST_F(IntakeTest, OnlyRobotsOnTheListAreTakenAndOthersRefusedByName) {
   EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 1u);
 }
 
-TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
+TEST_F(IntakeTest, FrozenAndDeletedSessionsRefuseKeyframes) {
   send(0);
   settle();
   sink_.set_state(1, storage::SessionState::kFrozen);
@@ -547,7 +547,7 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   restart();
   send(4);
   EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_DELETED);
-  // Another version of what was in the map is refused likewise: nobody else sends for the session.
+  // Another version of a keyframe that was in the map is refused with the same reason.
   Keyframe corrected = keyframe(2);
   corrected.standing_us += 1;
   send(corrected);
@@ -558,7 +558,7 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   ASSERT_EQ(robots.size(), 1u);
   EXPECT_FALSE(robots[0].not_taken.contains(Reason::SEQUENCE_CONFLICT));
   EXPECT_TRUE(robots[0].not_taken.contains(Reason::SESSION_DELETED));
-  // What was in the map once is refused, too, and not taken for settled.
+  // A keyframe that was in the map is refused, too, and not treated as settled.
   sink_.remove_frame({1, 0});
   restart();
   send(0);
@@ -568,8 +568,8 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   EXPECT_EQ(ack.refused.front().reason, Reason::SESSION_DELETED);
 }
 
-// A robot to whom all is settled sends nothing, and must hear of it all the same.
-TEST_F(IntakeTest, ThatASessionTakesNothingIsSaidUnasked) {
+// A robot with everything settled sends nothing, and must be told all the same.
+TEST_F(IntakeTest, ARobotIsToldAtOnceThatItsSessionTakesNothing) {
   send(0);
   EXPECT_TRUE(settle().refused.empty());
   for (const auto& [state, reason] : {std::pair{storage::SessionState::kFrozen, Reason::SESSION_FROZEN},
@@ -617,7 +617,7 @@ TEST_F(IntakeTest, ASessionEndsWhenAllOfItIsSettledAndAKeyframeOpensItAgain) {
   EXPECT_EQ(journalled<storage::SetSessionStateRecord>().size(), 2u);
 }
 
-TEST_F(IntakeTest, WhoBringsMoreThanItsRateIsHeldBackToldSoAndLosesNothing) {
+TEST_F(IntakeTest, ARobotAboveItsRateIsHeldBackToldSoAndLosesNothing) {
   IntakeOptions options;
   options.max_keyframes_per_s = 10;
   restart(options);
@@ -654,7 +654,7 @@ TEST_F(IntakeTest, WhoBringsMoreThanItsRateIsHeldBackToldSoAndLosesNothing) {
   EXPECT_TRUE(sink_.faults.empty());
 }
 
-TEST_F(IntakeTest, RoomIsGivenOutInTurn) {
+TEST_F(IntakeTest, SessionsGetRoomInTurn) {
   sink_.capacity = 2;
   std::vector<SessionUuid> sessions;
   for (std::uint8_t n = 1; n <= 4; ++n) {
@@ -666,7 +666,7 @@ TEST_F(IntakeTest, RoomIsGivenOutInTurn) {
   for (const SessionUuid& session : sessions) EXPECT_GE(intake_->acknowledgement(session)->next_sequence, 4u);
 }
 
-TEST_F(IntakeTest, TellsOfEachRobotHowItStands) {
+TEST_F(IntakeTest, ReportsTheStateOfEachRobot) {
   for (const std::uint32_t s : {0, 1, 5}) send(s);
   const Bytes payload = encode_keyframe(keyframe(3));
   intake_->take_part(cut_part(uuid_, 3, payload, crc32c(payload), 600, 0), now_);
@@ -690,7 +690,7 @@ TEST_F(IntakeTest, TellsOfEachRobotHowItStands) {
   EXPECT_EQ(intake_->begun(), std::set<SessionUuid>{uuid_});
 }
 
-// One that was killed is missing in the list for a while, where somebody may look for it; one that ended is not.
+// A robot that was killed stays in the list for a while, where an operator may look for it; one that ended does not.
 TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   const auto listed = [&] {
     (void)intake_->poll(now_);
@@ -708,7 +708,7 @@ TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   uuid_.bytes[0] ^= 2;
   Keyframe bad = keyframe(0);
   bad.driven_us = -1;
-  send(bad);  // of a stranger: its session never begins
+  send(bad);  // its session never begins
   settle();
   std::vector<RobotStats> robots = listed();
   EXPECT_EQ(robots.size(), 3u);
@@ -730,7 +730,7 @@ TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   now_ = heard + std::chrono::seconds(600);
   EXPECT_EQ(listed().size(), 0u);
 
-  // Back before that, it is a robot like any other.
+  // If it returns before, it is a robot like any other.
   uuid_ = killed;
   send(3);
   settle();
@@ -755,7 +755,7 @@ TEST_F(IntakeTest, SilentRobotsAreRememberedWithinBounds) {
   EXPECT_EQ(intake_->robots(now_).size(), 8u);
 }
 
-TEST_F(IntakeTest, TwoRobotsOfOneNameAreToldApartFromOneThatBeganAnew) {
+TEST_F(IntakeTest, TwoRobotsOfOneNameDifferFromOneThatWasRestarted) {
   const SessionUuid first = uuid_;
   SessionUuid second = uuid_;
   second.bytes[0] ^= 1;
@@ -788,7 +788,7 @@ TEST_F(IntakeTest, TwoRobotsOfOneNameAreToldApartFromOneThatBeganAnew) {
   now_ += std::chrono::seconds(1);
   settle();
   EXPECT_EQ(told(), 0u) << "once";
-  // Another name, or an end, is no trouble.
+  // Another name, or an end, resolves it.
   uuid_.bytes[0] ^= 2;
   Keyframe other = keyframe(0);
   other.session.robot = "another";
@@ -816,7 +816,7 @@ TEST_F(IntakeTest, TwoRobotsOfOneNameAreToldApartFromOneThatBeganAnew) {
   EXPECT_TRUE(namesakes(second).empty());
 }
 
-TEST_F(IntakeTest, TellsTheLogWhoIsHeardAndWhoFellSilent) {
+TEST_F(IntakeTest, ReportsToTheLogWhoIsHeardAndWhoFellSilent) {
   const auto kinds = [&] {
     std::vector<RobotEvent::Kind> all;
     for (const RobotEvent& event : intake_->take_events()) {
@@ -844,8 +844,8 @@ TEST_F(IntakeTest, TellsTheLogWhoIsHeardAndWhoFellSilent) {
   EXPECT_EQ(kinds(), Kinds{}) << "it has ended";
 }
 
-// Whole keyframes of which the first never comes must not lock others out.
-TEST_F(IntakeTest, WhoHoldsMostKeyframesThatWaitGivesWay) {
+// Complete keyframes whose predecessor never comes must not lock others out.
+TEST_F(IntakeTest, TheSessionWithMostWaitingKeyframesGivesWay) {
   const auto large = [&](std::uint32_t sequence) {
     Keyframe k = keyframe(sequence);
     k.picture = Bytes(40'000, 0xff);
@@ -862,7 +862,7 @@ TEST_F(IntakeTest, WhoHoldsMostKeyframesThatWaitGivesWay) {
   uuid_ = robot;
   for (std::uint32_t s = 0; s < 10; ++s) send(large(s));
   EXPECT_EQ(settle().next_sequence, 10u);
-  // What was let go of is missing again, and nothing else.
+  // Only the dropped keyframe is missing again.
   uuid_.bytes.fill(2);
   send(large(0));
   const Acknowledgement ack = settle();

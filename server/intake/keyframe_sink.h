@@ -1,4 +1,4 @@
-// Where keyframes go: what ingest needs of the map, so that it can be tested without one.
+// The interface through which ingest uses the map, so that it can be tested without one.
 #pragma once
 
 #include <cstddef>
@@ -17,18 +17,20 @@ class KeyframeSink {
  public:
   virtual ~KeyframeSink() = default;
 
-  // The number of the session with this uuid, durable. CALIBRATION_CHANGED if it began with another camera or flags.
+  // Returns the number of the session with this uuid once it is durable. CALIBRATION_CHANGED if the session began with
+  // another camera or flags.
   virtual Result<SessionNumber> begin_session(const SessionHeader& header) = 0;
 
-  // Queues a record; `done` is called once, from any thread, when it is durable or will never be. Records become
-  // durable in the order in which they were submitted, or not at all. BUDGET_EXCEEDED, without `done`: try again later.
+  // Queues a record. If the result is OK, `done` is called once, from any thread, when the record is durable or will
+  // never be. Otherwise `done` is not called; after BUDGET_EXCEEDED try again later. Records become durable in the
+  // order in which they were submitted, or not at all.
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   virtual Status submit(storage::JournalRecord record, Done done) = 0;
 
-  // The map; it may lag behind what is durable, except before the first submit().
+  // The map. It may lag behind the durable records, except before the first submit().
   virtual std::shared_ptr<const storage::Graph> view() const = 0;
 
-  // Bytes of records that submit() would take now, about.
+  // Approximate size of records that submit() would take now.
   virtual std::size_t free_bytes() const = 0;
 };
 

@@ -21,7 +21,7 @@ KeyframePart part(std::uint8_t from, std::uint32_t sequence, std::size_t bytes =
 
 constexpr std::size_t kPart = sizeof(KeyframePart) + 1400;
 
-TEST(PartQueue, OfOneSenderFirstInIsFirstOut) {
+TEST(PartQueue, IsFirstInFirstOutForOneSender) {
   PartQueue queue(100 * kPart);
   for (std::uint32_t s = 0; s < 50; ++s) queue.push(sender(1), part(1, s));
   EXPECT_EQ(queue.of(sender(1)).waiting, 50u);
@@ -31,7 +31,7 @@ TEST(PartQueue, OfOneSenderFirstInIsFirstOut) {
   EXPECT_EQ(queue.bytes(), 0u);
 }
 
-// However much one has queued, another's few parts are not behind it; by bytes, not by parts.
+// A sender with few parts does not wait behind one with many; turns are counted in bytes, not in parts.
 TEST(PartQueue, SendersAreServedInTurnByBytes) {
   PartQueue queue(std::size_t{64} << 20);
   for (std::uint32_t s = 0; s < 1000; ++s) queue.push(sender(1), part(1, s, 1400));
@@ -64,7 +64,7 @@ TEST(PartQueue, TheLongestQueueGivesWay) {
   }
 }
 
-TEST(PartQueue, NothingThatIsLargerThanAllOfItComesIn) {
+TEST(PartQueue, APartLargerThanTheQueueIsDropped) {
   PartQueue queue(kPart);
   queue.push(sender(1), part(1, 0, 2000));
   EXPECT_FALSE(queue.pop());
@@ -74,7 +74,7 @@ TEST(PartQueue, NothingThatIsLargerThanAllOfItComesIn) {
   EXPECT_EQ(queue.of(sender(1)).dropped, 1u + 1u);
 }
 
-TEST(PartQueue, ForgetsSendersThatAreGone) {
+TEST(PartQueue, ForgetsUnknownSenders) {
   PartQueue queue(100 * kPart);
   for (const std::uint8_t n : {1, 2, 3}) queue.push(sender(n), part(n, 0));
   for (int i = 0; i < 200; ++i) queue.push(sender(3), part(3, 1));

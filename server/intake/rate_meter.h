@@ -1,4 +1,4 @@
-// How much a second, over the last ten.
+// Mean rate per second over the last ten seconds.
 #pragma once
 
 #include <array>

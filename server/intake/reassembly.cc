@@ -9,19 +9,19 @@
 namespace relmap::intake {
 
 namespace {
-constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
+constexpr std::size_t kOverhead = 512;  // approximate memory of an assembly without its bytes
 }
 
 ReassemblyCharge Reassembly::take_room(std::size_t bytes) {
   for (;;) {
     auto charge = ReassemblyCharge::take(budget_, bytes);
     if (charge) return charge;
-    const auto most = std::max_element(holders_.begin(), holders_.end(),
-                                       [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
-    const std::size_t held = most == holders_.end() ? 0 : most->second.bytes;
+    const auto largest = std::max_element(holders_.begin(), holders_.end(),
+                                          [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
+    const std::size_t held = largest == holders_.end() ? 0 : largest->second.bytes;
     if (!others_ || !others_(held)) {
       if (held == 0) return charge;
-      drop(assemblies_.find(most->second.ages.front()));
+      drop(assemblies_.find(largest->second.ages.front()));
     }
     ++evicted_;
   }

@@ -1,5 +1,5 @@
-// Parts become payloads. Bounded bytes: when they run out, who holds most gives way, with what has waited longest for a
-// part; it is sent again.
+// Reassembles payloads from parts, in bounded memory. When memory runs out, the holder of most bytes loses the assembly
+// that has waited longest for a part; its robot sends it again.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +17,11 @@
 
 namespace relmap::intake {
 
-// Versions of a keyframe with different checksums are put together apart: which of them counts is not decided here.
+// Versions of a keyframe with different checksums are reassembled separately; the caller decides which of them counts.
 class Reassembly {
  public:
-  // Whole keyframes that wait elsewhere at the same share's expense: lets go of one of who holds most of them, if that
-  // is more than so many bytes. False: nobody does.
+  // Drops a complete keyframe that waits elsewhere and is charged to the same share: one of the session with most such
+  // bytes, if these are more than `more_than`. Returns whether one was dropped.
   using GiveWay = std::function<bool(std::size_t more_than)>;
   Reassembly(storage::Budget& budget, GiveWay others = nullptr) : budget_(budget), others_(std::move(others)) {}
 
@@ -31,21 +31,21 @@ class Reassembly {
     ReassemblyCharge charge;
   };
 
-  // The payload when this was its last part; nothing while others are missing. The part has passed check_part().
-  // `holder`: at whose expense; a session that has begun answers for itself, all others together (nil). CORRUPT: the
-  // payload is whole and fails its checksum; it is dropped. BUDGET_EXCEEDED.
+  // Adds a part that has passed check_part(). Returns the payload if this was its last part, nullopt while others are
+  // missing. `holder` is charged with the memory: the session itself once it has begun, nil for all others together.
+  // CORRUPT if the complete payload fails its checksum (it is dropped), BUDGET_EXCEEDED if there is no room.
   Result<std::optional<Payload>> add(const KeyframePart& part, const SessionUuid& holder);
 
   bool has_incomplete(const SessionUuid& session) const;
-  // Of one session, ascending by sequence.
+  // The session's incomplete sequences, ascending.
   std::vector<std::uint32_t> incomplete(const SessionUuid& session) const;
-  // The same with the parts that are missing, oldest first, within the limits of an acknowledgement.
+  // The same with their missing parts, within the limits of an acknowledgement.
   std::vector<MissingParts> missing(const SessionUuid& session) const;
 
-  // Drops what can no longer be used: sequences below `below`, or all.
+  // Drops the session's sequences below `below`.
   void forget(const SessionUuid& session, std::uint64_t below);
 
-  // Room for so many bytes, at the expense of who holds most. Empty: there is none.
+  // Reserves so many bytes; if necessary, the holders of most bytes give way. Empty if there is no room.
   ReassemblyCharge take_room(std::size_t bytes);
 
   std::size_t size() const { return assemblies_.size(); }
@@ -55,7 +55,7 @@ class Reassembly {
   using Key = std::tuple<SessionUuid, std::uint32_t, std::uint32_t>;  // session, sequence, crc
   struct Holder {
     std::size_t bytes = 0;
-    std::list<Key> ages;  // the one that has waited longest for a part first
+    std::list<Key> ages;  // assemblies, that which has waited longest for a part first
   };
   using Holders = std::map<SessionUuid, Holder>;
   struct Assembly {
@@ -73,7 +73,7 @@ class Reassembly {
   storage::Budget& budget_;
   const GiveWay others_;
   Assemblies assemblies_;
-  Holders holders_;  // of something
+  Holders holders_;  // those with an assembly
   std::uint64_t evicted_ = 0;
 };
 

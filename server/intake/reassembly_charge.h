@@ -11,7 +11,7 @@ namespace relmap::intake {
 class ReassemblyCharge {
  public:
   ReassemblyCharge() = default;
-  // Empty (false) if the share has no room.
+  // Charges the bytes; the result is empty (false) if the share has no room.
   static ReassemblyCharge take(storage::Budget& budget, std::size_t bytes) {
     ReassemblyCharge charge;
     if (budget.try_charge(storage::Share::kReassembly, bytes)) {

@@ -60,7 +60,7 @@ TEST_F(ReassemblyTest, PartsInAnyOrderAndTwiceGiveThePayloadOnce) {
   EXPECT_EQ(budget_.used(storage::Share::kReassembly), 0u);
 }
 
-TEST_F(ReassemblyTest, NamesWhatIsMissing) {
+TEST_F(ReassemblyTest, ListsMissingParts) {
   const Bytes bytes = payload(5000);
   for (const std::uint32_t i : {0u, 2u, 3u}) ASSERT_TRUE(add(part(session(1), 7, bytes, i)).ok());
   ASSERT_TRUE(add(part(session(2), 7, bytes, 0)).ok());
@@ -71,7 +71,7 @@ TEST_F(ReassemblyTest, NamesWhatIsMissing) {
   EXPECT_EQ(reassembly_.incomplete(session(1)), std::vector<std::uint32_t>{7});
 }
 
-TEST_F(ReassemblyTest, TheNamesFitAnAcknowledgement) {
+TEST_F(ReassemblyTest, MissingPartsFitAnAcknowledgement) {
   for (std::uint32_t s = 0; s < 20; ++s)
     ASSERT_TRUE(add(part(session(1), s, payload(40'000, static_cast<std::uint8_t>(s + 1)), 0)).ok());
   const auto missing = reassembly_.missing(session(1));
@@ -84,7 +84,7 @@ TEST_F(ReassemblyTest, TheNamesFitAnAcknowledgement) {
   EXPECT_LE(parts, kMaxAckParts);
 }
 
-TEST_F(ReassemblyTest, WrongPayloadChecksumIsCorruptAndBeginsAnew) {
+TEST_F(ReassemblyTest, AWrongPayloadChecksumIsCorruptAndReassemblyStartsAnew) {
   const Bytes bytes = payload(2000);
   const std::uint32_t wrong = crc32c(bytes) ^ 1;
   ASSERT_TRUE(add(cut_part(session(1), 0, bytes, wrong, 1000, 0)).ok());
@@ -103,14 +103,14 @@ TEST_F(ReassemblyTest, VersionsOfAKeyframeAreNotMixed) {
   EXPECT_EQ((**whole).bytes, one);
 }
 
-TEST_F(ReassemblyTest, OtherPartSizeBeginsAnew) {
+TEST_F(ReassemblyTest, AnotherPartSizeStartsReassemblyAnew) {
   const Bytes bytes = payload(2000);
   ASSERT_TRUE(add(part(session(1), 0, bytes, 0, 1000)).ok());
   for (std::uint32_t i = 0; i < 3; ++i) EXPECT_FALSE(add(part(session(1), 0, bytes, i, 600))->has_value());
   EXPECT_TRUE(add(part(session(1), 0, bytes, 3, 600))->has_value());
 }
 
-TEST_F(ReassemblyTest, UnderPressureDropsWhatWaitedLongest) {
+TEST_F(ReassemblyTest, UnderPressureDropsTheAssemblyThatWaitedLongest) {
   const Bytes bytes = payload(250'000);  // four and no more fit into 1 MiB
   for (std::uint32_t s = 0; s < 4; ++s) ASSERT_TRUE(add(part(session(1), s, bytes, 0)).ok());
   ASSERT_TRUE(add(part(session(1), 0, bytes, 1)).ok());  // 0 is fresh again; 1 waits longest
@@ -120,7 +120,7 @@ TEST_F(ReassemblyTest, UnderPressureDropsWhatWaitedLongest) {
   EXPECT_LE(budget_.used(storage::Share::kReassembly), budget_.allowance(storage::Share::kReassembly));
 }
 
-TEST_F(ReassemblyTest, WhoHoldsMostGivesWay) {
+TEST_F(ReassemblyTest, TheLargestHolderGivesWay) {
   const Bytes bytes = payload(120'000);
   ASSERT_TRUE(add(part(session(1), 0, bytes, 0)).ok());  // has waited longest of all
   for (std::uint32_t s = 0; s < 9; ++s) ASSERT_TRUE(add(part(session(2), s, bytes, 0)).ok());
@@ -129,14 +129,14 @@ TEST_F(ReassemblyTest, WhoHoldsMostGivesWay) {
   EXPECT_EQ(reassembly_.evicted(), 2u);
 }
 
-TEST_F(ReassemblyTest, WithoutRoomAtAllItRefuses) {
+TEST_F(ReassemblyTest, RefusesWithoutAnyRoom) {
   const std::size_t all = budget_.allowance(storage::Share::kReassembly);
   ASSERT_TRUE(budget_.try_charge(storage::Share::kReassembly, all));
   EXPECT_EQ(add(part(session(1), 0, payload(2000), 0)).reason(), Reason::BUDGET_EXCEEDED);
   budget_.release(storage::Share::kReassembly, all);
 }
 
-TEST_F(ReassemblyTest, ForgetsWhatIsSettled) {
+TEST_F(ReassemblyTest, ForgetsSettledSequences) {
   const Bytes bytes = payload(2000);
   for (std::uint32_t s = 0; s < 5; ++s) ASSERT_TRUE(add(part(session(1), s, bytes, 0)).ok());
   ASSERT_TRUE(add(part(session(2), 0, bytes, 0)).ok());

@@ -14,9 +14,9 @@ namespace {
 constexpr std::size_t kKeepJudged = 4 * kIntakeWindow;
 constexpr std::size_t kMaxBeforeBegin = 1024;
 constexpr std::size_t kMaxConflicts = 16;
-constexpr std::uint32_t kNewest = 4096;  // sequences whose refusals are told again to a robot that comes back
+constexpr std::uint32_t kNewest = 4096;  // refusals among so many last sequences are repeated to a robot that returns
 
-// The keyframe by itself; its place in the session is judged when its turn comes.
+// Checks the keyframe alone. Its place in the session is judged when its turn comes.
 Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Result<Keyframe>& keyframe) {
   if (!keyframe.ok()) return keyframe.status();
   if (keyframe->session.uuid != uuid || keyframe->sequence != sequence)
@@ -69,7 +69,7 @@ SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint
   if (sequence < turn_) {
     const auto known = judged(sequence);
     if (known && !known->gap && known->crc == crc) return Verdict::kRepeat;
-    // Whoever sends other keyframes of a deleted session takes its recording in again, as it is now: no two robots.
+    // Other keyframes of a deleted session are no conflict between two robots: the recording is being taken in again.
     if (judge_session().reason() == Reason::SESSION_DELETED) return Verdict::kDeleted;
     return !known || known->gap ? Verdict::kSettled : Verdict::kConflict;
   }
@@ -94,7 +94,7 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
     held.time_us = keyframe->time_us;
     held.header = keyframe->session;
     if (number_)
-      held.header.unknown.clear();  // the session has what its first keyframe said
+      held.header.unknown.clear();  // extensions come from the session's first keyframe
     else
       header_ = keyframe->session;
     held.payload = std::move(payload.bytes);
@@ -135,7 +135,7 @@ void SessionIntake::advance() {
       held_.erase(it);
       continue;
     }
-    // A range given up, but for what came all the same.
+    // Gives up a range, except the sequences of it that came all the same.
     auto gap = given_up_.begin();
     if (gap == given_up_.end() || gap->first > turn_) return;
     if (gap->second.to >= turn_) {
@@ -149,7 +149,7 @@ void SessionIntake::advance() {
   }
 }
 
-// What an operator has said of the session.
+// Not OK if an operator has frozen or deleted the session.
 Status SessionIntake::judge_session() const {
   const auto session = number_ ? sink_.view()->session(*number_) : std::nullopt;
   if (!session) return {};
@@ -177,7 +177,7 @@ bool SessionIntake::judge_keyframe(std::uint32_t sequence, Held& held) {
   const Status verdict = judge_in_turn(held);
   if (verdict.ok()) {
     if (!number_ && !begin(held.header)) return false;
-    // A copy: the sink may have no room, and then it is tried again.
+    // Submits a copy, because it is submitted again if the sink has no room.
     if (!submit(storage::KeyframeRecord{*number_, held.crc, held.payload}, sequence + std::uint64_t{1}, held.time_us,
                 true))
       return false;
@@ -199,7 +199,7 @@ bool SessionIntake::judge_gap(std::uint32_t to, Reason reason) {
   const auto from = static_cast<std::uint32_t>(turn_);
   if (!submit(storage::GapRecord{number_.value_or(0), from, to, reason}, to + std::uint64_t{1}, 0, false)) return false;
   stats_.sequences_given_up += to - from + std::uint64_t{1};
-  // classify() finds nothing for most of a long gap, which means the same.
+  // Of a long gap only the beginning is kept; classify() treats an unknown sequence in the same way.
   for (std::uint64_t s = from; s <= to && s < from + std::uint64_t{kIntakeWindow}; ++s)
     judged_[static_cast<std::uint32_t>(s)] = {0, reason, true};
   return true;
@@ -215,8 +215,8 @@ void SessionIntake::end(std::uint64_t next_sequence) {
   submitted_.push_back(std::move(end));
 }
 
-// A session begins with its first acceptable keyframe. What was settled before is journalled then: until there is a
-// session, forgetting it loses nothing that the robot could not say again.
+// A session begins with its first acceptable keyframe. What was settled before is journalled then. Until then it may be
+// forgotten, because the robot can send it again.
 bool SessionIntake::begin(const SessionHeader& header) {
   const Result<SessionNumber> number = sink_.begin_session(header);
   if (!number.ok()) {
@@ -253,7 +253,7 @@ bool SessionIntake::submit(storage::JournalRecord record, std::uint64_t end, std
       ++stats_.refused_before_begin[index_of(refusal->reason)];
       before_begin_.push_back(*refusal);
     } else {
-      before_begin_.push_back(std::get<storage::GapRecord>(record));  // a keyframe would begin the session
+      before_begin_.push_back(std::get<storage::GapRecord>(record));  // no keyframe: that would have begun the session
     }
     turn_ = durable_ = end;
     return true;
@@ -289,12 +289,12 @@ void SessionIntake::settle(std::uint64_t ticket, const Status& outcome) {
   prune_judged();
 }
 
-// The journal did not take them: they are as if they had never come, and are asked for again.
+// The journal did not take the submitted records. They are forgotten, and the robot is asked for them again.
 void SessionIntake::roll_back() {
   blocked_ = *submitted_.front().outcome;
-  // One that became durable behind one that did not would be out of order in the map for good.
+  // A record that became durable after one that failed would be out of order in the map for good.
   broken_ = std::any_of(submitted_.begin(), submitted_.end(), [](const Submitted& s) { return s.outcome->ok(); });
-  while (!submitted_.empty()) {  // the robot has long been told of those of before begin()
+  while (!submitted_.empty()) {  // the robot has been told that those from before begin() are settled, so they are kept
     if (auto& before = submitted_.back().before_begin) {
       if (const auto* refusal = std::get_if<storage::RefusalRecord>(&*before))
         ++stats_.refused_before_begin[index_of(refusal->reason)];
@@ -356,7 +356,7 @@ Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) con
   for (const auto* list : {&refused_, &conflicts_})
     for (const Refused& r : *list)
       if (list == &conflicts_ || r.sequence < durable_) ack.refused.push_back(r);
-  // Said though nothing came: of a robot that comes back all may be settled, and then it sends nothing.
+  // Included even if nothing came: a robot that returns may have nothing left to send.
   if (const Status session = judge_session(); !session.ok())
     ack.refused.push_back({kWholeSession, 0, session.reason()});
   if (ack.refused.size() > kMaxAckRefused) ack.refused.erase(ack.refused.begin(), ack.refused.end() - kMaxAckRefused);

@@ -1,5 +1,5 @@
-// What the worker does when no record waits: frames that are pending are relaxed, and sessions that are being deleted
-// leave the map, a chunk at a time. At most one relaxation record and one removal record are submitted and not yet
+// What the worker does when no record waits: it relaxes pending frames, and removes sessions that are being deleted
+// from the map, one chunk at a time. At most one relaxation record and one removal record are submitted and not yet
 // applied.
 #pragma once
 
@@ -24,38 +24,38 @@ class BackgroundWork {
     std::function<Status(storage::JournalRecord, Done)> submit;
     // Whether no record waits for the worker. Records from outside go first.
     std::function<bool()> is_quiet;
-    // A session as the worker sees it.
+    // The session as the worker sees it.
     std::function<std::optional<storage::Session>(SessionNumber)> session;
     // Whether frames of the session still wait for their lookup. Its removal waits for these.
     std::function<bool(SessionNumber)> has_waiting_lookups;
     // False while commits fail or too much is dirty (the edits could not be written out), once the map is read-only,
     // and during shutdown.
     std::function<bool()> may_remove;
-    // Nothing is left of the session. By the worker, without a lock held.
+    // Called by the worker, without a lock held, when nothing is left of the session.
     std::function<void(SessionNumber)> on_gone;
   };
-  // `slice`: counted work of one IdleWorkRecord. Must outlive the journal's writer, whose thread calls back.
+  // `slice` is the counted work of one IdleWorkRecord. Must outlive the journal's writer, whose thread calls back.
   BackgroundWork(std::uint64_t slice, Hooks hooks);
   BackgroundWork(const BackgroundWork&) = delete;
   BackgroundWork& operator=(const BackgroundWork&) = delete;
 
-  // By the thread that opens the map: whether frames wait for relaxation.
+  // For the thread that opens the map: tells whether frames wait for relaxation.
   void resume(bool relaxation_pending);
 
-  // By the worker:
+  // For the worker:
 
-  // Call after each applied record: whether frames wait for relaxation now.
+  // Call after each applied record, with whether frames wait for relaxation now.
   void applied(const storage::JournalRecord& record, bool relaxation_pending);
-  // Deterministic mode: the relaxation that is left goes on after the next record, and done() does not wait for it.
+  // Deterministic mode: the remaining relaxation continues after the next record, and done() does not wait for it.
   void forget_relaxation();
   // Adds the session to those that submit_next() and next_removal() take out chunk by chunk.
   void delete_session(SessionNumber session);
-  // Submits the next piece of each kind, unless one is on its way or a record from outside waits.
+  // Submits the next record of each kind, unless one of that kind is on its way or a record from outside waits.
   void submit_next();
-  // The next chunk to take out; nullopt: none, or not now. Forgets the sessions of which no frame is left.
+  // The next chunk to take out; nullopt if there is none, or it has to wait. Forgets sessions without frames.
   std::optional<storage::RemoveChunkRecord> next_removal();
 
-  // Whether nothing is left. By any thread.
+  // Whether no work is left. Thread-safe.
   bool done() const;
 
  private:
@@ -66,7 +66,7 @@ class BackgroundWork {
 
   mutable std::mutex mutex_;
   bool relaxation_pending_ = false;
-  // A record of the kind is submitted, and neither applied nor refused yet.
+  // A record of that kind is submitted, and neither applied nor refused yet.
   bool relaxation_on_its_way_ = false, removal_on_its_way_ = false;
   std::set<SessionNumber> going_;  // sessions that are being deleted
 };

@@ -46,7 +46,7 @@ class BackgroundWorkTest : public ::testing::Test {
                         .on_gone = [this](SessionNumber number) { gone_.push_back(number); }}};
 };
 
-TEST_F(BackgroundWorkTest, OneSliceOfRelaxationIsOnItsWayAtATime) {
+TEST_F(BackgroundWorkTest, AtMostOneRelaxationRecordIsSubmitted) {
   EXPECT_TRUE(work_.done());
   work_.resume(true);
   EXPECT_FALSE(work_.done());
@@ -74,7 +74,7 @@ TEST_F(BackgroundWorkTest, RecordsFromOutsideGoFirst) {
   EXPECT_EQ(2u, submitted_.size());
 }
 
-TEST_F(BackgroundWorkTest, WhatTheJournalDoesNotTakeIsSubmittedAgain) {
+TEST_F(BackgroundWorkTest, RefusedRecordsAreSubmittedAgain) {
   work_.resume(true);
   queue_takes_ = Status(Reason::BUDGET_EXCEEDED, "the queue is full");
   work_.submit_next();
@@ -86,7 +86,7 @@ TEST_F(BackgroundWorkTest, WhatTheJournalDoesNotTakeIsSubmittedAgain) {
   EXPECT_EQ(2u, submitted<storage::IdleWorkRecord>());
 }
 
-TEST_F(BackgroundWorkTest, SessionsGoOneAfterTheOtherChunkByChunk) {
+TEST_F(BackgroundWorkTest, SessionsAreRemovedInTurnChunkByChunk) {
   add_session(3, 70);
   add_session(5, 10);
   work_.delete_session(5);
@@ -111,7 +111,7 @@ TEST_F(BackgroundWorkTest, SessionsGoOneAfterTheOtherChunkByChunk) {
   EXPECT_TRUE(work_.done());
 }
 
-TEST_F(BackgroundWorkTest, NothingIsTakenOutWhileItMayNotBeOrIsLookedUp) {
+TEST_F(BackgroundWorkTest, RemovalWaitsForPermissionAndForLookups) {
   add_session(3, 10);
   work_.delete_session(3);
   looked_up_ = {3};

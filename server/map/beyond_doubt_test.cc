@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kLap = RiddenDrive::kLap;
 
-// What a frame sees that crosses an old path: strong, and nowhere else. The robot never stood, so nothing was carried.
+// The closure of a frame that crosses an old path: strong, and unique. The robot never stood, so it was not carried.
 storage::ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t i) {
   storage::ClosureProposalRecord proposal = drive.as_driven(i);
   proposal.inliers = 120;
@@ -23,14 +23,14 @@ storage::ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t 
   return proposal;
 }
 
-TEST(BeyondDoubt, ASingleFrameThatCrossesAnOldPathIsJoined) {
+TEST(BeyondDoubt, ALoneClosureWithStrongGeometryIsAccepted) {
   RiddenDrive drive(5, 0);
   const storage::Edge closure = drive.propose(crossing(drive, kLap + 2));
   EXPECT_EQ(closure.state, storage::EdgeState::kAccepted);
   EXPECT_EQ(closure.reason, Reason::BEYOND_DOUBT);
 }
 
-TEST(BeyondDoubt, WhereAnythingIsWantingItAwaitsAnother) {
+TEST(BeyondDoubt, MissingAnyConditionItStaysALoneCandidate) {
   const std::pair<const char*, std::function<void(storage::ClosureProposalRecord&)>> wanting[] = {
       {"inliers", [](auto& p) { p.inliers = 79; }},
       {"spread", [](auto& p) { p.spread = 0.29f; }},
@@ -52,7 +52,7 @@ TEST(BeyondDoubt, WhereAnythingIsWantingItAwaitsAnother) {
   }
 }
 
-TEST(BeyondDoubt, TheOdometryAndOthersInForceStandAboveIt) {
+TEST(BeyondDoubt, StrongGeometryDoesNotOverruleTheOdometry) {
   RiddenDrive drive(8, 0);
   storage::ClosureProposalRecord off = drive.closure(kLap + 2);
   const storage::ClosureProposalRecord strong = crossing(drive, kLap + 2);

@@ -46,7 +46,7 @@ std::vector<CameraDoubt> CameraDoubts::doubts() const {
 
 std::vector<CameraDoubt> CameraDoubts::doubts_locked() const {
   std::set<Sessions> contradictions;
-  std::map<SessionNumber, int> balance;  // of sessions: that it contradicts, less those that it confirms
+  std::map<SessionNumber, int> balance;  // number of sessions that it contradicts, less those that it confirms
   for (const auto& [sessions, pair] : pairs_) {
     const auto [a, b] = sessions;
     const bool contradict = pair.contradicted >= kMinKeyframes && pair.contradicted >= pair.confirmed;

@@ -1,4 +1,4 @@
-// Sessions whose pictures contradict each other's calibration where they show the same places.
+// Finds sessions with a wrong calibration: their pictures contradict those of other sessions that show the same places.
 #pragma once
 
 #include <cstdint>
@@ -15,27 +15,28 @@ namespace relmap::map {
 
 struct CameraDoubt {
   SessionNumber session = 0;
-  std::vector<SessionNumber> against;  // the sessions whose calibration its own contradicts, ascending
-  std::uint64_t contradicted = 0;      // keyframes, its own and theirs
-  std::string message;                 // of the last contradiction: what would fit
+  std::vector<SessionNumber> against;  // sessions whose calibration contradicts that of `session`, ascending
+  std::uint64_t contradicted = 0;      // number of keyframes, of all these sessions, that show a contradiction
+  std::string message;                 // of the last contradiction: which calibration would fit
 };
 
-// Counts since the daemon started. Thread-safe.
+// Counts start anew with the daemon. Thread-safe.
 class CameraDoubts {
  public:
-  // Of two sessions; fewer may be chance.
+  // Contradicting keyframes needed for two sessions to contradict each other; fewer may be chance.
   static constexpr std::uint64_t kMinKeyframes = 3;
 
-  // A keyframe of the one session shows a place of the other, and fits another camera; both may be the same session.
-  // The doubt that this has brought about, if any.
+  // Notes that a keyframe of `session` shows a place of session `with` but fits another calibration. Both may be the
+  // same session. Returns the doubt that this has raised, if any.
   std::optional<CameraDoubt> contradict(SessionNumber session, SessionNumber with, const std::string& message);
-  // A keyframe of the one session recognised a place of another.
+  // Notes that a keyframe of `session` recognised a place of session `with`.
   void confirm(SessionNumber session, SessionNumber with);
   void forget(SessionNumber session);
 
-  // Two sessions contradict each other where kMinKeyframes keyframes say so and no fewer than say the contrary. Which
-  // of the two is wrong is told by the others: named are, one after the other until no contradiction is left, the
-  // session with most contradictions less confirmations; of equal ones the newest. By session.
+  // The doubtful sessions, ascending by number. Two sessions contradict each other if at least kMinKeyframes keyframes
+  // say so, and at least as many as confirm the pair. The other sessions tell which of the two is wrong: the session
+  // with the most contradicted less confirmed sessions (the newest of several) is doubtful; its contradictions are then
+  // set aside, and the next is chosen, until no contradiction is left.
   std::vector<CameraDoubt> doubts() const;
 
  private:

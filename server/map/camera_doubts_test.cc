@@ -34,7 +34,7 @@ TEST(CameraDoubts, ASessionIsInDoubtOnceThreeKeyframesContradictIt) {
   EXPECT_FALSE(doubts.contradict(4, 2, "10 % longer")) << "told once";
 }
 
-TEST(CameraDoubts, OthersTellWhichOfTwoIsWrong) {
+TEST(CameraDoubts, OtherSessionsTellWhichOfTwoIsWrong) {
   CameraDoubts doubts;
   contradict(doubts, 2, 1);
   contradict(doubts, 3, 1);
@@ -54,7 +54,7 @@ TEST(CameraDoubts, TwoWrongOnesAreBothNamed) {
   EXPECT_THAT(named(doubts), ElementsAre(2, 5));
 }
 
-TEST(CameraDoubts, WhatIsConfirmedMoreOftenIsNotInDoubt) {
+TEST(CameraDoubts, SessionsConfirmedMoreOftenThanContradictedAreNotInDoubt) {
   CameraDoubts doubts;
   contradict(doubts, 4, 1);
   confirm(doubts, 4, 1);

@@ -13,10 +13,10 @@ namespace relmap::map {
 namespace {
 
 constexpr std::size_t kMaxTried = 4;  // closures, the nearest first
-constexpr int kDeepest = 2;           // stretches on the way to a closure that measured another
+constexpr int kMaxDepth = 2;          // nested stretches: on the odometry to a closure that measured another stretch
 
-// What closures measured of the stretches that are met, each worked out once for each depth at which it is: rides near
-// each other lie on the ways to one another's closures, and each of those would be followed again and again.
+// Caches the measured stretches by depth of nesting. Rides near each other lie on the odometry to one another's
+// closures, so each would be computed again and again otherwise.
 class Measured {
  public:
   Measured(const storage::Graph& graph, Drift drift) : graph_(graph), drift_(drift) {}
@@ -40,7 +40,7 @@ class Measured {
     if (carriers.size() > kMaxTried) carriers.resize(kMaxTried);
 
     const place::AcrossCarried beyond = [&](const storage::Edge& other) -> std::optional<storage::Edge> {
-      return depth < kDeepest ? across(other, depth + 1) : std::nullopt;
+      return depth < kMaxDepth ? across(other, depth + 1) : std::nullopt;
     };
     for (const storage::Edge& closure : carriers) {
       const FrameId first{closure.carried.session, closure.carried.first};
@@ -64,7 +64,7 @@ class Measured {
 
   const storage::Graph& graph_;
   const Drift drift_;
-  std::map<std::pair<EdgeId, int>, std::optional<storage::Edge>> known_;  // by step of the odometry, and depth
+  std::map<std::pair<EdgeId, int>, std::optional<storage::Edge>> known_;  // by odometry edge and depth
 };
 
 template <typename Change>

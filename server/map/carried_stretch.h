@@ -1,6 +1,6 @@
-// Stretches along which the robot was carried, as closures in force measured them: a lift, a train (Sibley et al., 1
-// and 4.7; docs/method.md, 7). Which they are is said by the closures (Edge::carried); here it is kept with the edges
-// of the robot's own motion, and the way across is worked out.
+// Stretches along which the robot was carried by a lift or a train, as closures in force measured them (Sibley et al.,
+// 1 and 4.7; docs/method.md, 7). A closure names its stretch in Edge::carried. This file enters it with the odometry
+// edges of the stretch (Edge::carried_by) and computes the transform across.
 #pragma once
 
 #include <optional>
@@ -11,14 +11,16 @@
 
 namespace relmap::map {
 
-// The way from the first frame of the stretch in which `step` lies to its last, measured by the nearest of the closures
-// that carry it; not an edge of the map. Nullopt where none of them can be followed.
+// The transform from the first frame of the carried stretch that contains `step` to its last, measured by the nearest
+// of the closures in `step.carried_by`. The result is not an edge of the map. Nullopt if the odometry to none of these
+// closures can be followed.
 std::optional<storage::Edge> measured_stretch(const storage::Graph& graph, const storage::Edge& step, Drift drift);
 
-// Goes across by measured_stretch(); what is met on the way is worked out once, however many ways lead over it.
+// A function that crosses carried stretches by measured_stretch(). It computes each stretch once, however many paths
+// lead over it. The graph must not change while it is in use.
 place::AcrossCarried across_as_measured(const storage::Graph& graph, Drift drift);
 
-// Enters in Edge::carried_by of the stretch that `closure` came into force, or takes it out there.
+// Adds `closure`, which came into force, to Edge::carried_by along its stretch, or takes it out there.
 void enter_carrier(storage::EditableGraph& map, const storage::Edge& closure);
 void take_out_carrier(storage::EditableGraph& map, const storage::Edge& closure);
 

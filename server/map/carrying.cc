@@ -14,35 +14,37 @@ namespace relmap::map {
 
 namespace {
 
-// Views of one facade or shelf are hardly more evidence than one of them: what counts is how far they go on.
-constexpr double kMetresOfALookAlike = 3;  // over which its likeness falls by e
-constexpr double kMaxBetween = 2;          // metres from one view to the next that they vouch for
+// Many views of one facade or shelf are hardly more evidence than one view; what counts is how far they extend.
+constexpr double kMetresOfALookAlike = 3;  // two places that look alike go on doing so with probability 1/e per 3 m
+constexpr double kMaxBetween = 2;          // metres from one view to the next that count at most
 constexpr double kMaxMetres = 15;
-// That a stop was a ride grows with its length: halts of tens of seconds are rarer than those of a few.
-constexpr double kMaxForStanding = 2;
-constexpr double kNeeded = 3.5;  // nats that being carried at all is less likely than that a place looks like another
-constexpr double kPerOpponent = 3;
-constexpr std::uint32_t kMaxOpposed = 2;  // more than outweigh all that can speak for a ride are not looked for
+// A longer stop is more likely to be a ride, since halts of tens of seconds are rarer than those of a few.
+constexpr double kMaxForStanding = 2;     // nats
+constexpr double kNeeded = 3.5;           // nats: prior log-odds of a place that looks alike against a ride
+constexpr double kPerOpponent = 3;        // nats
+constexpr std::uint32_t kMaxOpposed = 2;  // opponents counted at most: these outweigh any evidence for a ride
 static_assert(kPerOpponent * kMaxOpposed > kMaxMetres / kMetresOfALookAlike + kMaxForStanding - kNeeded);
-constexpr double kClearRival = 0.4, kPerRival = 10;             // share of inliers, nats for all of them
-constexpr double kUsualDifference = 0.35, kPerDifference = 12;  // share of the views, nats for all of it
+constexpr double kClearRival = 0.4, kPerRival = 10;             // share of inliers; nats per unit of share above it
+constexpr double kUsualDifference = 0.35, kPerDifference = 12;  // share of the views; nats per unit of share above it
 
-// One step of the robot's own motion in the stretch that is looked at.
+// One odometry edge of the interval.
 struct Step {
   std::uint32_t from, to;
   double stood_s;
-  bool possible;  // no closure in force says yet that the robot was carried along it
+  bool possible;  // no closure in force says that the robot was carried along it
   bool stood;     // for most of its time
 };
 
-// It may speak for the odometry between its ends: it is in force, and does not say itself that the robot was carried.
+// Whether the closure may support the odometry between its ends: it is in force, and does not itself say that the robot
+// was carried.
 bool may_agree(const storage::Edge& edge, SessionNumber session) {
   return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted &&
          edge.carried.session == 0 && edge.a.session == session && edge.b.session == session &&
          edge.verification != storage::Verification::kCompounded && edge.b.index - edge.a.index <= kMotionReach;
 }
 
-// Between the newest place that was seen again and the oldest view of one.
+// The frames between the newest match and the oldest query of a set of closures: a single ride that explains all of
+// them lies there.
 struct Interval {
   SessionNumber session = 0;
   std::uint32_t first = 0, last = std::numeric_limits<std::uint32_t>::max();
@@ -56,24 +58,23 @@ struct Interval {
   }
 };
 
-// Standing still in one go.
+// An uninterrupted time of standing still.
 struct Stand {
   double seconds = 0;
   storage::FrameRange stretch;  // session 0: the robot never stood
 };
 
-// The robot's motion back to the interval's beginning, the newest step first, with the closures that lead over it.
-// Nowhere along it was the robot carried that a closure covers which agrees with the odometry (test_motion()): whether
-// one does is asked only where it matters, and once, since to hold it against the odometry is to go all the way between
-// its ends.
+// The robot's motion back to the interval's beginning, the newest step first, with the closures that lead over it. The
+// robot was not carried along steps covered by a closure that agrees with the odometry (test_motion()). That test walks
+// the whole odometry between the closure's ends, so it is made only where it matters, and once for each closure.
 class Way {
  public:
   // `gone`: closures that do not count.
   Way(const storage::Graph& graph, const Interval& interval, const std::set<EdgeId>& gone = {})
       : graph_(graph), session_(interval.session) {
     double metres = 0;
-    std::uint32_t oldest = interval.first;  // that a closure leads to
-    // Closures of newer queries reach over the interval, too.
+    std::uint32_t oldest = interval.first;  // oldest frame that a closure leads to
+    // Closures of newer queries may lead over the interval too.
     const auto session = graph.session(session_);
     const std::uint32_t last = std::max(interval.newest, session ? session->last : 0);
     for (FrameId at{session_, std::min(last, interval.newest + kMotionReach)}; at.index > oldest;) {
@@ -100,13 +101,12 @@ class Way {
       metres += motion->T_ab.t.norm();
       at = motion->a;
     }
-    // Of those that cover a step the one first that covers most before it: so few of them are held against the
-    // odometry.
+    // Of the closures that cover a step, the one with the oldest match comes first, so that few have to be tested.
     std::stable_sort(closures_.begin(), closures_.end(),
                      [](const Closure& x, const Closure& y) { return x.first < y.first; });
   }
 
-  // From one view to the next, the newest first.
+  // Metres driven along the views, which come newest first.
   double along(const std::vector<std::uint32_t>& views) const {
     double sum = 0;
     for (std::size_t i = 1; i < views.size(); ++i) {
@@ -117,17 +117,17 @@ class Way {
     return std::min(sum, kMaxMetres);
   }
 
-  // For longest, where the robot may have been carried.
+  // The longest stand among the steps along which the robot may have been carried.
   Stand longest_stand() {
-    Stand longest;
+    Stand max_stand;
     for (std::size_t i = 0; i < steps_.size();) {
       double stood = 0;
       std::size_t end = i;
       for (; end < steps_.size() && steps_[end].stood && possible(steps_[end]); ++end) stood += steps_[end].stood_s;
-      if (stood > longest.seconds) longest = {stood, {session_, steps_[end - 1].from, steps_[i].to}};
+      if (stood > max_stand.seconds) max_stand = {stood, {session_, steps_[end - 1].from, steps_[i].to}};
       i = std::max(end, i + 1);
     }
-    return longest;
+    return max_stand;
   }
 
   // The newest step along which the robot may have been carried; session 0: there is none.
@@ -136,11 +136,11 @@ class Way {
     return step == steps_.end() ? storage::FrameRange{} : storage::FrameRange{session_, step->from, step->to};
   }
 
-  // Closures of these queries that agree with the odometry; not counted beyond `most`.
-  std::uint32_t opposed(std::uint32_t from, std::uint32_t to, std::uint32_t most) {
+  // Number of closures of queries from `from` to `to` that agree with the odometry, at most `max_count`.
+  std::uint32_t opposed(std::uint32_t from, std::uint32_t to, std::uint32_t max_count) {
     std::uint32_t count = 0;
     for (Closure& closure : closures_)
-      if (count < most && closure.last >= from && closure.last <= to && agrees(closure)) ++count;
+      if (count < max_count && closure.last >= from && closure.last <= to && agrees(closure)) ++count;
     return count;
   }
 
@@ -148,7 +148,7 @@ class Way {
   struct Closure {
     EdgeId id;
     std::uint32_t first, last;
-    std::optional<bool> agrees;  // with the odometry, once it was asked
+    std::optional<bool> agrees;  // with the odometry; nullopt: not tested yet
   };
 
   bool agrees(Closure& closure) {
@@ -169,9 +169,9 @@ class Way {
   const storage::Graph& graph_;
   const SessionNumber session_;
   std::vector<Step> steps_;                 // of the interval
-  std::vector<Closure> closures_;           // that may agree, by their older ends
-  std::vector<std::uint32_t> unsensed_;     // newer ends of steps that nothing sensed
-  std::map<std::uint32_t, double> metres_;  // back to each frame
+  std::vector<Closure> closures_;           // those that may agree with the odometry, sorted by match
+  std::vector<std::uint32_t> unsensed_;     // newer ends of steps that no sensor measured
+  std::map<std::uint32_t, double> metres_;  // by frame: driven from there to the newest
 };
 
 class Mean {

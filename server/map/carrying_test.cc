@@ -35,7 +35,7 @@ std::uint32_t until_believed(RiddenDrive& drive,
   return 0;
 }
 
-TEST(Carrying, ClosuresThatGoOnSayThatTheRobotWasCarriedWhereItStood) {
+TEST(Carrying, AgreeingClosuresOverSomeMetresMeanThatTheRobotWasCarriedWhereItStood) {
   RiddenDrive drive(kBeyond);
   const std::uint32_t first = kLap + 1;
   EXPECT_EQ(drive.propose(drive.closure(first)).reason, Reason::CONTRADICTS_MOTION)
@@ -56,14 +56,14 @@ TEST(Carrying, ClosuresThatGoOnSayThatTheRobotWasCarriedWhereItStood) {
       << "what the robot said stays";
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 
-  // What the closures measured takes the place of the odometry.
+  // The closures' measurement replaces the odometry.
   const auto ride = measured_stretch(drive.map(), *storage::find_edge(drive.map(), RiddenDrive::ride()), {});
   ASSERT_TRUE(ride);
   EXPECT_EQ(ride->b.index, ride->a.index + 1);
   EXPECT_NEAR(ride->T_ab.t.norm(), 0.2 * (RiddenDrive::kRidden + 1), 0.3);
 }
 
-TEST(Carrying, WithoutASignOfARideTheOdometryHolds) {
+TEST(Carrying, WithoutAStopTheOdometryPrevails) {
   for (const double stood_s : {0.0, 1.0}) {
     RiddenDrive drive(kBeyond, stood_s);
     EXPECT_EQ(until_believed(drive), 0u) << stood_s << " s";
@@ -72,7 +72,7 @@ TEST(Carrying, WithoutASignOfARideTheOdometryHolds) {
   }
 }
 
-TEST(Carrying, PlacesThatAreNotUniqueOrShowSomethingElseAreNotBelieved) {
+TEST(Carrying, PlacesThatAreNotUniqueOrLookDifferentAreNoEvidence) {
   RiddenDrive alike(kBeyond), different(kBeyond), unique(kBeyond);
   EXPECT_EQ(until_believed(alike,
                            [](storage::ClosureProposalRecord& p) {
@@ -94,7 +94,7 @@ TEST(Carrying, PlacesThatAreNotUniqueOrShowSomethingElseAreNotBelieved) {
             0u);
 }
 
-TEST(Carrying, LaterClosuresAreHeldAgainstWhatWasMeasured) {
+TEST(Carrying, LaterClosuresAreTestedAgainstTheMeasuredRide) {
   RiddenDrive drive(kBeyond);
   const std::uint32_t believed = kLap + until_believed(drive);
   ASSERT_GT(believed, kLap);
@@ -119,7 +119,7 @@ void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAcce
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
-TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
+TEST(Carrying, RemovingAndRestoringAClosureRemovesAndRestoresTheRide) {
   RiddenDrive drive(kBeyond), without(kBeyond);
   const std::uint32_t believed = kLap + until_believed(drive);
   ASSERT_GT(believed, kLap);
@@ -137,7 +137,7 @@ TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
   EXPECT_EQ(carriers(drive), before);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 
-  // By itself it takes only its own voice along.
+  // Removed alone, it takes only itself out of the carriers.
   auto without_it = before;
   std::erase(without_it, any);
   decide(drive, any, EdgeAction::kRemoveAlone);
@@ -146,7 +146,7 @@ TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
   EXPECT_EQ(carriers(drive), before);
 }
 
-TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
+TEST(Carrying, MoreClosuresThatAgreeWithTheOdometryOverturnARide) {
   RiddenDrive drive(kBeyond);
   const std::uint32_t believed = kLap + until_believed(drive);
   ASSERT_GT(believed, kLap);
@@ -170,7 +170,7 @@ TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
-TEST(Carrying, WhatAgreesWithTheOdometryOverTheSameWaySpeaksAgainstIt) {
+TEST(Carrying, ClosuresAcrossTheRideThatAgreeWithTheOdometrySpeakAgainstIt) {
   RiddenDrive drive(kBeyond);
   // Recognised from behind the ride in the same places as the odometry has it: it cannot have been carried.
   for (const std::uint32_t i : {kLap + 1, kLap + 3}) drive.propose(drive.as_driven(i));
@@ -200,7 +200,7 @@ std::vector<EdgeId> candidates(RiddenDrive& drive, std::uint32_t from, std::uint
   return ids;
 }
 
-TEST(Carrying, WhatWasNeverHeldAgainstTheOdometrySaysNothingAgainstIt) {
+TEST(Carrying, ClosuresWhoseMotionIsUntestedDoNotSpeakAgainstARide) {
   RiddenDrive drive(kBeyond);
   constexpr std::uint32_t kBlindStep = 6;
   drive.map().edit_hot(RiddenDrive::frame(kBlindStep)).edges.front().source = MotionSource::kUnsensed;
@@ -218,7 +218,7 @@ TEST(Carrying, WhatWasNeverHeldAgainstTheOdometrySaysNothingAgainstIt) {
   EXPECT_FALSE(carriers(drive).empty());
 }
 
-TEST(Carrying, WhatAnOperatorPutIntoForceSpeaksAgainstItAsAnyOtherDoes) {
+TEST(Carrying, ClosuresAcceptedByAnOperatorSpeakAgainstARideToo) {
   RiddenDrive drive(kBeyond);
   const storage::Edge driven = drive.propose(drive.as_driven(kLap + 20));
   ASSERT_EQ(driven.reason, Reason::LONE);
@@ -230,8 +230,8 @@ TEST(Carrying, WhatAnOperatorPutIntoForceSpeaksAgainstItAsAnyOtherDoes) {
   EXPECT_FALSE(evidence.speaks_for_carrying());
 }
 
-// Holding one against the odometry is to go all the way between its ends: it is not done for each.
-TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
+// Testing a closure against the odometry walks the whole path between its ends, so only few are tested.
+TEST(Carrying, OfManyClosuresOverTheSameStepsFewAreTested) {
   RiddenDrive drive(kBeyond);
   std::size_t reads[2] = {};
   for (const std::uint32_t many : {2u, 20u}) {
@@ -245,7 +245,7 @@ TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
   EXPECT_LT(reads[1], 1.5 * static_cast<double>(reads[0]));
 }
 
-TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
+TEST(Carrying, AnOperatorsAcceptanceImpliesARideWithoutAStop) {
   RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
   const std::uint32_t named = kLap + 10;
   const storage::Edge closure = drive.propose(drive.closure(named));
@@ -279,7 +279,7 @@ TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
 }
 
-TEST(Carrying, WhatFollowedAWordGoesWithItThoughItAgreesAmongItself) {
+TEST(Carrying, ClosuresThatDependOnAnAcceptanceGoWithIt) {
   RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
   const std::uint32_t named = kLap + 10;
   const EdgeId word = drive.propose(drive.closure(named)).id;
@@ -301,7 +301,7 @@ TEST(Carrying, WhatFollowedAWordGoesWithItThoughItAgreesAmongItself) {
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
 }
 
-TEST(Carrying, WhatFollowedAWordAndTellsOfARideByItselfStays) {
+TEST(Carrying, ClosuresThatProveARideByThemselvesOutliveTheAcceptance) {
   RiddenDrive drive(kBeyond);
   const EdgeId word = drive.propose(drive.closure(kLap + 1)).id;
   decide(drive, word);
@@ -313,7 +313,7 @@ TEST(Carrying, WhatFollowedAWordAndTellsOfARideByItselfStays) {
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
-TEST(Carrying, AWordThatIsTakenBackLeavesNoRideBehind) {
+TEST(Carrying, AWithdrawnAcceptanceLeavesNoRideBehind) {
   RiddenDrive drive(kBeyond, 0);
   const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
   decide(drive, closure.id);
@@ -326,8 +326,8 @@ TEST(Carrying, AWordThatIsTakenBackLeavesNoRideBehind) {
   EXPECT_EQ(storage::hash_map(drive.map()).structure, before);
 }
 
-// It was carried before the closures agree with the odometry again, and those stay in force.
-TEST(Carrying, AnOperatorsWordIsAboutWhereTheOdometryIsNotVouchedFor) {
+// The ride lies before the frames whose closures agree with the odometry, and these closures stay in force.
+TEST(Carrying, AnAcceptedRideLiesWhereNoClosureAgreesWithTheOdometry) {
   RiddenDrive drive(kBeyond, 0);
   constexpr std::uint32_t kSeen = RiddenDrive::kAlights + 9;
   for (const std::uint32_t i : {1u, 4u, 12u}) drive.propose(driven_from(drive, kLap + i, kSeen + i));
@@ -343,7 +343,7 @@ TEST(Carrying, AnOperatorsWordIsAboutWhereTheOdometryIsNotVouchedFor) {
   EXPECT_EQ(drive.propose(drive.closure(kLap + 13)).reason, Reason::CARRIED);
 }
 
-TEST(Carrying, WhereTheRobotHaltedAnOperatorsWordIsBelievedOfTheHalt) {
+TEST(Carrying, AnAcceptedRideIsPlacedAtTheRobotsStop) {
   RiddenDrive drive(kBeyond, 1);  // too short to say anything by itself
   const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
   decide(drive, closure.id);
@@ -351,7 +351,7 @@ TEST(Carrying, WhereTheRobotHaltedAnOperatorsWordIsBelievedOfTheHalt) {
   EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, alights - 1, alights}));
 }
 
-TEST(Carrying, OthersThatMeanTheRideTellMoreNearlyWhereItWas) {
+TEST(Carrying, CandidatesOfTheSameRideNarrowDownWhereItWas) {
   RiddenDrive drive(kBeyond, 0);
   candidates(drive, kLap + 5, 2);
   const storage::Edge closure = drive.propose(drive.closure(kLap + 10));

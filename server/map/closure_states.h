@@ -1,4 +1,4 @@
-// Changes of closures' states, which everything that judges closures makes by the same steps (docs/method.md, 2 and 7).
+// Changes the states of closures, in the same steps for everything that judges closures (docs/method.md, 2 and 7).
 #pragma once
 
 #include <cstdint>
@@ -16,37 +16,40 @@ struct StateChange {
   EdgeId id;
   storage::EdgeState state;
   Reason reason;
-  storage::FrameRange carried = {};  // along which it says that the robot was carried; session 0: as it was
-  bool forget_carried = false;       // it says so no more
+  storage::FrameRange carried = {};  // new value of Edge::carried; session 0: Edge::carried stays as it is
+  bool forget_carried = false;       // clears Edge::carried
 };
 
-// What brings changes of state about.
+// What causes changes of state.
 struct Cause {
-  std::uint64_t sequence;
-  EdgeId closure;
-  std::string note = {};
+  std::uint64_t sequence;  // of the journal record
+  EdgeId closure;          // the closure that was proposed or edited
+  std::string note = {};   // an operator's
 };
 
-// Into the history: kMaxEvents at most are kept. An operator's words stay with the closure that he named.
+// Adds an event to the edge's history, which keeps at most kMaxEvents. The note goes only to the closure that the
+// operator named.
 void add_event(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause);
 
-// Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
+// Changes the states of closures and everything derived from them: edges of the graph, bindings in force, support.
+// `spacing` as in kLoopEdgeSpacing.
 ClosureChange change_states(storage::EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
                             std::uint32_t spacing);
 
-// Stores with each of them that they agree.
+// Stores with `id` and with each of `agreeing` that the two agree.
 void remember_agreement(storage::EditableGraph& map, EdgeId id, const std::vector<EdgeId>& agreeing);
 
-// Of those that do not agree with `id`, the ones that it cannot stand beside. Where an accepted closure agrees with
-// both they say the same, and one of them coarsely.
+// Those of the `conflicting` closures that cannot be in force together with `id`. If an accepted closure agrees with
+// both, they say the same and one of them is coarse: such a pair is left out.
 std::set<EdgeId> opponents(const storage::Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting,
                            const ConsistencyRules& rules = {});
 
-// Adds accepted closures with which, once the `outvoted` are gone and `winners` (ascending) are in force, none that is
-// accepted agrees: the set that they came in with is broken. Those that an operator decided on stand alone.
+// Adds to `outvoted` the accepted closures that no accepted closure agrees with any more, once the `outvoted` are out
+// of force and the `winners` (ascending) are in force: the set that they were accepted with is broken. Closures that an
+// operator put into force need no other and are not added.
 void add_left_alone(const storage::Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted);
 
-// One of them that an operator decided on; nullopt: none is.
+// One of the closures that an operator put into force; nullopt if there is none.
 std::optional<EdgeId> decided_among(const storage::Graph& graph, const std::set<EdgeId>& closures);
 
 }  // namespace relmap::map

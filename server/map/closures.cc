@@ -24,7 +24,7 @@ namespace relmap::map {
 namespace {
 
 constexpr std::size_t kMaxOfOneRide = 128;  // closures that are weighed together
-constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
+constexpr std::size_t kMaxClaims = 4;       // of a landmark: the first in force counts, the others take over if it goes
 
 void set_state(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
   edge.state = state;
@@ -41,8 +41,8 @@ bool taken_in_before(const storage::Graph& graph, FrameId a, FrameId b) {
   return storage::taken_in(*graph.hot(a)) < storage::taken_in(*graph.hot(b));
 }
 
-// "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
-// store.
+// Stores the claim that the landmark of observation `index` of `frame` is `target`, or, if `target` is invalid, that it
+// is not needed. False if there was nothing to store.
 bool store_claim(storage::EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
   if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
@@ -57,7 +57,8 @@ bool store_claim(storage::EditableGraph& map, FrameId frame, std::size_t index, 
   return true;
 }
 
-// `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
+// Stores that `frame` sees `binding.landmark` at a keypoint without a track, unless it has an observation of it
+// already.
 bool store_observation(storage::EditableGraph& map, FrameId frame, const storage::ProposedBinding& binding,
                        ClosureId closure) {
   const auto warm = map.warm(frame);
@@ -69,7 +70,7 @@ bool store_observation(storage::EditableGraph& map, FrameId frame, const storage
   return true;
 }
 
-// Facts only: whether they are in force is up to the closure's state.
+// Stores bindings as facts. Whether they are in force depends on the closure's state. Returns how many were stored.
 std::size_t store_bindings(storage::EditableGraph& map, FrameId frame, ClosureId closure,
                            const std::vector<storage::ProposedBinding>& bindings) {
   std::size_t stored = 0;
@@ -93,7 +94,7 @@ std::size_t loop_edges_from(const storage::Graph& graph, FrameId frame) {
   }));
 }
 
-// Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
+// Whether an accepted closure becomes an edge of the present graph (docs/method.md, 2).
 bool should_carry(const storage::Graph& graph, const storage::Edge& closure, std::uint32_t spacing) {
   const bool fits = storage::is_metric(closure.verification) && closure.verification != storage::Verification::kPnP;
   return fits && far_apart(graph, closure.a, closure.b, spacing) && loop_edges_from(graph, closure.b) < kMaxLoopEdges;
@@ -141,14 +142,14 @@ ClosureChange change_states(storage::EditableGraph& map, const std::vector<State
                             std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
-  std::set<FrameId> frames;   // whose observations may mean something else, or be reached by another path
-  std::set<FrameId> ends;     // the newer ones of edges that may come or go
-  std::set<EdgeId> to_carry;  // closures whose part in the graph is decided anew, in the order of their ids
-  // Where an edge goes, another closure may begin to carry that did not have to before.
+  std::set<FrameId> frames;   // whose observations may stand for another landmark, or be reached by another path
+  std::set<FrameId> ends;     // the newer ends of edges that may come or go
+  std::set<EdgeId> to_carry;  // closures that may become edges, in the order of their ids
+  // When an edge goes, a closure that only bound may have to become an edge.
   const bool withdrawing = std::any_of(changes.begin(), changes.end(), [](const StateChange& change) {
     return change.state != storage::EdgeState::kAccepted;
   });
-  // In force for another reason than before: nothing follows.
+  // Only the reason changes, not the state: nothing else follows.
   const auto stays = [](const storage::Edge& edge, const StateChange& change) {
     return edge.state == storage::EdgeState::kAccepted && change.state == storage::EdgeState::kAccepted;
   };
@@ -280,31 +281,31 @@ std::optional<EdgeId> decided_among(const storage::Graph& graph, const std::set<
 
 namespace {
 
-// Size of the largest set of accepted closures that one of these stands in.
+// Size of the largest consistent set of accepted closures that contains one of these.
 std::size_t strength(const storage::Graph& graph, const std::set<EdgeId>& closures) {
-  std::size_t largest = 0;
+  std::size_t max_size = 0;
   for (const EdgeId id : closures) {
     const auto edge = storage::find_edge(graph, id);
     std::vector<EdgeId> accepted = edge->consistent_with;
     std::erase_if(accepted, [&](EdgeId other) {
       return storage::find_edge(graph, other)->state != storage::EdgeState::kAccepted;
     });
-    largest = std::max(largest, largest_consistent_set(graph, id, accepted).size());
+    max_size = std::max(max_size, largest_consistent_set(graph, id, accepted).size());
   }
-  return largest;
+  return max_size;
 }
 
-// A closure comes into force with others that agree with it. If that is so only because the robot was carried, it
-// vouches for that from now on.
+// The change that accepts a closure with others that agree with it. If it agrees with the robot's motion only because
+// the robot was carried, the closure itself says so from now on.
 StateChange accepted_with_others(const storage::Graph& graph, EdgeId id, const ConsistencyRules& rules) {
   const MotionTest motion = test_motion(graph, *storage::find_edge(graph, id), rules);
-  const bool carried = motion.verdict == MotionVerdict::kAsMeasured;  // of several stretches for the newest
+  const bool carried = motion.verdict == MotionVerdict::kAsMeasured;  // of several stretches it names the newest
   return {id, storage::EdgeState::kAccepted, carried ? Reason::CARRIED : Reason::CONSISTENT,
           carried ? motion.carried.front() : storage::FrameRange{}};
 }
 
-// Closures that contradict the odometry as `id` does and agree with it, or with one that does, and so on, of queries
-// near by: ascending, with `id`. All of them mean the same ride.
+// The closures that stand for the same ride as `id`, with `id`, ascending: those of queries near by that contradict the
+// odometry and agree with `id`, directly or through others of the set.
 std::vector<EdgeId> of_one_ride(const storage::Graph& graph, EdgeId id, std::uint32_t reach) {
   std::vector<EdgeId> found{id};
   std::set<EdgeId> seen{id};
@@ -315,7 +316,7 @@ std::vector<EdgeId> of_one_ride(const storage::Graph& graph, EdgeId id, std::uin
           std::max(other.frame.index, id.frame.index) - std::min(other.frame.index, id.frame.index);
       if (other.frame.session != id.frame.session || apart > reach || !seen.insert(other).second) continue;
       const auto closure = storage::find_edge(graph, other);
-      // Those in force vouch for a ride that it does not agree with.
+      // Those in force stand for another ride, with which `id` does not agree.
       if (contradicts_odometry(*closure) && closure->state != storage::EdgeState::kRemoved &&
           closure->state != storage::EdgeState::kAccepted && closure->a.session == id.frame.session)
         found.push_back(other);
@@ -407,7 +408,7 @@ bool is_going(const storage::Graph& graph, FrameId frame) {
 
 namespace {
 
-// One proposal on its way: stored as a candidate, then weighed.
+// Judges one proposal: stores it as a candidate, then weighs it against the closures near by.
 class Judgement {
  public:
   Judgement(storage::EditableGraph& map, std::uint64_t sequence, const storage::ClosureProposalRecord& proposal,
@@ -419,11 +420,11 @@ class Judgement {
       return stays_candidate(Reason::AMBIGUOUS_PLACE, id_);
     if (rules_.motion) motion_ = test_motion(map_, edge(), rules_);
     const bool contradicts = motion_.verdict == MotionVerdict::kContradicts;
-    // So that those count which contradict the odometry like it.
+    // With this reason test_consistency() compares it with closures that contradict the odometry as well.
     if (contradicts) map_.edit_hot(id_.frame).edge(id_)->reason = Reason::CONTRADICTS_MOTION;
     near_ = test_consistency(map_, edge(), rules_);
     remember_agreement(map_, id_, near_.agreeing);
-    // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
+    // Otherwise a wrong place that an operator has taken out would be back with the robot's next two keyframes.
     if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
     return contradicts ? judge_ride() : judge_with_odometry();
   }
@@ -436,7 +437,7 @@ class Judgement {
     return {};
   }
 
-  // Those that `winners` cannot stand beside, with those that are left alone without them.
+  // `against`, and the opponents of the other winners that are not accepted yet; without the winners themselves.
   std::set<EdgeId> outvoted_by(const std::vector<EdgeId>& winners, std::set<EdgeId> against) const {
     for (const EdgeId member : winners)
       if (member != id_ && !is_accepted(map_, member))
@@ -446,7 +447,7 @@ class Judgement {
     return against;
   }
 
-  // What comes into force, and what goes for it.
+  // Puts `accepted` into force and quarantines the outvoted closures and those that are taken back.
   ClosureChange change(std::vector<StateChange> accepted, const std::vector<EdgeId>& winners,
                        std::set<EdgeId> outvoted) {
     outvoted.insert(taken_back_.begin(), taken_back_.end());
@@ -459,7 +460,7 @@ class Judgement {
     return change_states(map_, changes, cause_, spacing_);
   }
 
-  // It contradicts the odometry: was the robot carried?
+  // Judges a proposal that contradicts the odometry: either the robot was carried, or it is refused.
   ClosureChange judge_ride() {
     const auto refused = [&] { return stays_candidate(Reason::CONTRADICTS_MOTION, id_); };
     if (!rules_.rides || near_.agreeing.empty()) return refused();
@@ -483,8 +484,9 @@ class Judgement {
 
   bool looks_alike(EdgeId closure) const { return storage::find_edge(map_, closure)->reason == Reason::LOOKS_ALIKE; }
 
-  // Behind a stop: is it the place that it looks like, by all that say so of these two stretches? Else it is refused,
-  // and those in force with it.
+  // Judges a proposal behind a stop with all closures between the same two stretches: it may be another place that
+  // looks alike. If so, refuses the proposal and takes back those of the closures that are in force. Nullopt: not
+  // refused.
   std::optional<ClosureChange> refuse_look_alike() {
     if (motion_.verdict != MotionVerdict::kAgrees) return std::nullopt;
     look_alikes_ = weigh_look_alikes(map_, edge());
@@ -505,8 +507,9 @@ class Judgement {
     return std::nullopt;
   }
 
-  // Those that were refused with this stretch come into force with the first that is believed; with those of other
-  // stretches nothing agrees, whatever it measures.
+  // Adds to `set` the closures of this stretch that were refused as look-alikes and agree with a member: they come into
+  // force with the first that is accepted. Refused closures of this stretch that agree with no member become lone
+  // candidates. Refused closures of other stretches count for nothing.
   void add_refused_before(std::vector<EdgeId>& set) {
     const std::vector<EdgeId>& place = look_alikes_.place.closures;
     for (std::size_t i = 0; i < set.size(); ++i) {
@@ -517,7 +520,7 @@ class Judgement {
           set.push_back(other);
     }
     std::sort(set.begin(), set.end());
-    for (const EdgeId other : place)  // it is the same place, though nothing agrees with them
+    for (const EdgeId other : place)
       if (looks_alike(other) && !std::binary_search(set.begin(), set.end(), other))
         set_state(*map_.edit_hot(other.frame).edge(other), storage::find_edge(map_, other)->state, Reason::LONE,
                   cause_);
@@ -532,12 +535,12 @@ class Judgement {
              (looks_alike(other) && !std::binary_search(place.begin(), place.end(), other));
     });
     std::set<EdgeId> against = opponents(map_, id_, near_.conflicting, rules_);
-    // What says that the robot was carried has it wrong, or this has.
+    // Either the closures that say that the robot was carried are wrong, or this one is.
     if (motion_.verdict == MotionVerdict::kDenies) {
       against.insert(motion_.carriers.begin(), motion_.carriers.end());
       std::erase_if(near_.agreeing, [&](EdgeId other) { return against.contains(other); });
     }
-    // With those that were outvoted before, if that overturns the vote; else without them.
+    // Votes first together with quarantined closures that agree, and, if that set does not win, without them.
     std::vector<std::vector<EdgeId>> partners{near_.agreeing, near_.agreeing};
     if (std::erase_if(partners.back(), [&](EdgeId other) {
           return storage::find_edge(map_, other)->state == storage::EdgeState::kQuarantined;
@@ -546,7 +549,7 @@ class Judgement {
     for (const std::vector<EdgeId>& agreeing : partners) {
       std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
       const std::set<EdgeId> outvoted = outvoted_by(set, against);
-      // Where as many say the one as the other nobody was carried: that asks for less.
+      // A tie is decided against a ride, because that is the simpler explanation.
       const std::size_t votes = set.size() + (motion_.verdict == MotionVerdict::kDenies ? 1 : 0);
       if (set.size() < 2 || strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) continue;
       add_refused_before(set);
@@ -574,7 +577,7 @@ class Judgement {
   MotionTest motion_;
   Neighbourhood near_;
   LookAlikes look_alikes_;
-  std::set<EdgeId> taken_back_;  // in force, and of a place that looks alike
+  std::set<EdgeId> taken_back_;  // in force so far, but of a place that looks alike
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The life of a loop closure in the map: proposed, weighed against its neighbours, accepted, bound, taken out
-// (docs/method.md, 2 and 7). Every function is a pure function of the map and its arguments.
+// The life of a loop closure in the map: it is proposed, weighed against its neighbours, accepted, binds landmarks, and
+// may be taken out (docs/method.md, 2 and 7). Every function is a pure function of the map and its arguments.
 #pragma once
 
 #include <functional>
@@ -12,58 +12,59 @@
 
 namespace relmap::map {
 
-// The path between the ends of a new loop edge must have more edges than this; a closure between nearer frames only
-// binds. Measured: docs/rba.md, Which closures become edges.
+// A closure becomes an edge of the graph only if the path between its ends has more edges than this; otherwise it only
+// binds landmarks. Measured in docs/rba.md, Which closures become edges.
 inline constexpr std::uint32_t kLoopEdgeSpacing = 16;
-inline constexpr std::uint32_t kMaxLoopEdges = 8;  // from a frame to older ones, accepted and carrying
+inline constexpr std::uint32_t kMaxLoopEdges = 8;  // edges of the graph from one frame to older ones by closures
 
-// What changed, and where relaxation has to start.
+// What a record changed, and where relaxation has to start.
 struct ClosureChange {
-  std::vector<FrameId> seeds;        // both ends of every closure that came into force or went
+  std::vector<FrameId> seeds;        // both ends of every closure that came into force or went out of force
   std::vector<EdgeId> accepted;      // came into force now
-  std::vector<EdgeId> withdrawn;     // quarantined or removed now, some of them not in force before
-  std::vector<EdgeId> out_of_force;  // those that were
-  std::vector<EdgeId> lone;          // stored now, and await confirmation
-  std::vector<storage::Edge> gone;   // were in force, and went with a session (state: removed)
+  std::vector<EdgeId> withdrawn;     // quarantined, removed or made candidates now, whether in force before or not
+  std::vector<EdgeId> out_of_force;  // those of `withdrawn` that were in force
+  std::vector<EdgeId> lone;          // stored now, and await confirmation by another closure
+  std::vector<storage::Edge> gone;   // were in force, and were deleted with a session (state: removed)
 };
 
-// `sequence` is the record's in the journal, and goes into the history of every closure whose state it changes.
-//
-// Stores the proposal as a candidate with its bindings; accepts it, and candidates that it confirms, if they form a
-// consistent set of at least two, none of which agrees with one that an operator has taken out near by. A proposal that
-// is already stored changes nothing.
+// Stores the proposal as a candidate with its bindings. Accepts it, together with candidates that it confirms, if they
+// form a consistent set of at least two, or if it is beyond doubt alone (beyond_doubt.h). A proposal that agrees with a
+// closure near by that an operator has taken out stays a candidate. A proposal that is already stored changes nothing.
+// `sequence` is that of the journal record; it goes into the history of every closure whose state changes.
 ClosureChange apply_proposal(storage::EditableGraph& map, std::uint64_t sequence,
                              const storage::ClosureProposalRecord& proposal,
                              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing, const ConsistencyRules& rules = {});
 
-// Adds bindings of an accepted closure in one more frame.
+// Adds bindings of an accepted closure in one more frame. Changes nothing if the closure is not accepted.
 ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record);
 
-// Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
-// others hold as `holds` tells. `known`: landmarks looked at before.
+// Adds to `frames` all frames with an observation that stands for another landmark, comes into force or goes out of
+// force, by bindings of `closure`, when closures are in force as `holds` says. `known` holds the landmarks examined so
+// far.
 void add_bound(const storage::Graph& graph, const storage::Edge& closure, const std::function<bool(ClosureId)>& holds,
                std::set<LandmarkId>& known, std::set<FrameId>& frames);
 
-// Accepted closures that could take over as edges when some that end in `newer_ends` go: those with an end above.
+// Accepted closures that are not edges of the graph but could become edges when edges that end in `newer_ends` go:
+// those with an end in frames_above(newer_ends).
 std::vector<EdgeId> stand_ins(const storage::Graph& graph, const std::vector<FrameId>& newer_ends);
 
-// Makes edges of the graph of those of these closures that are accepted and join what is far apart (docs/method.md, 2),
-// and appends their ends to `seeds`. Support is the caller's affair (change_support()).
+// Makes edges of the graph of those closures that are accepted and whose ends are far apart (docs/method.md, 2), and
+// appends their ends to `seeds`. The caller updates support (change_support()).
 void carry_where_needed(storage::EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
                         std::vector<FrameId>* seeds);
 
-// It is in force by an operator's word: no other closure outvotes it, and it needs none that agrees.
+// Whether an operator put the closure into force. No other closure outvotes it, and it needs none that agrees.
 inline bool is_decided(const storage::Edge& edge) {
   return edge.state == storage::EdgeState::kAccepted && edge.reason == Reason::ACCEPTED_BY_OPERATOR;
 }
 
-// How many closures of a state there are.
+// The number of closures in a state.
 std::uint64_t& closure_counter(storage::MapState& state, storage::EdgeState of);
 
-// Whether no path leads from one frame to the other with so few edges that a closure between them would only bind.
+// Whether no path of at most `spacing` edges joins the two frames, so that a closure between them becomes an edge.
 bool far_apart(const storage::Graph& graph, FrameId a, FrameId b, std::uint32_t spacing);
 
-// Whether the session of a frame is being deleted: it takes part in nothing new.
+// Whether the frame's session is being deleted. Such a frame takes part in nothing new.
 bool is_going(const storage::Graph& graph, FrameId frame);
 
 }  // namespace relmap::map

@@ -13,7 +13,7 @@ namespace {
 
 using Closures = TwoLaps;
 
-TEST_F(Closures, TwoThatAgreeComeIntoForce) {
+TEST_F(Closures, TwoThatAgreeAreAccepted) {
   propose(62);
   EXPECT_EQ(closure(62).reason, Reason::LONE);
   propose(64);
@@ -36,7 +36,7 @@ storage::ClosureProposalRecord with_less(storage::ClosureProposalRecord proposal
   return proposal;
 }
 
-TEST_F(Closures, LandmarksThatAreNotNeededComeBackWithoutTheClosureThatSaidSo) {
+TEST_F(Closures, UnneededLandmarksReturnWhenTheirClosureIsRemoved) {
   const std::size_t before = in_force(drive_.map());
   for (const std::uint32_t query : {62, 64}) drive_.apply(with_less(*true_closure(drive_.map(), world_, query, kLap)));
   EXPECT_EQ(state(64), storage::EdgeState::kAccepted);
@@ -57,7 +57,7 @@ TEST_F(Closures, LandmarksThatAreNotNeededComeBackWithoutTheClosureThatSaidSo) {
   expect_derived_facts_hold();
 }
 
-TEST_F(Closures, WhatIsRestoredIsWhatItWasAndNoMore) {
+TEST_F(Closures, ARestoredClosureReturnsToItsFormerState) {
   propose(62);
   const EdgeId lone = closure(62).id;
   drive_.apply(storage::SetEdgeStateRecord{lone, storage::EdgeState::kRemoved, "not sure"});
@@ -70,7 +70,7 @@ TEST_F(Closures, WhatIsRestoredIsWhatItWasAndNoMore) {
   expect_derived_facts_hold();
 }
 
-TEST_F(Closures, WhatAgreesWithOneThatAnOperatorTookOutStaysACandidateUntilItIsBack) {
+TEST_F(Closures, ProposalsThatAgreeWithARemovedClosureStayCandidatesUntilItIsRestored) {
   for (const std::uint32_t query : {62, 64}) propose_wrongly(query);
   EXPECT_EQ(state(64), storage::EdgeState::kAccepted);
   drive_.apply(storage::SetEdgeStateRecord{closure(62).id, storage::EdgeState::kRemoved, "that is the other hall"});
@@ -88,7 +88,7 @@ TEST_F(Closures, WhatAgreesWithOneThatAnOperatorTookOutStaysACandidateUntilItIsB
   expect_derived_facts_hold();
 }
 
-TEST_F(Closures, ABindingMayMeasureInThePictureAndSayWhatIsNotNeeded) {
+TEST_F(Closures, ABindingMayBeAlignedInThePictureOrMarkALandmarkAsUnneeded) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   const FrameId frame{kDriveSession, 66};
   const auto seen = drive_.map().warm(frame)->observations;
@@ -113,7 +113,7 @@ TEST_F(Closures, ABindingMayMeasureInThePictureAndSayWhatIsNotNeeded) {
   expect_derived_facts_hold();
 }
 
-TEST(ClosuresOnTheWay, ATrackThatIsNotNeededGoesOnWithoutBeginningAnew) {
+TEST(ClosuresOnTheWay, AnUnneededTrackIsContinued) {
   const sim::PointsWorld world(two_laps());
   PointsDrive drive;
   drive.apply(session_record(world));
@@ -137,7 +137,7 @@ TEST(ClosuresOnTheWay, ATrackThatIsNotNeededGoesOnWithoutBeginningAnew) {
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
-TEST_F(Closures, OneThatAnAcceptedSetContradictsStaysACandidate) {
+TEST_F(Closures, AClosureThatContradictsAnAcceptedSetStaysACandidate) {
   for (const std::uint32_t query : {62, 64, 66}) propose(query);
   propose_wrongly(68);
   EXPECT_EQ(state(68), storage::EdgeState::kCandidate);
@@ -161,7 +161,7 @@ TEST_F(Closures, AWrongSetIsQuarantinedOnceALargerOneContradictsIt) {
   expect_derived_facts_hold();
 }
 
-TEST_F(Closures, AQuarantinedSetComesBackWithEnoughNewEvidence) {
+TEST_F(Closures, AQuarantinedSetIsAcceptedAgainWithEnoughNewEvidence) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   for (const std::uint32_t query : {66, 68, 70}) propose_wrongly(query);
   EXPECT_EQ(state(62), storage::EdgeState::kQuarantined);

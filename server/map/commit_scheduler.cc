@@ -91,7 +91,7 @@ void CommitScheduler::begin() {
   }
   budget_->set(storage::Share::kEngine, engine_->memory_bytes());
   if (begun.ok()) return;
-  finish();  // the one before, if it is not that which failed
+  finish();  // the previous commit, unless it was the one that failed
   {
     const std::lock_guard lock(mutex_);
     under_way_ = false;

@@ -1,7 +1,7 @@
-// When the map is committed: after an interval, when much is dirty, when somebody asks for it, and at the end.
+// Decides when the map is committed: after an interval, when much is dirty, when somebody asks for it, and at the end.
 //
-// The worker encodes what is dirty and goes on while the disk writes it; it waits only if the commit before is not
-// through yet.
+// The worker encodes what is dirty and goes on while the disk writes it. It waits only if the previous commit is still
+// being written.
 #pragma once
 
 #include <atomic>
@@ -40,25 +40,25 @@ class CommitScheduler {
 
   // Thread-safe:
 
-  // Asks the worker for a commit. The ticket is done when a commit of all that was applied before has succeeded or
-  // failed (on_outcome was told which), or, after close(), without one.
+  // Asks the worker for a commit and returns a ticket. The ticket is done once a commit of everything applied before
+  // has succeeded or failed (on_outcome was told which), or, after close(), without a commit.
   std::uint64_t ask();
   bool done(std::uint64_t ticket) const;
   // Whether the worker should call run() now: somebody asked for a commit, or a written one waits to be finished.
   bool wants_worker() const;
-  // Commits nothing from now on: a record could not be applied, and half of it may be in the map.
+  // Ends committing. Call when a record could not be applied: half of it may be in the map.
   void close() { closed_ = true; }
 
-  // By the thread that opens the map, before there is a worker:
+  // For the thread that opens the map, before there is a worker:
   void open(storage::Map& map) { map_ = &map; }
 
-  // By the worker:
+  // For the worker:
   Clock::time_point next_due() const { return last_ + interval_; }
   // Finishes a written commit; then commits if somebody asked for it, or begins a commit if one is due.
   void run();
   // Begins a commit if one is due.
   void begin_if_due();
-  // Commits all that is applied, before it returns.
+  // Commits everything applied and waits until it is written.
   void commit();
   bool failing() const { return failing_; }  // the last commit could not be written
 

@@ -40,7 +40,7 @@ class CommitSchedulerTest : public ::testing::Test {
   std::unique_ptr<storage::Map> map_;
 };
 
-TEST_F(CommitSchedulerTest, WhoAsksIsToldWhenAllIsCommitted) {
+TEST_F(CommitSchedulerTest, ATicketIsDoneOnceEverythingIsCommitted) {
   edit();
   EXPECT_FALSE(commits_.wants_worker());
   const std::uint64_t ticket = commits_.ask();
@@ -63,7 +63,7 @@ TEST_F(CommitSchedulerTest, NothingIsDueBeforeTheIntervalUnlessMuchIsDirty) {
   EXPECT_GT(commits_.next_due(), CommitScheduler::Clock::now() + 30min);
 }
 
-TEST_F(CommitSchedulerTest, AFailedCommitIsSaidAndMadeUpFor) {
+TEST_F(CommitSchedulerTest, AFailedCommitIsReportedAndRepeated) {
   edit();
   faults_->commits = 1;
   commits_.commit();
@@ -77,7 +77,7 @@ TEST_F(CommitSchedulerTest, AFailedCommitIsSaidAndMadeUpFor) {
   EXPECT_FALSE(commits_.failing());
 }
 
-TEST_F(CommitSchedulerTest, AClosedOneCommitsNothingAndStillAnswers) {
+TEST_F(CommitSchedulerTest, AClosedSchedulerCommitsNothingButCompletesTickets) {
   edit();
   commits_.close();
   const std::uint64_t ticket = commits_.ask();

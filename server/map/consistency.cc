@@ -22,9 +22,9 @@ bool returns_home(const Uncertain& loop, const ConsistencyRules& rules) {
   return std::isfinite(chi2) && chi2 <= kChi2With6At99;
 }
 
-bool moved(const SE3& T, double least) { return T.t.norm() >= least || rotation_angle(T.R) >= least; }
+bool moved(const SE3& T, double min_change) { return T.t.norm() >= min_change || rotation_angle(T.R) >= min_change; }
 
-// Extends `set` by members of `open` (all of which agree with everyone in `set`) as far as it goes.
+// Searches the largest clique that extends `set` by members of `open`, each of which agrees with all of `set`.
 void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t>& set,
             const std::vector<std::size_t>& open, std::vector<std::size_t>& best) {
   if (set.size() > best.size()) best = set;
@@ -58,7 +58,7 @@ MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure
     carriers.insert(step.carried_by.begin(), step.carried_by.end());
     return stretch;
   });
-  // Each step by what the odometry itself says.
+  // Every step as the odometry measured it.
   const auto as_sensed = !met_carried
                              ? as_measured
                              : place::back_along_odometry(graph, closure.b, closure.a, [](const storage::Edge& step) {
@@ -70,7 +70,7 @@ MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure
     return match && returns_home(T_match_query * Uncertain(*match, drift), rules);
   };
   if (!as_measured) {
-    // It ends where the robot was carried, or nothing is measured across that: the odometry alone may refuse it.
+    // The way across a carried stretch is not measured, or an end lies within one: only the odometry can refuse it.
     if (as_sensed && !agrees(as_sensed)) test.verdict = MotionVerdict::kContradicts;
     return test;
   }
@@ -96,7 +96,7 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
   std::stable_sort(queries.begin(), queries.end(), [](const auto& a, const auto& b) { return a.way < b.way; });
 
   const bool contradicts = contradicts_odometry(closure);
-  // What says otherwise than the odometry does not count for what agrees with it, and the other way round.
+  // Closures that contradict the odometry are no witnesses for those that agree with it, and the other way round.
   const auto is_witness = [&](const storage::Edge& other) {
     if (other.state == storage::EdgeState::kRemoved) return true;
     if (contradicts) return contradicts_odometry(other);
@@ -112,9 +112,9 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
     const Uncertain T_query_other(query, drift);
     const auto hot = graph.hot(query.frame);
     for (const storage::Edge& other : hot->edges) {
-      // A bridge over a session that was deleted may lead through motion that nothing sensed, and is no evidence.
+      // A bridge over a deleted session is no evidence: it may lead through motion that nothing sensed.
       if (other.kind != storage::EdgeKind::kLoop || other.verification == storage::Verification::kCompounded) continue;
-      if (other.reason == Reason::REMOVED_ALONE) continue;  // of what agrees with it the operator said nothing
+      if (other.reason == Reason::REMOVED_ALONE) continue;  // the operator said nothing about closures that agree
       const bool witness = is_witness(other), removed = other.state == storage::EdgeState::kRemoved;
       if (!witness && other.state != storage::EdgeState::kAccepted) continue;
       const auto T_match_other = matches.find(other.a);
@@ -139,7 +139,7 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
 
 std::vector<EdgeId> largest_consistent_set(const storage::Graph& graph, EdgeId closure,
                                            const std::vector<EdgeId>& agreeing) {
-  // A clique among the nearest: enough to decide, and bounded.
+  // A clique among the newest is enough to decide, and bounds the search.
   constexpr std::size_t kMaxMembers = 16;
   std::vector<EdgeId> members = agreeing;
   if (members.size() > kMaxMembers) members.erase(members.begin(), members.end() - kMaxMembers);

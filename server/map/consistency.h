@@ -1,6 +1,6 @@
-// Pairwise consistency of loop closures (docs/method.md, 7): two closures of neighbouring frames agree if going round
-// query -> match -> match' -> query' -> query comes back to where it began, within the covariance of the way. And one
-// closure with the robot's own motion: going query -> match -> query does.
+// Pairwise consistency of loop closures (docs/method.md, 7). Two closures of neighbouring frames agree if the loop
+// query -> match -> match' -> query' -> query is the identity within its covariance. A closure agrees with the robot's
+// own motion if the loop query -> match -> query along the odometry is.
 #pragma once
 
 #include <cstdint>
@@ -11,61 +11,67 @@
 
 namespace relmap::map {
 
-inline constexpr std::size_t kMaxTested = 24;        // closures, of the nearest queries
-inline constexpr std::uint32_t kMotionReach = 1000;  // keyframes between a closure's ends
+inline constexpr std::size_t kMaxTested = 24;  // closures that one is tested against, of the nearest queries
+inline constexpr std::uint32_t kMotionReach =
+    1000;  // closures whose ends are further apart, in keyframes, are untested
 
-// Which rules hold, and what they go by. Only the defaults are for maps that are kept; others show what each is worth
-// (`relmap-bench closures`, docs/decisions/closures.md).
+// The rules and thresholds of consistency. Maps that are kept use the defaults; other values are for measuring what
+// each rule is worth (`relmap-bench closures`, docs/decisions/closures.md).
 struct ConsistencyRules {
-  std::uint32_t reach = 100;     // odometry edges between the two queries, and the two matches
-  double moved = 0.1;            // metres or radians that two witnesses lie apart at least
-  double drift_share = 0.01;     // what odometry has wrong all the way alike: standard deviation over its length,
-  double drift_radians = 3e-4;   // and a metre
-  double floor_metres = 0.01;    // what no covariance knows of: calibration, rounding, keyframes not quite where their
-  double floor_radians = 0.002;  // pictures are
-  bool motion = true;            // the odometry between its ends may refuse a closure
-  bool coarse = true;            // two that an accepted one agrees with do not stand against each other
-  bool rides = true;             // a set that contradicts the odometry may mean that the robot was carried
-  bool alone = true;             // one that is beyond doubt needs no other
-  bool look_alikes = true;       // what is not as it was, all along a stretch behind a stop, is another place
+  std::uint32_t reach = 100;    // odometry edges between the two queries, and between the two matches, at most
+  double moved = 0.1;           // two witnesses are at least so many metres or radians apart
+  double drift_share = 0.01;    // systematic error of odometry: standard deviation of position over the distance,
+  double drift_radians = 3e-4;  // and of rotation, per metre
+  // Standard deviations of errors that no covariance includes: calibration, rounding, and the distance between
+  // keyframes and their pictures.
+  double floor_metres = 0.01;
+  double floor_radians = 0.002;
+  bool motion = true;       // the odometry between its ends may refuse a closure
+  bool coarse = true;       // two closures that agree with the same accepted one do not oppose each other
+  bool rides = true;        // a set that contradicts the odometry may mean that the robot was carried
+  bool alone = true;        // a closure beyond doubt needs no other
+  bool look_alikes = true;  // a stretch behind a stop that differs all along from what was seen is another place
 };
 
-// What the robot's own motion says of a closure of its own past.
+// The verdict of the robot's own motion on a closure with its session's own past.
 enum class MotionVerdict : std::uint8_t {
-  kUntested,     // another session's, too far back, or through motion that nothing sensed
-  kAgrees,       // with the odometry
-  kAsMeasured,   // with the odometry and, where the robot was carried, what closures in force measured there
-  kContradicts,  // neither
-  kDenies,       // with the odometry alone, and not with what closures in force say: that it was carried
+  kUntested,     // the ends are of two sessions, too far apart, or there is motion between them that nothing sensed
+  kAgrees,       // agrees with the odometry
+  kAsMeasured,   // agrees only with the odometry corrected by what closures in force measured where the robot was
+                 // carried
+  kContradicts,  // agrees with neither
+  kDenies,       // agrees with the odometry alone: it denies what closures in force say, that the robot was carried
 };
 struct MotionTest {
   MotionVerdict verdict = MotionVerdict::kUntested;
-  std::vector<storage::FrameRange> carried;  // stretches between its ends, the newest first
-  std::vector<EdgeId> carriers;              // ascending: the closures that say so
+  std::vector<storage::FrameRange> carried;  // carried stretches between the closure's ends, the newest first
+  std::vector<EdgeId> carriers;              // the closures that say so, ascending
 };
 MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure, const ConsistencyRules& rules = {});
 
-// Whether `closure`, as its verdict was, stands for the robot having been carried.
+// Whether `closure` stands for the robot having been carried, by the verdict stored with it.
 inline bool contradicts_odometry(const storage::Edge& closure) {
   return closure.reason == Reason::CONTRADICTS_MOTION || closure.carried.session != 0;
 }
 
 struct Neighbourhood {
-  std::vector<EdgeId> agreeing;     // ascending
+  // Ascending:
+  std::vector<EdgeId> agreeing;     // closures that agree and are not removed
   std::vector<EdgeId> conflicting;  // accepted closures that were tested and do not agree
-  std::vector<EdgeId> taken_out;    // closures that agree, and that an operator has removed with all that agree
+  std::vector<EdgeId> taken_out;    // closures that agree and that an operator has removed with their set
 };
 
-// Tests `closure` (an edge of kind loop, whether stored or not) against the closures of nearby query frames. One that
-// contradicts the odometry agrees with others that do (contradicts_odometry()), any other with those that the odometry
-// does not contradict. Chains through unsensed motion are not tested, and across a carried stretch they are as closures
-// in force measured it; nor are queries between which the robot moved less than `moved`: one picture, twice, is one
-// witness.
+// Tests `closure` (an edge of kind loop, stored or not) against the closures of nearby query frames. A closure that
+// contradicts the odometry (contradicts_odometry()) can agree only with others that do; any other closure only with
+// those that the odometry does not contradict, or that are in force although it does. Loops follow carried stretches as
+// closures in force measured them, and are not tested if they lead through motion that nothing sensed. Queries between
+// which the robot moved less than `moved` are skipped: two pictures from one spot are one witness.
 Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge& closure,
                                const ConsistencyRules& rules = {});
 
-// The largest set that holds `closure` and in which all agree pairwise; of equally large ones the first by edge id.
-// `agreeing` are those that agree with it; whether two of these agree is read from their Edge::consistent_with.
+// The largest set of pairwise agreeing closures that contains `closure`, ascending; of several, the first by edge id.
+// `agreeing` are the closures that agree with `closure`; Edge::consistent_with tells which of these agree with each
+// other. Only the last 16 of `agreeing` are considered.
 std::vector<EdgeId> largest_consistent_set(const storage::Graph& graph, EdgeId closure,
                                            const std::vector<EdgeId>& agreeing);
 

@@ -44,14 +44,14 @@ class Consistency : public ::testing::Test {
   place::HandMadeGraph graph_;
 };
 
-TEST_F(Consistency, ClosuresAgreeThatSayTheSame) {
+TEST_F(Consistency, ClosuresWithTheSameTransformAgree) {
   const storage::Edge first = close(5, 5, 0), second = close(9, 8, 1);
   const Neighbourhood near = test_consistency(graph_, second);
   EXPECT_THAT(near.agreeing, ElementsAre(first.id));
   EXPECT_THAT(near.conflicting, IsEmpty());
 }
 
-TEST_F(Consistency, AcceptedOnesThatSayOtherwiseConflict) {
+TEST_F(Consistency, AcceptedClosuresWithAnotherTransformConflict) {
   const storage::Edge wrong = close(5, 5, 1), candidate = close(6, 6, 1, storage::EdgeState::kCandidate),
                       closure = close(9, 9, 0);
   const Neighbourhood near = test_consistency(graph_, closure);
@@ -59,7 +59,7 @@ TEST_F(Consistency, AcceptedOnesThatSayOtherwiseConflict) {
   EXPECT_THAT(near.conflicting, ElementsAre(wrong.id));
 }
 
-TEST_F(Consistency, WhatTheOperatorTookOutSaysNothing) {
+TEST_F(Consistency, RemovedClosuresAreListedApart) {
   close(5, 5, 0, storage::EdgeState::kRemoved);
   const Neighbourhood near = test_consistency(graph_, close(9, 9, 0));
   EXPECT_THAT(near.agreeing, IsEmpty());
@@ -73,7 +73,7 @@ class Standing : public Consistency {
   }
 };
 
-TEST_F(Standing, ARobotThatStandsIsOneWitness) {
+TEST_F(Standing, FramesOfAStandingRobotAreOneWitness) {
   close(6, 5, 0);
   EXPECT_THAT(test_consistency(graph_, close(9, 5, 0)).agreeing, IsEmpty());
   EXPECT_EQ(test_consistency(graph_, close(11, 7, 0)).agreeing.size(), 2u);
@@ -98,8 +98,8 @@ TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
   EXPECT_EQ(verdict(closure(30, 10, 0)), MotionVerdict::kUntested);
 }
 
-// Rides near each other, all seen by closures that lead over the later ones as well: to measure one is to follow the
-// closures of others, which lead over others again.
+// Rides near each other, with closures that lead over the later rides as well: to measure one, the closures of others
+// are followed, which lead over others again.
 std::size_t reads_of_a_closure_over(std::uint32_t rides) {
   constexpr std::uint32_t kBefore = 20, kApart = 5, kCarriers = 4;
   const std::uint32_t behind = kBefore + rides * kApart;
@@ -132,7 +132,7 @@ std::size_t reads_of_a_closure_over(std::uint32_t rides) {
   return counting.hot_reads();
 }
 
-TEST(ConsistencyAcrossRides, EachIsMeasuredOnceHoweverManyLieNearEachOther) {
+TEST(ConsistencyAcrossRides, EachRideIsMeasuredOnceHoweverManyLieNearEachOther) {
   const std::size_t one = reads_of_a_closure_over(1), four = reads_of_a_closure_over(4),
                     eight = reads_of_a_closure_over(8);
   EXPECT_LT(four, 4 * one);

@@ -21,16 +21,17 @@ namespace relmap::map {
 
 namespace {
 
-constexpr double kMinDepth = 0.1;  // metres before a camera: nearer, a point is not taken over
+constexpr double kMinDepth = 0.1;  // metres in front of a camera: nearer points are not re-based
 
-// What a frame that stays knows of a landmark by way of a closure: a claim of one that it observes, or an observation.
+// What a remaining frame knows of a landmark through a closure: an observation of it, or the claim of another landmark
+// that it observes.
 struct Fact {
   FrameId seen_in;
-  std::optional<LandmarkId> claimant;  // else an observation of seen_in
+  std::optional<LandmarkId> claimant;  // the landmark with the claim; nullopt: an observation of seen_in
   ClosureId closure;
 };
 
-// One chunk's way out of the map.
+// Removes one chunk from the map.
 class Deletion {
  public:
   Deletion(storage::Map& map, std::uint64_t sequence, SessionNumber session, std::uint32_t spacing)
@@ -43,7 +44,7 @@ class Deletion {
 
   ClosureChange run() {
     const std::vector<Rebasing> rebasings = plan();
-    std::set<LandmarkId> meant;  // whatever a pass has of them moves, by whichever closure it has it
+    std::set<LandmarkId> meant;  // a pass's facts about these move, whichever closure they stand by
     for (const Rebasing& rebasing : rebasings) meant.insert(rebasing.meaning);
     add_all_observers(meant);
     const std::vector<EdgeId> unused = change_support(map_, affected_, [&] {
@@ -60,10 +61,10 @@ class Deletion {
   }
 
  private:
-  // A landmark of the session and the passes of other sessions, oldest first, that are to have it themselves.
+  // A landmark of the session, and the passes of other sessions, oldest first, in which it is to be re-based.
   struct Rebasing {
     LandmarkId landmark;
-    LandmarkId meaning;  // in force, now
+    LandmarkId meaning;  // the landmark in force that it stands for now
     std::vector<std::vector<Fact>> passes;
   };
 
@@ -93,7 +94,7 @@ class Deletion {
   void let_go(ClosureId closure);
   void unlink();
   void bridge();
-  // A frame that hung on the session, by an edge of the graph.
+  // A remaining frame that an edge of the graph joins to the session.
   struct Attachment {
     FrameId frame, going;
     storage::Edge edge;
@@ -105,16 +106,16 @@ class Deletion {
   const std::uint64_t sequence_;
   const storage::Session session_;
   const std::uint32_t spacing_;
-  storage::LocalGraph local_;  // until edges change
+  storage::LocalGraph local_;  // valid until edges change
 
-  std::vector<FrameId> going_;           // ascending
-  std::optional<FrameId> left_;          // of the session, what is its last frame afterwards
-  std::vector<storage::Edge> motions_;   // of the robot, that end in frames that go, as these
-  std::vector<storage::Edge> closures_;  // ascending: those with an end that goes
-  std::set<EdgeId> stand_ins_;           // accepted closures that may carry in their place
-  std::set<FrameId> affected_;           // those that go, and those that may see something else afterwards
-  std::set<FrameId> near_;               // those, and those that may know of what goes by what is not in force
-  std::map<LandmarkId, std::vector<Fact>> facts_;  // that others have of the session's landmarks
+  std::vector<FrameId> going_;           // frames that go, ascending
+  std::optional<FrameId> left_;          // the session's last frame afterwards
+  std::vector<storage::Edge> motions_;   // odometry edges into frames that go, in the order of going_
+  std::vector<storage::Edge> closures_;  // closures with an end that goes, ascending
+  std::set<EdgeId> stand_ins_;           // accepted closures that may become edges in place of those that go
+  std::set<FrameId> affected_;           // frames that go, and frames whose observations may change
+  std::set<FrameId> near_;               // affected_, and frames that may have facts out of force about what goes
+  std::map<LandmarkId, std::vector<Fact>> facts_;  // what others know of the session's landmarks
   ClosureChange change_;
 };
 
@@ -141,7 +142,8 @@ void Deletion::find_closures() {
             [](const storage::Edge& x, const storage::Edge& y) { return x.id < y.id; });
 }
 
-// Edges may go, and come, that end in `ends`; landmarks that go, and what they mean, are seen by their observers.
+// Frames are affected beyond the ends of edges that may go or come, and as observers of landmarks that go or of the
+// landmarks that these stand for.
 void Deletion::find_affected() {
   std::vector<FrameId> ends = going_;
   if (left_) ends.push_back(*left_);
@@ -164,19 +166,19 @@ void Deletion::find_affected() {
   add_all_observers(meant);
 }
 
-// Of landmarks that stay.
+// Adds the observers of those of the landmarks that stay.
 void Deletion::add_all_observers(const std::set<LandmarkId>& landmarks) {
-  std::optional<FrameId> all_near;  // to that base have been added
+  std::optional<FrameId> all_near;  // the base of which all frames in reach have been added
   for (const LandmarkId landmark : landmarks) {
     if (!landmark.valid() || goes(landmark.base)) continue;
-    const bool settled = storage::is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
-    if (settled && all_near == landmark.base) continue;
+    const bool fixed = storage::is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
+    if (fixed && all_near == landmark.base) continue;
     add_observers(map_, landmark, &affected_);
-    if (settled) all_near = landmark.base;
+    if (fixed) all_near = landmark.base;
   }
 }
 
-// Who knows of a landmark sees it; what is not in force stands where a closure near it binds.
+// Facts in force are those of the observers (affected_); facts out of force are in frames where closures near by bind.
 void Deletion::find_facts() {
   std::set<FrameId> around(going_.begin(), going_.end());
   std::vector<std::int32_t> walk;
@@ -227,7 +229,7 @@ std::vector<Deletion::Rebasing> Deletion::plan() const {
   return rebasings;
 }
 
-// Whether something is known there by what goes, and is in force.
+// Whether the pass has a fact in force about the landmark that is lost with the landmark's base or with a closure.
 bool Deletion::needs_own(const Rebasing& rebasing, const std::vector<Fact>& pass) const {
   return std::any_of(pass.begin(), pass.end(), [&](const Fact& fact) {
     return storage::closure_holds(map_, fact.closure) && (goes(rebasing.landmark.base) || goes(fact.closure)) &&
@@ -235,7 +237,7 @@ bool Deletion::needs_own(const Rebasing& rebasing, const std::vector<Fact>& pass
   });
 }
 
-// Oldest first.
+// Groups facts by pass, the oldest pass first.
 std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts) const {
   std::stable_sort(facts.begin(), facts.end(), [](const Fact& x, const Fact& y) { return x.seen_in < y.seen_in; });
   std::vector<std::vector<Fact>> passes;
@@ -248,7 +250,7 @@ std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts) cons
   return passes;
 }
 
-// A landmark's parameters in a frame; nullopt: it cannot be said.
+// The landmark's parameters (a, b, rho) in a frame; nullopt if no path leads there or it is not in front of the camera.
 std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
   std::vector<storage::LocalStep> steps;
   if (!landmark.valid() || !local_.path(local_.frame(landmark.base), local_.frame(frame), &steps)) return std::nullopt;
@@ -263,9 +265,9 @@ std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
 }
 
 void Deletion::rebase(const Rebasing& rebasing) {
-  std::vector<LandmarkId> older;  // of the passes before
+  std::vector<LandmarkId> older;  // landmarks of the passes before
   for (const std::vector<Fact>& pass : rebasing.passes) {
-    if (!needs_own(rebasing, pass)) continue;  // what was moved before may have answered it
+    if (!needs_own(rebasing, pass)) continue;  // an earlier re-basing may have done it
     const auto landmark = take_over(rebasing, pass);
     if (!landmark) continue;
     map_.state().pending.insert(landmark->base);
@@ -274,7 +276,7 @@ void Deletion::rebase(const Rebasing& rebasing) {
   }
 }
 
-// The landmark of the pass that stands for the one that it saw; nullopt: none can.
+// The landmark of the pass that takes the re-based one's place; nullopt if there is none and none can be made.
 std::optional<LandmarkId> Deletion::take_over(const Rebasing& rebasing, const std::vector<Fact>& pass) {
   std::optional<LandmarkId> own;
   for (const Fact& fact : pass)
@@ -297,8 +299,8 @@ std::optional<LandmarkId> Deletion::take_over(const Rebasing& rebasing, const st
   return LandmarkId{base, slot};
 }
 
-// All that the pass has of the landmark means its own from now on; and that one, by a closure that stays, an older
-// pass's.
+// Makes all that the pass has of the landmark mean `own` from now on. If a closure in force that stays joins the pass
+// to an older one, `own` claims to be the older pass's landmark by that closure.
 void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<Fact>& pass,
                     const std::vector<LandmarkId>& older) {
   ClosureId to_older;
@@ -347,14 +349,14 @@ void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<
   edge.bound = static_cast<std::uint16_t>(std::min(edge.bound + 1, 0xffff));
 }
 
-// A claim or an observation that stands by this closure is no more.
+// Notes that a claim or an observation of this closure has gone.
 void Deletion::let_go(ClosureId closure) {
   if (!closure.valid() || goes(closure)) return;
   if (const auto edge = storage::find_edge(map_, closure); edge && edge->bound > 0)
     --map_.edit_hot(closure.frame).edge(closure)->bound;
 }
 
-// What is still said by closures that go, or of landmarks that do, is void.
+// Drops the remaining facts that stand by closures that go, or are about landmarks that go.
 void Deletion::drop_facts() {
   std::set<LandmarkId> known;
   for (const FrameId frame : near_) {
@@ -370,7 +372,7 @@ void Deletion::drop_facts() {
       };
       const auto& claims = base->landmarks[z.landmark.slot].claims;
       if (std::none_of(claims.begin(), claims.end(), drop)) continue;
-      // It is on its own now, where what it meant has come to lie.
+      // If nothing else claims it, the landmark is in force by itself now, with the estimate of the one it stood for.
       const LandmarkId meant = storage::meaning_of(map_, z.landmark).landmark;
       const auto estimate = meant == z.landmark ? std::nullopt : seen_from(z.landmark.base, meant);
       storage::Landmark& landmark = map_.edit_hot(z.landmark.base).landmarks[z.landmark.slot];
@@ -387,7 +389,7 @@ void Deletion::drop_facts() {
   }
 }
 
-// Takes the edges that end in frames that go out of those that stay.
+// Removes edges to frames that go from the frames that stay.
 void Deletion::unlink() {
   local_.clear();
   storage::MapState& state = map_.state();
@@ -410,7 +412,7 @@ void Deletion::unlink() {
     if (!goes(edge.a) && map_.hot(edge.a)) std::erase(map_.edit_hot(edge.a).incoming, edge.id);
   }
   if (left_) std::erase(map_.edit_hot(*left_).incoming, motions_.front().id);
-  // Closures of others that bind in frames that go.
+  // Closures between other frames that bind in frames that go.
   std::map<EdgeId, std::set<FrameId>> bound;
   for (const FrameId frame : going_) {
     const auto warm = map_.warm(frame);
@@ -437,15 +439,16 @@ void Deletion::unlink() {
   }
 }
 
-// The robot's own motion that ends in a frame that goes.
+// The odometry edge that ends in a frame that goes.
 const storage::Edge* Deletion::motion_into(FrameId frame) const {
   const auto at =
       std::find_if(motions_.begin(), motions_.end(), [&](const storage::Edge& edge) { return edge.b == frame; });
   return at == motions_.end() ? nullptr : &*at;
 }
 
-// Along the session, from its end, stretch by stretch: what hung on it hangs on what is oldest there, so that walks up
-// stay short however many have passed; and that hangs on the oldest of the next stretch, or the end of what is left.
+// Bridges the session stretch by stretch, from its end. In each stretch the frames that it joined are joined to the
+// oldest of them, so that walks up stay short however many passes there are. The oldest frame is joined to the oldest
+// of the next stretch, and the last of these to the end of what is left of the session.
 void Deletion::bridge() {
   std::vector<Attachment> attachments;
   for (const storage::Edge& edge : closures_) {
@@ -457,7 +460,7 @@ void Deletion::bridge() {
   std::erase_if(change_.seeds, [&](FrameId frame) { return !map_.hot(frame); });
   std::stable_sort(attachments.begin(), attachments.end(),
                    [](const Attachment& x, const Attachment& y) { return y.going < x.going; });
-  const Attachment* before = nullptr;  // the oldest of the stretch before
+  const Attachment* before = nullptr;  // the oldest attachment of the previous stretch
   for (auto begin = attachments.begin(); begin != attachments.end();) {
     const auto end = std::find_if(begin, attachments.end(), [&](const Attachment& attachment) {
       return begin->going.index - attachment.going.index >= spacing_;
@@ -476,8 +479,8 @@ void Deletion::bridge() {
   if (before && left_) join(*before, *left_, *left_, nullptr);
 }
 
-// A closure from the frame of `from` to `to`, where the way that is left is much longer: by the edge of `from`, the
-// robot's motion back to `turn`, and the edge of `at_turn`, if it is not the end itself.
+// Adds a bridge from the frame of `from` to `to` if the remaining path is much longer. The bridge compounds the edge of
+// `from`, the robot's motion back to `turn`, and the edge of `at_turn`; a null `at_turn` means that `to` is `turn`.
 void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn) {
   if (to == from.frame) return;
   storage::CompoundedChain chain;

@@ -1,13 +1,14 @@
-// Deleting a session (docs/method.md, 2), chunk by chunk, the newest first: what is left of it is a session that ended
-// earlier, and the map is whole after each.
+// Deletes a session (docs/method.md, 2) chunk by chunk, the newest first. After each chunk the map is complete: what is
+// left of the session is one that ended earlier.
 //
-// What others know by the frames that go stays with them:
-//   - A landmark of the session is re-based in each pass of another session that sees it: the oldest landmark that is
-//     the same there takes its place, with the estimate that it has now; where there is none, its first observer there
-//     gets one. What else the pass has of it means that one from now on, whatever closures hold.
-//   - Where the way between two frames led over the session and what is left is longer by more than kLoopEdgeSpacing
-//     edges, a closure is put in its place: the chain's transform and covariance (Verification::kCompounded), which is
-//     its prior, as nothing is observed along it.
+// What other sessions know through the deleted frames stays with them:
+//   - A landmark of the session is re-based in each pass of another session that sees it. The oldest landmark of the
+//     pass that stands for it takes its place, with the deleted one's present estimate; if there is none, the first
+//     observer of the pass gets a new landmark. All that the pass has of the deleted landmark means this one from now
+//     on, independent of closures.
+//   - If the path between two frames led over the session and the remaining path is longer by more than
+//     kLoopEdgeSpacing edges, a bridge replaces it: a closure with the transform and covariance of the chain
+//     (Verification::kCompounded). These are its prior, since nothing is observed along it.
 #pragma once
 
 #include <cstdint>
@@ -19,10 +20,11 @@
 
 namespace relmap::map {
 
-// The chunk that is to go next; nullopt: no frame is left.
+// The next chunk to remove; nullopt if no frame is left or the session is not being deleted.
 std::optional<storage::RemoveChunkRecord> next_deletion(const storage::Session& session);
 
-// Nothing for a session that is not being deleted, and for another than its last chunk. `sequence` is the record's.
+// Removes a chunk. Changes nothing if the session is not being deleted, or if the chunk is not its last. `sequence` is
+// the record's in the journal.
 ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const storage::RemoveChunkRecord& record,
                              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 

@@ -207,7 +207,7 @@ class Deleting : public ThreeRobots, public ::testing::WithParamInterface<bool> 
   void SetUp() override { drive(GetParam()); }
 };
 
-TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
+TEST_P(Deleting, DeletingTheOldestKeepsWhatTheOthersKnow) {
   const double before = worst_error(2, 3);
   const std::size_t seen = observations(2);
   remove(1, [&] { expect_whole("after a chunk"); });
@@ -219,7 +219,7 @@ TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
   EXPECT_THAT(bridges(), testing::IsEmpty()) << "each of the others hangs together by itself";
 }
 
-TEST_P(Deleting, TheOneBetweenTwoOthersIsBridged) {
+TEST_P(Deleting, DeletingTheMiddleOneLeavesABridge) {
   const double before = worst_error(1, 3);
   const std::size_t loops =
       edges([](const storage::Edge& edge) { return edge.kind == storage::EdgeKind::kLoop && edge.in_graph(); }).size();
@@ -241,7 +241,7 @@ TEST_P(Deleting, TheOneBetweenTwoOthersIsBridged) {
   }
 }
 
-TEST_P(Deleting, TheNewestGoesWithoutATrace) {
+TEST_P(Deleting, DeletingTheNewestLeavesNoTrace) {
   const double before = worst_error(1, 2);
   const std::size_t seen = observations(1);
   remove(3, [&] { expect_whole("after a chunk"); });
@@ -251,7 +251,7 @@ TEST_P(Deleting, TheNewestGoesWithoutATrace) {
   EXPECT_EQ(map().sessions().size(), kRobots) << "its uuid is not taken again";
 }
 
-TEST_P(Deleting, OneAfterAnotherAndWhatIsLeftLivesOn) {
+TEST_P(Deleting, TheMapIsConsistentAfterEachOfSeveralDeletions) {
   remove(2);
   drive_->apply(storage::IdleWorkRecord{500'000});
   expect_whole("the second is gone");
@@ -270,7 +270,7 @@ TEST_P(Deleting, OneAfterAnotherAndWhatIsLeftLivesOn) {
   EXPECT_TRUE(map().state().pending.empty());
 }
 
-TEST_F(ThreeRobots, DeletionIsAFunctionOfTheJournalWhereverItIsCutOff) {
+TEST_F(ThreeRobots, DeletionIsAFunctionOfTheJournalWhereverItIsInterrupted) {
   drive(true);
   remove(2);
   const storage::MapHash whole = storage::hash_map(map());
@@ -300,10 +300,10 @@ TEST_F(ThreeRobots, DeletionIsAFunctionOfTheJournalWhereverItIsCutOff) {
   EXPECT_EQ(storage::hash_map(again->map()), whole);
 }
 
-TEST_F(ThreeRobots, WhatComesTooLateForASessionBeingDeletedChangesNothing) {
+TEST_F(ThreeRobots, RecordsForASessionBeingDeletedChangeNothing) {
   drive(false);
   drive_->apply(storage::SetSessionStateRecord{2, storage::SessionState::kDeleting});
-  // Keyframes and gaps on their way are settled, so that the robot hears of it.
+  // Keyframes and gaps on their way are skipped, so that their robot is told.
   take_in(2, kLap);
   drive_->apply(storage::GapRecord{2, kLap + 1, kLap + 3});
   const storage::Session session = *map().session(2);
@@ -356,14 +356,14 @@ TEST_F(DeletingTheLink, BridgesLeadBetweenOlderFrames) {
   }
 }
 
-// A place that has been passed so often that its landmarks are settled.
+// A place that has been passed so often that its landmarks are fixed.
 class DeletingInABusyPlace : public Robots, public ::testing::WithParamInterface<SessionNumber> {
  protected:
   static constexpr SessionNumber kPasses = 6;
   DeletingInABusyPlace() : Robots(kPasses) {}
 };
 
-TEST_P(DeletingInABusyPlace, WhatWasSettledIsSeenByOthers) {
+TEST_P(DeletingInABusyPlace, FixedLandmarksAreSeenByOthers) {
   constexpr std::uint32_t kStretch = 80;
   for (SessionNumber robot = 1; robot <= kPasses; ++robot) {
     drive_->apply(begin(robot));

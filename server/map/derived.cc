@@ -15,7 +15,7 @@ std::vector<FrameId> all_frames(const storage::Graph& graph) {
   std::vector<FrameId> frames;
   for (const storage::Session& session : graph.sessions()) {
     if (session.frames == 0) continue;
-    for (std::uint64_t index = session.first; index <= session.last; ++index)  // past what `incoming` may not lead to
+    for (std::uint64_t index = session.first; index <= session.last; ++index)  // not along `incoming`, which is checked
       if (const FrameId id{session.number, static_cast<std::uint32_t>(index)}; graph.hot(id)) frames.push_back(id);
   }
   return frames;

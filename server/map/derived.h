@@ -1,5 +1,6 @@
-// Recomputes from the stored facts what is derived from them, and says where the map differs: for tests, and for
-// whoever verifies a map. From nothing, not step by step as support.h keeps it; and slow: every frame, every path.
+// Checks derived data for tests and for verifying a map: recomputes it from the stored facts and reports where the map
+// differs. Unlike support.h, which updates it step by step, this starts from nothing. It is slow: it visits every frame
+// and every path.
 #pragma once
 
 #include <string>
@@ -9,8 +10,8 @@
 
 namespace relmap::map {
 
-// One line for each difference: observers, unreached ones, incoming edges, support, active priors, and edges of the
-// graph that have neither support nor prior. Empty: all is as it should be.
+// Returns one line for each difference in observers, unreached observers, incoming edges, support and active priors,
+// and for each edge of the graph that has neither support nor prior. Empty if the map is consistent.
 std::vector<std::string> derived_differences(const storage::Graph& graph);
 
 }  // namespace relmap::map

@@ -14,7 +14,7 @@ DeterministicDriver::Outcome DeterministicDriver::follow_up(std::uint64_t sequen
   Outcome outcome{sequence, {}};
   try {
     if (frame) {
-      lookups_.open(*frame);  // if it is not finished, the next start takes it up again
+      lookups_.open(*frame);  // so that the next start repeats a lookup that does not finish
       const std::vector<storage::JournalRecord> found = hooks_.look_up(*frame);
       const auto follows = [&](const storage::JournalRecord& record) { return append_and_apply(record, outcome); };
       if (std::all_of(found.begin(), found.end(), follows)) lookups_.close(*frame);

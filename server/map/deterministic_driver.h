@@ -1,6 +1,6 @@
-// Deterministic mode: what follows from a record (the lookup of a new frame, a slice of the relaxation that is left, a
-// chunk of a session that is being deleted) is journalled and applied right after it, before the next record is taken.
-// So the same input gives the same map, whatever the machine has time for.
+// Deterministic mode. What follows from a record (the lookup of a new frame, slices of the remaining relaxation, chunks
+// of sessions that are being deleted) is journalled and applied right after it, before the next record is taken. So the
+// same input gives the same map, however fast the machine is.
 #pragma once
 
 #include <cstdint>
@@ -19,27 +19,27 @@ namespace relmap::map {
 class DeterministicDriver {
  public:
   struct Hooks {
-    // Makes a record durable, and gives its sequence; nullopt: the disk did not take it before the
-    // daemon stops, or takes nothing while it starts.
+    // Makes a record durable and returns its sequence; nullopt if the disk did not take it before the daemon stopped,
+    // or takes nothing while the daemon starts.
     std::function<std::optional<std::uint64_t>(const storage::JournalRecord&)> append;
-    // Applies it to the map. Throws what the map throws.
+    // Applies the record to the map. Throws what the map throws.
     std::function<void(std::uint64_t sequence, const storage::JournalRecord&)> apply;
     std::function<std::vector<storage::JournalRecord>(FrameId)> look_up;
     std::function<bool()> relaxation_pending;
     std::function<std::optional<storage::RemoveChunkRecord>()> next_removal;
   };
-  // At most so many relaxation records after each record: enough for a loop closure, and bounded.
+  // Relaxation records after each record, at most: enough for a loop closure.
   static constexpr int kSlices = 16;
 
-  // `slice`: counted work of one record of relaxation.
+  // `slice` is the counted work of one relaxation record.
   DeterministicDriver(std::uint64_t slice, LookupQueue& lookups, Hooks hooks);
 
   struct Outcome {
-    std::uint64_t last = 0;  // sequence of the last record that followed; if none did, the `sequence` passed in
-    Status trouble;          // not ok: something that follows could not be found or applied
+    std::uint64_t last = 0;  // sequence of the last record that followed, or `sequence` if none did
+    Status trouble;          // not ok: a lookup failed, or a record could not be applied
   };
-  // Looks up `frame` (the one that record `sequence` added, if any), relaxes in at most `slices` records, then takes
-  // out chunks of sessions that are being deleted. Each step is journalled and applied here.
+  // Looks up `frame` (the one that record `sequence` added, if any), relaxes in at most `slices` records, then removes
+  // chunks of sessions that are being deleted. Journals and applies each step.
   Outcome follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int slices = kSlices);
 
  private:

@@ -80,7 +80,7 @@ TEST_F(DeterministicDriverTest, ALookupThatIsNotJournalledStaysOpen) {
   EXPECT_TRUE(lookups_.is_open({1, 3}));
 }
 
-TEST_F(DeterministicDriverTest, WhatFailsIsSaidWithHowFarItGot) {
+TEST_F(DeterministicDriverTest, AFailureIsReportedWithTheLastAppliedSequence) {
   look_up_fails_ = Status(Reason::IO_ERROR, "the disk");
   const auto outcome = driver_.follow_up(10, FrameId{1, 3});
   EXPECT_EQ(Reason::IO_ERROR, outcome.trouble.reason());

@@ -1,5 +1,5 @@
-// What an edit changes of the edges of the map, or would change: noted while it is made, whoever makes it and however,
-// so that what a dry run tells of a draft (storage/map/draft.h) is what the edit does to the map.
+// Records which edges an edit changes while it is made, on the map or on a draft (storage/map/draft.h). So a dry run
+// reports exactly what the edit would do to the map.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@
 
 namespace relmap::map {
 
-// How an edge stands.
+// The part of an edge that EdgeChange compares.
 struct EdgeStanding {
   storage::EdgeState state = storage::EdgeState::kAccepted;
   Reason reason = Reason::MOTION;
-  bool in_graph = false;           // else it binds at most
-  std::vector<EdgeId> carried_by;  // of an edge of the robot's own motion
+  bool in_graph = false;           // false: a closure that at most binds
+  std::vector<EdgeId> carried_by;  // of an odometry edge
 
   explicit EdgeStanding(const storage::Edge& edge)
       : state(edge.state), reason(edge.reason), in_graph(edge.in_graph()), carried_by(edge.carried_by) {}
@@ -30,19 +30,20 @@ struct EdgeChange {
   FrameId a, b;
   storage::EdgeKind kind = storage::EdgeKind::kLoop;
   std::uint32_t bound = 0;                    // observations and landmarks that it justifies while it is in force
-  std::uint32_t bound_frames = 0;             // in which they are
-  std::optional<EdgeStanding> before, after;  // none: it was, or is, not there
+  std::uint32_t bound_frames = 0;             // number of frames that these are in
+  std::optional<EdgeStanding> before, after;  // nullopt: the edge was, or is, not there
 
   bool operator==(const EdgeChange&) const = default;
 };
 
-// Passes every edit on to another graph.
+// Passes every edit on to another graph and records the edges before it.
 class EdgeRecorder final : public storage::ForwardingGraph<storage::EditableGraph> {
  public:
-  // What the graph gives now stays unchanged until it is edited.
+  // Make the recorder before the first edit since the graph was published or drafted: edit_hot() then copies a frame
+  // before it changes. Edit the graph through the recorder only.
   explicit EdgeRecorder(storage::EditableGraph& graph) : ForwardingGraph(graph), graph_(graph) {}
 
-  // Edges that stand otherwise than when the recorder was made, ascending by id.
+  // The edges that differ in EdgeStanding from when the recorder was made, ascending by id.
   std::vector<EdgeChange> changes() const;
 
   storage::FrameHot& edit_hot(FrameId id) override;

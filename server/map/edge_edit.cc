@@ -19,7 +19,7 @@ namespace relmap::map {
 
 namespace {
 
-// The closure, those that agree with it and `join` it, and with those, and so on.
+// The closure, and all for which `join` is true that agree with it, directly or through others of the set.
 std::vector<storage::Edge> joined_set(const storage::Graph& graph, EdgeId named,
                                       const std::function<bool(const storage::Edge&)>& join) {
   std::vector<storage::Edge> set{*storage::find_edge(graph, named)};
@@ -31,7 +31,7 @@ std::vector<storage::Edge> joined_set(const storage::Graph& graph, EdgeId named,
   return set;
 }
 
-// What agrees with a wrong closure is wrong with it. One that an operator decided on goes when it is named itself.
+// Closures that agree with a wrong one are wrong too. One that an operator put into force is only removed by name.
 std::vector<StateChange> removal(const storage::Graph& graph, EdgeId named) {
   std::vector<StateChange> changes;
   for (const storage::Edge& edge : joined_set(graph, named, [](const storage::Edge& other) {
@@ -59,7 +59,7 @@ std::vector<StateChange> removal_alone(EdgeId named) {
   return {{named, storage::EdgeState::kRemoved, Reason::REMOVED_ALONE}};
 }
 
-// What a removed closure was: restoring it does not make more of it. `end`: of the history that counts.
+// The state of a removed closure before its removal, by the first `end` events of its history.
 StateChange as_before_removal(const storage::Edge& edge, std::size_t end) {
   const auto events = std::span(edge.history).first(end);
   for (auto event = events.rbegin(); event != events.rend(); ++event)
@@ -78,8 +78,8 @@ std::vector<StateChange> restoration(const storage::Graph& graph, EdgeId named) 
   return changes;
 }
 
-// The event by which an operator put it into force: its place in the history. It may have been taken out, and restored,
-// since.
+// Index in the history of the event by which an operator put the closure into force. It may have been removed and
+// restored since.
 std::size_t decision(const storage::Edge& decided) {
   std::size_t found = decided.history.size() - 1;
   for (std::size_t i = found; i-- > 0;) {
@@ -91,8 +91,8 @@ std::size_t decision(const storage::Edge& decided) {
   return found;
 }
 
-// Whether a set in which it stood had said where the robot was carried before the operator put it into force: then that
-// is not of his word.
+// Whether the closure had been accepted with a set that says where the robot was carried before the operator put it
+// into force. Edge::carried is then not due to the operator.
 bool said_carried_before(const storage::Edge& decided) {
   const auto before = std::span(decided.history).first(decision(decided));
   return std::any_of(before.begin(), before.end(),
@@ -104,7 +104,7 @@ StateChange as_before(const storage::Edge& edge, std::size_t event) {
   return {edge.id, edge.history[event - 1].state, edge.history[event - 1].reason};
 }
 
-// Closures that the decision put out of force and that nothing has changed since.
+// The closures that the operator's decision put out of force and that have not changed since.
 std::vector<storage::Edge> put_out_by(const storage::Graph& graph, const storage::Edge& decided) {
   const std::uint64_t sequence = decided.history[decision(decided)].journal_sequence;
   const auto by_it = [&](const storage::Edge& edge) {
@@ -118,7 +118,7 @@ std::vector<storage::Edge> put_out_by(const storage::Graph& graph, const storage
                              [](const storage::Edge& step) { return std::optional<storage::Edge>(step); }))
     for (const storage::Edge& edge : graph.hot(near.frame)->edges) {
       if (!by_it(edge) || seen.contains(edge.id)) continue;
-      for (storage::Edge& member : joined_set(graph, edge.id, by_it))  // those that were left alone without it
+      for (storage::Edge& member : joined_set(graph, edge.id, by_it))  // with those of add_left_alone()
         if (seen.insert(member.id).second) found.push_back(std::move(member));
     }
   return found;
@@ -128,8 +128,8 @@ std::set<EdgeId> opponents_now(const storage::Graph& graph, EdgeId id) {
   return opponents(graph, id, test_consistency(graph, *storage::find_edge(graph, id)).conflicting);
 }
 
-// Closures that came into force because they agree with a ride that an operator's word gave, and that would not be
-// believed to tell of one by themselves (weigh_carrying()).
+// The closures in force that agree with a ride stated by an operator and would not be accepted as evidence for it
+// without him (weigh_carrying()).
 std::vector<EdgeId> on_the_word_alone(const storage::Graph& graph, const storage::Edge& decided) {
   std::vector<EdgeId> followers;
   for (const storage::Edge& edge : joined_set(graph, decided.id, [&](const storage::Edge& other) {
@@ -179,16 +179,16 @@ std::vector<StateChange> withdrawal(const storage::Graph& graph, const storage::
 ClosureChange withdraw(storage::EditableGraph& map, const storage::Edge& decided, const Cause& cause,
                        std::uint32_t spacing) {
   const std::vector<StateChange> changes = withdrawal(map, decided);
-  if (changes.front().state ==
-      storage::EdgeState::kRemoved) {  // of what it was before that, its history goes on to tell
+  if (changes.front().state == storage::EdgeState::kRemoved) {
+    // Keeps its state before the removal in the history, for a restoration.
     const StateChange before = as_before_removal(decided, decision(decided));
     add_event(*map.edit_hot(decided.id.frame).edge(decided.id), before.state, before.reason, cause);
   }
   return change_states(map, changes, cause, spacing);
 }
 
-// Where the robot was carried if an operator is right about a closure that contradicts the odometry. Those that agree
-// with it tell more nearly, though they were not believed; it is not they that the operator spoke of.
+// Where the robot was carried if an operator is right about a closure that contradicts the odometry. Closures that
+// agree with it narrow the stretch down although they are not in force; if they leave none, the closure alone counts.
 storage::FrameRange carried_by_word(const storage::Graph& graph, EdgeId id, const std::vector<EdgeId>& agreeing,
                                     const std::set<EdgeId>& outvoted) {
   std::vector<EdgeId> ride{id};
@@ -203,28 +203,28 @@ storage::FrameRange carried_by_word(const storage::Graph& graph, EdgeId id, cons
   return together.session != 0 ? together : where_carried(graph, {id}, outvoted);
 }
 
-// What it comes to that an operator puts a closure into force.
+// The consequences of an operator putting a closure into force.
 struct Word {
   std::vector<EdgeId> agreeing;
-  std::set<EdgeId> against;     // cannot stand beside it
-  storage::FrameRange carried;  // there the robot was carried, he says; session 0: no more than the closure said before
+  std::set<EdgeId> against;     // closures that cannot be in force together with it
+  storage::FrameRange carried;  // new value of Edge::carried; session 0: it stays as it is
 };
 
 Word word_on(const storage::Graph& graph, EdgeId id) {
   const storage::Edge closure = *storage::find_edge(graph, id);
   const Neighbourhood near = test_consistency(graph, closure);
   storage::Draft with_it(graph);
-  remember_agreement(with_it, id, near.agreeing);  // one that contradicted the motion was not held against others
+  remember_agreement(with_it, id, near.agreeing);  // until now it was compared only with closures that contradict too
   Word word{near.agreeing, opponents(with_it, id, near.conflicting), {}};
   const MotionTest motion = test_motion(graph, closure);
   if (motion.verdict == MotionVerdict::kDenies) word.against.insert(motion.carriers.begin(), motion.carriers.end());
-  // If it contradicts the odometry, he says that the robot was carried. Where a set said so before that it stood in, it
-  // goes on to say where.
+  // If it contradicts the odometry, the operator says that the robot was carried. If a set with this closure has said
+  // where before, that stays.
   if (motion.verdict != MotionVerdict::kContradicts || closure.carried.session != 0) return word;
   word.carried = carried_by_word(graph, id, near.agreeing, {});
   if (word.carried.session != 0) {
-    // Closures on either side of the ride agree with the odometry, and stand beside this one once the way between them
-    // goes by what it measured.
+    // Closures on either side of the ride agree with the odometry. They can be in force together with this one once the
+    // path between them crosses the ride as this one measured it.
     storage::Edge& carrier = *with_it.edit_hot(id.frame).edge(id);
     carrier.carried = word.carried;
     enter_carrier(with_it, storage::Edge(carrier));
@@ -264,12 +264,12 @@ Status check_restoration(const storage::Graph& graph, const storage::Edge& closu
 
 Status check_acceptance(const storage::Graph& graph, const storage::Edge& closure) {
   if (is_decided(closure))
-    return {Reason::WRONG_STATE, closure.id.to_string() + " is in force by an operator's word already"};
+    return {Reason::WRONG_STATE, closure.id.to_string() + " has been put into force by an operator already"};
   if (!storage::is_metric(closure.verification))
     return {Reason::UNSUPPORTED,
             closure.id.to_string() + (closure.verification == storage::Verification::kNone
                                           ? " was never verified: nothing says how far its ends are from each other"
-                                          : " is verified by epipolar geometry alone, which knows no metres")};
+                                          : " is verified by epipolar geometry alone, which measures no metres")};
   if (const auto decided = decided_among(graph, word_on(graph, closure.id).against))
     return in_the_way(closure.id, *decided);
   return {};
@@ -296,7 +296,7 @@ Result<EdgeAction> action_of(const storage::SetEdgeStateRecord& record) {
     return record.decided ? EdgeAction::kAccept : EdgeAction::kRestore;
   if (record.state == storage::EdgeState::kCandidate && !record.decided && !record.alone) return EdgeAction::kWithdraw;
   return {Reason::UNSUPPORTED,
-          "a loop closure can be removed, restored, put into force, and left to the vote again; nothing else"};
+          "a loop closure can only be removed, restored, put into force, or left to the vote again"};
 }
 
 std::uint64_t removal_mark(const storage::Graph& graph, EdgeId closure) {
@@ -323,7 +323,8 @@ Status check_edge_edit(const storage::Graph& graph, const storage::SetEdgeStateR
   if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
   for (const FrameId end : {edge->a, edge->b})
     if (is_going(graph, end))
-      return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
+      return {Reason::SESSION_DELETED,
+              name + " belongs to session " + std::to_string(end.session) + ", which is being deleted"};
   switch (*action) {
     case EdgeAction::kRemove:
     case EdgeAction::kRemoveAlone:
@@ -335,7 +336,7 @@ Status check_edge_edit(const storage::Graph& graph, const storage::SetEdgeStateR
       return check_acceptance(graph, *edge);
     case EdgeAction::kWithdraw:
       if (!is_decided(*edge))
-        return {Reason::WRONG_STATE, name + " is not in force by an operator's word: there is none to take back"};
+        return {Reason::WRONG_STATE, name + " was not put into force by an operator: there is nothing to withdraw"};
       return {};
   }
   return {};

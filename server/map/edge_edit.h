@@ -1,6 +1,6 @@
-// What an operator does to loop closures (docs/method.md, 7): takes one out, restores it, puts one into force by his
-// word, takes that word back. Every function is a pure function of the graph and its arguments; a dry run is the same
-// edit on a draft (storage/map/draft.h).
+// Edits of loop closures by an operator (docs/method.md, 7): remove one, restore it, put one into force, withdraw that.
+// Every function is a pure function of the graph and its arguments; a dry run is the same edit on a draft
+// (storage/map/draft.h).
 #pragma once
 
 #include "server/map/closures.h"
@@ -10,29 +10,32 @@ namespace relmap::map {
 enum class EdgeAction : std::uint8_t { kRemove, kRemoveAlone, kRestore, kAccept, kWithdraw };
 
 storage::SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string note = {});
-// UNSUPPORTED: the record says what no edit is.
+// The action that a record describes. UNSUPPORTED if it describes none.
 Result<EdgeAction> action_of(const storage::SetEdgeStateRecord& record);
 
-// Stands for the closures that a removal of `closure` would take out: their number times 2^32 plus the CRC-32C of their
-// ids. Never 0. The closure must be there.
+// Identifies the set of closures that a removal of `closure` would take out: their number times 2^32 plus the CRC-32C
+// of their ids. Never 0. The closure must exist.
 std::uint64_t removal_mark(const storage::Graph& graph, EdgeId closure);
 
-// Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, NO_SUCH_FRAME (an end was lost), SESSION_DELETED,
-// WRONG_STATE (there is nothing to do, or another closure is in the way that an operator put into force, or others
-// would be removed than the record's `shown` stands for), UNSUPPORTED (one to be put into force is not verified in
-// metres).
+// OK if this edit is possible. Otherwise NO_SUCH_EDGE, ODOMETRY_EDGE, NO_SUCH_FRAME (an end was lost), SESSION_DELETED,
+// WRONG_STATE (there is nothing to do, or a closure that an operator put into force is in the way, or the closures that
+// would be removed are not those of the record's `shown`), or UNSUPPORTED (the closure to be put into force is not
+// verified in metres).
 Status check_edge_edit(const storage::Graph& graph, const storage::SetEdgeStateRecord& record);
 
-// Nothing if check_edge_edit() says no. `sequence` is the record's in the journal.
-//   remove    with all that are in force and agree with it, and with those, but for others that an operator decided on.
-//             What agrees with one of them later stays a candidate
-//   alone     it goes by itself. What agrees with it stays as it is, those too that came into force with it alone, and
-//             is judged later as if there were no such closure: it neither vouches for others nor keeps them out
-//   restore   with all that went with it, each to the state that it had; one that went alone comes back alone
-//   accept    those that cannot stand beside it are quarantined; it is not outvoted, and needs none that agrees. If it
-//             contradicts the odometry, the robot was carried in between (where_carried())
-//   withdraw  what it was before it was accepted so. What it quarantined is back as it was, unless it has changed since
-//             or closures in force stand against it now; what came into force by agreeing with it alone is a candidate
+// Applies the edit; changes nothing if check_edge_edit() is not OK. `sequence` is the record's in the journal.
+//   remove    Removes the closure and all closures in force that agree with it, directly or through one another, except
+//             those that an operator put into force. A later proposal that agrees with one of them stays a candidate.
+//   alone     Removes only the closure. Those that agree with it stay as they are, even if they came into force only
+//             with it. Later proposals are judged as if it did not exist: it neither supports nor opposes them.
+//   restore   Restores the closure and all that were removed with it, each to its former state. One that was removed
+//             alone is restored alone.
+//   accept    Puts the closure into force and quarantines those that cannot be in force together with it. From then on
+//             it is not outvoted, and needs none that agrees. If it contradicts the odometry, it says that the robot
+//             was carried in between (where_carried()).
+//   withdraw  Returns the closure to its state before it was accepted. Those that it quarantined return to theirs,
+//             unless they have changed since or closures in force oppose them now. Those that came into force only by
+//             agreeing with it become candidates.
 ClosureChange apply_edge_edit(storage::EditableGraph& map, std::uint64_t sequence,
                               const storage::SetEdgeStateRecord& record,
                               std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);

@@ -52,7 +52,7 @@ class EdgeEdit : public TwoLaps {
   }
 };
 
-TEST_F(EdgeEdit, OneThatNothingAgreesWithComesIntoForceByAnOperatorsWordAndWithoutItGoesBack) {
+TEST_F(EdgeEdit, AnOperatorAcceptsALoneClosureAndWithdrawsThat) {
   propose(62);
   const auto before = standings();
   const storage::MapHash map_before = storage::hash_map(drive_.map());
@@ -80,7 +80,7 @@ TEST_F(EdgeEdit, OneThatNothingAgreesWithComesIntoForceByAnOperatorsWordAndWitho
   EXPECT_EQ(refusal(closure(62).id, EdgeAction::kWithdraw).reason(), Reason::WRONG_STATE);
 }
 
-TEST_F(EdgeEdit, AnOperatorsWordOutvotesASetAndIsOutvotedByNone) {
+TEST_F(EdgeEdit, AnOperatorsAcceptanceOutvotesASetAndIsNeverOutvoted) {
   for (const std::uint32_t query : {66, 68, 70}) propose_wrongly(query);
   propose(62);
   EXPECT_EQ(closure(62).reason, Reason::INCONSISTENT);
@@ -105,7 +105,7 @@ TEST_F(EdgeEdit, AnOperatorsWordOutvotesASetAndIsOutvotedByNone) {
   expect_derived_facts_hold();
 }
 
-TEST_F(EdgeEdit, WhatTheWordPutOutStaysOutWhereOthersStandAgainstItNow) {
+TEST_F(EdgeEdit, AfterAWithdrawalClosuresThatOthersOpposeStayQuarantined) {
   for (const std::uint32_t query : {64, 66}) propose_wrongly(query);
   propose(62);
   edit(closure(62).id, EdgeAction::kAccept);
@@ -118,7 +118,7 @@ TEST_F(EdgeEdit, WhatTheWordPutOutStaysOutWhereOthersStandAgainstItNow) {
   for (const std::uint32_t query : {64, 66}) EXPECT_EQ(state(query), storage::EdgeState::kQuarantined) << query;
 }
 
-TEST_F(EdgeEdit, ARemovalThatWasShownTakesNothingElseOut) {
+TEST_F(EdgeEdit, ARemovalIsRefusedIfItWouldRemoveOtherClosuresThanShown) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   ASSERT_EQ(state(64), storage::EdgeState::kAccepted);
   const EdgeId named = closure(62).id;
@@ -144,7 +144,7 @@ TEST_F(EdgeEdit, ARemovalThatWasShownTakesNothingElseOut) {
   EXPECT_EQ(state(66), storage::EdgeState::kRemoved);
 }
 
-TEST_F(EdgeEdit, OneThatIsRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {
+TEST_F(EdgeEdit, AClosureRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {
   for (const std::uint32_t query : {62, 64, 66, 68}) propose(query);
   const auto before = standings();
   const storage::MapHash map_before = storage::hash_map(drive_.map());
@@ -171,7 +171,7 @@ TEST_F(EdgeEdit, OneThatIsRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {
   expect_derived_facts_hold();
 }
 
-TEST_F(EdgeEdit, WhatWasRemovedAloneStaysOutWhenTheSetGoesAndComesBack) {
+TEST_F(EdgeEdit, AClosureRemovedAloneStaysRemovedWhenItsSetIsRestored) {
   for (const std::uint32_t query : {62, 64, 66}) propose(query);
   const auto before = standings();
   edit(closure(64).id, EdgeAction::kRemoveAlone);
@@ -189,7 +189,7 @@ TEST_F(EdgeEdit, WhatWasRemovedAloneStaysOutWhenTheSetGoesAndComesBack) {
   EXPECT_EQ(standings(), before);
 }
 
-TEST_F(EdgeEdit, TheLastOneThatAgreedMayBeRemovedAlone) {
+TEST_F(EdgeEdit, TheLastAgreeingClosureMayBeRemovedAlone) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   edit(closure(64).id, EdgeAction::kRemoveAlone);
   EXPECT_EQ(state(62), storage::EdgeState::kAccepted);
@@ -201,7 +201,7 @@ TEST_F(EdgeEdit, TheLastOneThatAgreedMayBeRemovedAlone) {
   EXPECT_EQ(closure(64).reason, Reason::CONSISTENT);
 }
 
-TEST_F(EdgeEdit, OneInForceIsHeldThereAndLetGoAgain) {
+TEST_F(EdgeEdit, AClosureInForceIsHeldThereByAnOperatorUntilWithdrawn) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   const auto before = standings();
   const storage::MapHash map_before = storage::hash_map(drive_.map());
@@ -217,7 +217,7 @@ TEST_F(EdgeEdit, OneInForceIsHeldThereAndLetGoAgain) {
   EXPECT_EQ(state(64), storage::EdgeState::kAccepted);
 }
 
-TEST_F(EdgeEdit, RemovedAndRestoredItIsStillDecided) {
+TEST_F(EdgeEdit, ARestoredClosureIsStillAcceptedByTheOperator) {
   propose(62);
   edit(closure(62).id, EdgeAction::kAccept);
   const storage::MapHash decided = storage::hash_map(drive_.map());
@@ -231,7 +231,7 @@ TEST_F(EdgeEdit, RemovedAndRestoredItIsStillDecided) {
   EXPECT_EQ(closure(62).reason, Reason::LONE);
 }
 
-TEST_F(EdgeEdit, OneThatWasTakenOutMayBeAcceptedAndIsOutAgainWithoutTheWord) {
+TEST_F(EdgeEdit, ARemovedClosureMayBeAcceptedAndIsRemovedAgainWhenWithdrawn) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   edit(closure(62).id, EdgeAction::kRemove);
   EXPECT_EQ(state(64), storage::EdgeState::kRemoved);
@@ -244,7 +244,7 @@ TEST_F(EdgeEdit, OneThatWasTakenOutMayBeAcceptedAndIsOutAgainWithoutTheWord) {
   for (const std::uint32_t query : {62, 64}) EXPECT_EQ(closure(query).reason, Reason::CONSISTENT) << query;
 }
 
-TEST_F(EdgeEdit, WordsThatContradictEachOtherAreRefused) {
+TEST_F(EdgeEdit, AcceptancesThatContradictEachOtherAreRefused) {
   propose(62);
   propose_wrongly(66);
   for (const std::uint32_t query : {72, 74}) propose_wrongly(query);
@@ -261,7 +261,7 @@ TEST_F(EdgeEdit, WordsThatContradictEachOtherAreRefused) {
   edit(closure(72).id, EdgeAction::kRestore);
 }
 
-TEST_F(EdgeEdit, WhatKnowsNoMetresIsRefusedByName) {
+TEST_F(EdgeEdit, ClosuresWithoutMetresAreRefused) {
   for (const auto& [query, verification] :
        {std::pair{62u, storage::Verification::kEpipolar}, std::pair{64u, storage::Verification::kNone},
         std::pair{66u, storage::Verification::kImported}}) {
@@ -275,7 +275,7 @@ TEST_F(EdgeEdit, WhatKnowsNoMetresIsRefusedByName) {
   EXPECT_TRUE(refusal(closure(66).id, EdgeAction::kAccept).ok());
 }
 
-TEST_F(EdgeEdit, EdgesOfTheGraphThatTakeOverAreAmongWhatChanges) {
+TEST_F(EdgeEdit, ClosuresThatBecomeEdgesInsteadAreAmongTheChanges) {
   for (const std::uint32_t query : {62, 64, 66}) propose(query);
   std::vector<EdgeId> edges, binding;
   for (const auto& [id, standing] : standings()) (standing.in_graph ? edges : binding).push_back(id);
@@ -289,7 +289,7 @@ TEST_F(EdgeEdit, EdgesOfTheGraphThatTakeOverAreAmongWhatChanges) {
   EXPECT_EQ(std::count_if(changes.begin(), changes.end(), goes), 1);
 }
 
-TEST_F(EdgeEdit, AProposalSaysWhatItWouldChangeToo) {
+TEST_F(EdgeEdit, ADryRunOfAProposalTellsItsChanges) {
   propose(62);
   const auto proposal = *true_closure(drive_.map(), world_, 64, kLap);
   const storage::MapState& state = drive_.map().state();
@@ -320,9 +320,9 @@ TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {
   EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
 }
 
-// Two words contradict each other however far apart their views are: the one says that the robot was carried where it
-// drove by the other.
-TEST(EdgeEditOfARide, AWordThatDeniesAnotherIsRefused) {
+// Two acceptances may contradict each other however far apart their frames are: by one the robot was carried, and by
+// the other it drove there.
+TEST(EdgeEditOfARide, AnAcceptanceThatDeniesAnAcceptedRideIsRefused) {
   constexpr std::uint32_t kFrames = 300, kCarried = 100;
   place::HandMadeGraph graph;
   graph.add_session(1, {300, 160, 120, 0.1, 320, 240});

@@ -72,7 +72,7 @@ class LaterExtensions : public ::testing::Test {
   const std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
 };
 
-TEST_F(LaterExtensions, StayThroughRelaxationEditsCommitsAndStarts) {
+TEST_F(LaterExtensions, SurviveRelaxationEditsCommitsAndRestarts) {
   {
     PointsDrive drive(engine_);
     expect_all(drive.map());
@@ -96,7 +96,7 @@ TEST_F(LaterExtensions, StayThroughRelaxationEditsCommitsAndStarts) {
   EXPECT_EQ(drive.map().session(kDriveSession)->state, storage::SessionState::kFrozen);
 }
 
-TEST_F(LaterExtensions, CountForTheHashButWhatOnlyTellsHowTheMapCameAbout) {
+TEST_F(LaterExtensions, AreHashedUnlessTheyOnlyTellHowTheMapCameAbout) {
   PointsDrive drive(engine_);
   storage::Map& map = drive.map();
   const storage::MapHash hash = storage::hash_map(map);

@@ -11,7 +11,7 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::chrono::milliseconds kAskAgain{200};  // after a failure
+constexpr std::chrono::milliseconds kAskAgain{200};  // between two attempts after a failure
 
 std::size_t queue_bytes(const storage::JournalRecord& record) {
   std::size_t bytes = sizeof(storage::JournalRecord);
@@ -33,7 +33,7 @@ JournalWriter::JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint6
       one_at_a_time_(one_at_a_time),
       on_durable_(std::move(on_durable)),
       durable_(engine_->last_journal_sequence()),
-      settled_(durable_),
+      finished_(durable_),
       thread_([this] { run(); }) {}
 
 JournalWriter::~JournalWriter() { stop(); }
@@ -54,7 +54,7 @@ void JournalWriter::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     wake_.wait(lock, [&] {
-      const bool turn = !one_at_a_time_ || settled_ >= durable_;
+      const bool turn = !one_at_a_time_ || finished_ >= durable_;
       return (turn && !queue_.empty()) || stopping_ || !health_.ok();
     });
     if (!health_.ok()) {
@@ -70,7 +70,7 @@ void JournalWriter::run() {
       set_health(now);
       continue;
     }
-    // What has not had its turn would come before what follows from the record that has it.
+    // Written now, the queue would precede what still follows from the record that is being applied.
     if (stopping_ && one_at_a_time_) {
       std::vector<Queued> left = std::exchange(queue_, {});
       lock.unlock();
@@ -127,7 +127,7 @@ void JournalWriter::refuse(std::vector<Queued> group, const Status& why) {
   }
 }
 
-// With the lock.
+// Call with mutex_ held.
 void JournalWriter::set_health(const Status& status) {
   if (status.ok() != health_.ok()) {
     if (status.ok())
@@ -148,9 +148,9 @@ Result<std::uint64_t> JournalWriter::append_follow_up(const storage::JournalReco
   return sequence;
 }
 
-void JournalWriter::settled(std::uint64_t sequence) {
+void JournalWriter::finished(std::uint64_t sequence) {
   const std::lock_guard lock(mutex_);
-  settled_ = std::max(settled_, sequence);
+  finished_ = std::max(finished_, sequence);
   wake_.notify_all();
 }
 

@@ -1,6 +1,6 @@
-// The journal's only writer: group commit without timers. Whatever queues while one append is being made durable goes
-// into the next. After an append that failed nothing is taken until the journal says that it would be, which is asked
-// five times a second: the caller keeps what it has, and order is kept.
+// The journal's only writer: group commit without timers. Records that queue while one append is being made durable go
+// into the next. After an append has failed, the queue is refused and nothing is taken until the engine, which is asked
+// five times a second, would take records again. So callers keep what was refused, and no record overtakes another.
 #pragma once
 
 #include <condition_variable>
@@ -17,7 +17,7 @@
 
 namespace relmap::map {
 
-// A record with its place in the journal. `bytes` stay charged to Share::kQueues until release().
+// A record with its sequence in the journal. Its receiver releases `bytes`, which are charged to Share::kQueues.
 struct DurableRecord {
   std::uint64_t sequence = 0;
   storage::JournalRecord record;
@@ -31,19 +31,18 @@ class JournalWriter {
   // Called from the writer's thread with each durable group, in order, before their `done`.
   using OnDurable = std::function<void(std::vector<DurableRecord>)>;
 
-  // `one_at_a_time`: groups of one record, the next only after settled(sequence) of the one before (deterministic
-  // mode).
+  // `one_at_a_time` (deterministic mode): writes groups of one record, each only after finished() of the one before.
   JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch, std::shared_ptr<storage::Budget> budget,
                 bool one_at_a_time, OnDurable on_durable);
   ~JournalWriter();
 
-  // BUDGET_EXCEEDED: the queue is full; SHUTTING_DOWN; what health() says. Otherwise `done` is called once, from the
-  // writer's thread: records become durable in the order in which they were submitted, or not at all.
+  // Queues a record. BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN, or health(); otherwise `done` is called once,
+  // from the writer's thread. Records become durable in the order in which they were submitted, or not at all.
   Status submit(storage::JournalRecord record, Done done);
 
-  // Everything that follows from record `sequence` has been applied; deterministic mode only.
-  void settled(std::uint64_t sequence);
-  // Appends at once, from the worker, between a group and its settled(); deterministic mode only.
+  // Deterministic mode: tells that record `sequence` and everything that follows from it has been applied.
+  void finished(std::uint64_t sequence);
+  // Deterministic mode: appends at once, from the worker, between a group and its finished().
   Result<std::uint64_t> append_follow_up(const storage::JournalRecord& record);
 
   std::uint64_t durable_through() const;
@@ -77,7 +76,7 @@ class JournalWriter {
   bool writing_ = false;
   bool stopping_ = false;
   std::uint64_t durable_ = 0;
-  std::uint64_t settled_ = 0;
+  std::uint64_t finished_ = 0;
   Status health_;
   std::thread thread_;
 };

@@ -13,17 +13,17 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::uint32_t kMaxSteps = 300;     // of a stretch, each way
-constexpr std::uint32_t kMinCompared = 150;  // of pictures: some five of them
+constexpr std::uint32_t kMaxSteps = 300;     // length of a stretch in each direction
+constexpr std::uint32_t kMinCompared = 150;  // parts of pictures: those of about five pictures
 constexpr std::uint32_t kMinChanged = 4;
-constexpr std::size_t kMaxOthers = 8;  // stretches that one is taken for at once
-constexpr double kAnother = 0.02;      // share of what is compared that changes at a place that looks alike, at least
-constexpr double kTheSame = 0.015;     // and at one that is the same, at most
+constexpr std::size_t kMaxOthers = 8;  // other stretches that are examined
+constexpr double kAnother = 0.02;      // above this share of changed parts, it is a place that looks alike
+constexpr double kTheSame = 0.015;     // up to this share, it is the same place
 
-// How long the robot has stood still in one go, followed step by step.
+// How long the robot has stood still without interruption, followed step by step.
 class Standing {
  public:
-  // Whether it has been for kMinRideSeconds by now.
+  // Adds a step; returns whether the robot has stood for kMinRideSeconds by now.
   bool is_stop(const storage::Edge& motion) {
     stood_s_ = stood(motion) ? stood_s_ + double{motion.standing_s} : 0;
     return stood_s_ >= kMinRideSeconds;
@@ -34,10 +34,10 @@ class Standing {
   double stood_s_ = 0;
 };
 
-// The frame after the last stop before `frame`, back to `earliest`; nullopt: it did not stop, nor does motion end.
+// The frame after the last stop before `frame`, or where motion begins; nullopt if neither is found back to `earliest`.
 std::optional<std::uint32_t> alighted(const storage::Graph& graph, FrameId frame, std::uint32_t earliest) {
   Standing standing;
-  std::uint32_t moving = frame.index;  // the last frame, going back, before which it was not standing
+  std::uint32_t moving = frame.index;  // going back, the last frame that the robot did not stand before
   for (FrameId at = frame; at.index > earliest;) {
     const auto hot = graph.hot(at);
     const storage::Edge* motion = hot ? motion_to(*hot) : nullptr;
@@ -49,10 +49,10 @@ std::optional<std::uint32_t> alighted(const storage::Graph& graph, FrameId frame
   return std::nullopt;
 }
 
-// The last frame before the robot stops after `frame`, up to `latest`.
+// The last frame before the first stop after `frame`, or where motion ends; at most `latest`.
 std::uint32_t boards(const storage::Graph& graph, FrameId frame, std::uint32_t latest) {
   Standing standing;
-  std::uint32_t moving = frame.index;  // the last frame after which it was not standing
+  std::uint32_t moving = frame.index;  // the last frame that the robot did not stand after
   for (FrameId at = frame; at.index < latest;) {
     const auto next = place::next_of(graph, at);
     const auto hot = next ? graph.hot(*next) : nullptr;
@@ -71,7 +71,8 @@ storage::FrameRange stretch_round(const storage::Graph& graph, FrameId frame) {
           boards(graph, frame, frame.index + kMaxSteps)};
 }
 
-// Whether it takes a stretch of its session for another one. What was outvoted, or is of several places, does not.
+// Whether the closure says that two stretches of its session are the same place. Closures that were outvoted, or are
+// ambiguous, do not.
 bool says_same(const storage::Edge& edge) {
   const bool believed =
       edge.state == storage::EdgeState::kAccepted || edge.reason == Reason::LONE || edge.reason == Reason::LOOKS_ALIKE;
@@ -80,7 +81,7 @@ bool says_same(const storage::Edge& edge) {
          !contradicts_odometry(edge);
 }
 
-// Calls `visit` with each closure of queries within a stretch that takes it for another one of the same session.
+// Calls `visit` with each says_same() closure of the queries in a stretch.
 template <typename Visit>
 void visit_closures(const storage::Graph& graph, const storage::FrameRange& queries, const Visit& visit) {
   for (std::uint32_t index = queries.first; index <= queries.last; ++index) {
@@ -103,7 +104,7 @@ SameStretch between(const storage::Graph& graph, const storage::FrameRange& now,
   return same;
 }
 
-// Whether what takes the later of two stretches for the earlier one is refused, for they look different.
+// Whether a closure between the two stretches is refused as a look-alike.
 bool are_told_apart(const storage::Graph& graph, const storage::FrameRange& a, const storage::FrameRange& b) {
   bool refused = false;
   visit_closures(graph, a.first > b.first ? a : b, [&](const storage::Edge& edge) {

@@ -21,7 +21,7 @@ storage::ClosureProposalRecord seen_with(storage::ClosureProposalRecord proposal
   return proposal;
 }
 
-TEST(LookAlike, AFloorWhereSomethingIsDifferentAllAlongIsTakenBack) {
+TEST(LookAlike, AFloorWithDifferencesAllAlongIsTakenBack) {
   RiddenDrive drive(kBeyond);
   std::uint32_t in_force = 0, i = kLap + 1;
   for (; i < kLap + kBeyond; ++i) {
@@ -39,21 +39,21 @@ TEST(LookAlike, AFloorWhereSomethingIsDifferentAllAlongIsTakenBack) {
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
-TEST(LookAlike, WhatIsAsItWasIsBelievedBehindAStop) {
+TEST(LookAlike, AnUnchangedPlaceIsAcceptedBehindAStop) {
   RiddenDrive drive(kBeyond);
   for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i)
     drive.propose(seen_with(drive.as_driven(i), 30, i % 10 == 0 ? 1 : 0));
   EXPECT_EQ(drive.map().state().closures_accepted, kBeyond - 1);
 }
 
-TEST(LookAlike, APlaceMayChangeWhereTheRobotSawAllItsWay) {
+TEST(LookAlike, APlaceMayHaveChangedIfTheRobotDidNotStop) {
   RiddenDrive drive(kBeyond, 1);
   for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i) drive.propose(seen_with(drive.as_driven(i), 30, 6));
   EXPECT_EQ(drive.map().state().closures_accepted, kBeyond - 1);
   EXPECT_THAT(weigh_look_alikes(drive.map(), drive.closure_of(kLap + 9)).place.closures, IsEmpty());
 }
 
-TEST(LookAlike, MoreThatIsAsItWasBringsAllOfThemBack) {
+TEST(LookAlike, EnoughUnchangedPartsBringARefusedStretchBack) {
   RiddenDrive drive(60);
   for (std::uint32_t i = kLap + 1; i < kLap + 26; ++i) drive.propose(seen_with(drive.as_driven(i), 40, 1));
   ASSERT_EQ(drive.closure_of(kLap + 25).reason, Reason::LOOKS_ALIKE);
@@ -67,7 +67,7 @@ TEST(LookAlike, MoreThatIsAsItWasBringsAllOfThemBack) {
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
-TEST(LookAlike, WhatAnOperatorPutIntoForceStays) {
+TEST(LookAlike, AStretchThatAnOperatorAcceptedStaysInForce) {
   RiddenDrive drive(kBeyond);
   for (std::uint32_t i = kLap + 1; i < kLap + 10; ++i) drive.propose(seen_with(drive.as_driven(i), 30, 2));
   const EdgeId id = drive.closure_of(kLap + 3).id;
@@ -81,9 +81,9 @@ TEST(LookAlike, WhatAnOperatorPutIntoForceStays) {
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
-// The second stretch is a floor that looks like the first one's, and is told from it; the third is the first again, and
-// shows little that would tell it from the second. It cannot be both.
-TEST(LookAlike, OfTwoPlacesThatAreToldApartAThirdIsTheOneThatItIsMoreLike) {
+// The second stretch is a floor that looks like the first and is told apart from it. The third is the first again, and
+// differs little from the second. It cannot be both.
+TEST(LookAlike, OfTwoLookAlikesTheLessChangedOneIsAccepted) {
   constexpr std::uint32_t kHalts = 96;
   RiddenDrive drive(kBeyond, 20, {kHalts});
   for (std::uint32_t k = 0; k < 20; ++k) drive.propose(seen_with(drive.as_driven(55 + k, 5 + k), 30, 2));

@@ -21,8 +21,8 @@ namespace relmap::map {
 
 namespace {
 
-constexpr double kWorthVerifying = 0.05;  // probability of a place
-constexpr std::size_t kMaxVerified = 4;   // places a query
+constexpr double kWorthVerifying = 0.05;  // minimum probability of a place
+constexpr std::size_t kMaxVerified = 4;   // places per query
 constexpr std::size_t kMinBindings = 5;   // fewer are not worth a record
 
 // An older frame that looks the same way from nearly the same position, reached through an accepted closure.
@@ -74,13 +74,13 @@ std::optional<FrameId> step_back(const storage::Graph& graph, FrameId frame, con
   return std::nullopt;
 }
 
-// Whether a verification of the older view, or a frame beside it, finds the query about where the map has it.
+// Whether the verification with the older view, or a frame next to it, places the query about where the map has it.
 bool stands_at(const storage::Graph& view, const place::OlderView& older, const place::VerifiedPlace& found) {
   const auto T_older_match = place::way_beside(view, older.frame, found.match, place::kViewReach);
   return T_older_match && place::says_the_same(older.T_frame_query.inverse() * *T_older_match * found.T_match_query);
 }
 
-// `more` where `bindings` has nothing for the same track or landmark yet.
+// Appends those of `more` whose track and landmark `bindings` does not contain yet.
 void add_new(std::vector<storage::ProposedBinding>& bindings, const std::vector<storage::ProposedBinding>& more) {
   for (const storage::ProposedBinding& candidate : more) {
     const bool known = std::any_of(bindings.begin(), bindings.end(), [&](const storage::ProposedBinding& b) {
@@ -126,7 +126,7 @@ storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::Pi
   place::Reobservation again = place::reobserve(view, pictures, frame, standpoints, recent);
   proposal.uniqueness = uniqueness;
   if (uniqueness.known) {
-    // Of the pass that the closure is made with, which may be an older one.
+    // Changes are counted against the pass that the closure is made with, which may be an older one.
     const place::Standpoint& older = standpoints.back();
     const place::Changes there = place::changes(
         standpoints.size() == 1 ? again.sought : place::reobserve(view, pictures, frame, {&older, 1}, recent).sought,
@@ -176,7 +176,7 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
   place::TrialLimits limits{.max_trials = kMaxVerified, .min_probability = kWorthVerifying, .skip_mono = true};
   (void)trials.run(answer.candidates, limits);
   const std::size_t answers = trials.size();
-  // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
+  // Also tries places that look like the best one: they are no answer, but tell whether the best one is unique.
   if (const auto best = trials.best()) {
     limits.min_probability = 0;
     (void)trials.run(place::look_alikes(view, places, trials.all()[*best].frame, {&own_past, 1}), limits);

@@ -1,5 +1,5 @@
-// What is done for each keyframe beside the worker, on a view: recognise the place, verify it by geometry, find
-// re-observations. The outcome is journal records; the map itself is not touched.
+// The lookup of a keyframe, made on a view beside the worker: recognises the place, verifies it by geometry and finds
+// re-observations. The outcome is journal records; the map itself is not changed.
 #pragma once
 
 #include <optional>
@@ -13,15 +13,16 @@
 
 namespace relmap::map {
 
-// Frames of a session from `first_recent()` on are too near to the query in its own past to be a recognition: within
-// 20 odometry edges or 10 s; in a mono session, which has no edges, within 20 consecutive frames (docs/method.md, 7).
-// More than 1,000 edges back nothing is, whatever the clock says.
+// Index of the query's oldest recent frame. It and later frames of the session are too near to the query in its own
+// past to count as recognition. Recent is within 20 odometry edges, or within 10 s but at most 1,000 edges; in a mono
+// session, which has no edges, consecutive frames count instead (docs/method.md, 7).
 inline constexpr std::uint32_t kRecentEdges = 20;
 inline constexpr std::uint32_t kMaxRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const storage::Graph& graph, FrameId query);
 
-// A keyframe whose picture fits another camera than its session's, or than that of the session whose place it shows.
+// A keyframe that shows a place but fits another calibration: its session's camera, or that of the place's session, is
+// not as calibrated.
 struct CameraContradiction {
   SessionNumber with = 0;  // the session whose place it shows
   Status what;             // WRONG_CALIBRATION, with what would fit
@@ -32,18 +33,20 @@ struct Lookup {
   std::optional<CameraContradiction> contradiction;  // then there are no records
 };
 
-// A function of the view, the index and the frame; `pictures` spares it some decoding. Nothing for a frame of a mono
-// session: what it recognises comes without metres, and would be no edge (Map.MatchImage tells).
+// Looks up a frame: a function of the view, the index and the frame, with `pictures` as cache of decoded pictures.
+// Returns nothing for a frame of a mono session, since its closures would have no metres and could not be edges
+// (Map.MatchImage tells what such a frame recognises).
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
                FrameId frame);
 
-// verify_place() of what `frame` saw, with a seed of its own.
+// verify_place() for what `frame` saw, with a random seed that depends on the frame alone.
 Result<place::VerifiedPlace> verify_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,
                                           FrameId match);
 
-// The proposal that comes of a place where geometry found `frame`: refined where an older view of the same place is
-// verified, too, with all that is seen again there. `query`: what the frame saw. Its appearance has not been asked:
-// its probability is the caller's to set. To what is known of its uniqueness is added what landmarks tell.
+// Makes a proposal of a place that geometry verified for `frame`. If an older view of the place verifies too, the
+// closure is made with that view. Bindings of everything seen again are added. `query` is what the frame saw; frames of
+// its session from `recent` on do not count. If `uniqueness` is known, changes of old landmarks are added to it. The
+// caller sets `probability`, which appearance tells.
 storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::PictureCache& pictures,
                                            const place::QueryPicture& query, FrameId frame, place::VerifiedPlace found,
                                            const storage::Uniqueness& uniqueness, std::uint32_t recent);

@@ -10,10 +10,9 @@ namespace relmap::map {
 
 namespace {
 
-// What an open frame costs: here, and in the map's state.
-constexpr std::size_t kBytesPerFrame = 128;
-constexpr int kViews = 3;                        // that are tried in a row
-constexpr std::chrono::milliseconds kRetry{20};  // until the memory that a view needs may be there
+constexpr std::size_t kBytesPerFrame = 128;      // of an open frame, here and in the map's state
+constexpr int kViews = 3;                        // attempts in a row, each on a new view
+constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memory
 
 }  // namespace
 

@@ -1,7 +1,8 @@
 // Frames that wait to be looked up (lookup.h), and the thread that looks them up.
 //
-// A frame is open from when it is applied until all that its lookup found is durable. What is open when the map is
-// committed, or when the daemon is killed, is looked up after the next start: a proposal made twice changes nothing.
+// A frame is open from when it is applied until everything that its lookup found is durable. Frames that are open when
+// the map is committed, or when the daemon is killed, are looked up after the next start. A proposal made twice changes
+// nothing.
 #pragma once
 
 #include <condition_variable>
@@ -26,18 +27,18 @@ class LookupQueue {
   // Returns what the lookup of the frame found. Throws StatusError VIEW_EXPIRED if its view was cut off under memory
   // pressure: the lookup is tried again. After any other exception the frame stays open until the next start.
   using LookUp = std::function<std::vector<storage::JournalRecord>(FrameId)>;
-  // Returns true once the record is durable, false if the daemon stops before.
+  // Waits until the record is durable. False if the daemon stops before.
   using Journal = std::function<bool(const storage::JournalRecord&)>;
 
   explicit LookupQueue(std::shared_ptr<storage::Budget> budget);
-  // As stop().
+  // Calls stop().
   ~LookupQueue();
   LookupQueue(const LookupQueue&) = delete;
   LookupQueue& operator=(const LookupQueue&) = delete;
 
   // Starts the thread. `on_change` is called by it, without a lock held, whenever waiting() has changed.
   void start(LookUp look_up, Journal journal, std::function<void()> on_change);
-  // Ends the thread after the lookup under way. What is open stays open.
+  // Ends the thread after the present lookup. Open frames stay open.
   void stop();
 
   // Opens the frame and lets the thread look it up.
@@ -45,9 +46,9 @@ class LookupQueue {
   // Opens and closes a frame that the caller looks up itself (deterministic mode).
   void open(FrameId frame);
   void close(FrameId frame);
-  // Closes all, and returns which frames were open.
+  // Closes all open frames and returns them.
   std::set<FrameId> close_all();
-  // Closes the frames of the session whose lookup failed: it is being deleted, and nobody will recognise them.
+  // Closes the session's frames whose lookup failed: the session is being deleted.
   void forget_failed(SessionNumber session);
 
   std::set<FrameId> open_frames() const;
@@ -55,7 +56,7 @@ class LookupQueue {
   // Open frames whose lookup has not failed since the start.
   std::size_t waiting() const;
   bool is_waiting(SessionNumber session) const;
-  // The frames that wait take half of the queues' share of memory: no more keyframes should be taken in.
+  // Whether waiting frames take half of the queues' share of memory, so that no more keyframes should be taken in.
   bool is_full() const;
 
  private:
@@ -70,7 +71,7 @@ class LookupQueue {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<FrameId> queue_;  // for the thread
-  std::set<FrameId> open_;     // those, the one under way, and those that failed
+  std::set<FrameId> open_;     // those queued, the one being looked up, and those that failed
   std::set<FrameId> failed_;
   bool stopping_ = false;
   std::thread thread_;

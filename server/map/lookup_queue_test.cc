@@ -68,7 +68,7 @@ TEST_F(LookupQueueTest, FramesAreLookedUpInOrderAndClosedOnceWhatWasFoundIsDurab
   EXPECT_EQ(budget_->used(storage::Share::kQueues), 0u);
 }
 
-TEST_F(LookupQueueTest, ALookupWhoseViewsAreCutOffIsTriedUntilItSucceeds) {
+TEST_F(LookupQueueTest, ALookupWhoseViewExpiresIsRepeatedUntilItSucceeds) {
   int left = 7;
   look_up_ = [&](FrameId frame) {
     if (frame == FrameId{1, 0} && left-- > 0) throw StatusError({Reason::VIEW_EXPIRED, "under pressure"});
@@ -82,7 +82,7 @@ TEST_F(LookupQueueTest, ALookupWhoseViewsAreCutOffIsTriedUntilItSucceeds) {
   EXPECT_TRUE(queue_.open_frames().empty());
 }
 
-TEST_F(LookupQueueTest, ALookupThatFailsHoldsNothingUpAndStaysOpenForTheNextStart) {
+TEST_F(LookupQueueTest, AFailedLookupDoesNotBlockOthersAndStaysOpenForTheNextStart) {
   look_up_ = [](FrameId frame) {
     if (frame.index == 0) throw StatusError({Reason::DATA_LOSS, "a damaged part"});
     if (frame.index == 1) throw std::runtime_error("anything else");
@@ -109,7 +109,7 @@ TEST_F(LookupQueueTest, FramesThatFailedDoNotFillTheQueue) {
   EXPECT_FALSE(queue_.is_full());
 }
 
-TEST_F(LookupQueueTest, WhatIsNotDurableWhenItStopsStaysOpen) {
+TEST_F(LookupQueueTest, AFrameStaysOpenIfItsRecordsAreNotDurableWhenTheQueueStops) {
   journal_takes_ = false;
   queue_.push({1, 0});
   start();

@@ -155,7 +155,7 @@ class LookUpAgain : public ::testing::Test {
   std::vector<std::uint32_t> words_;
 };
 
-TEST_F(LookUpAgain, ThePlaceIsWhereMostFits) {
+TEST_F(LookUpAgain, ThePlaceWithTheBestFitIsProposed) {
   // Somewhere looks the same by its words, and thirty of its features would fit.
   add_frame({2, 0}, {picture_.begin(), picture_.begin() + 30}, 200);
   ASSERT_TRUE(places_.add({2, 0}, words_).ok());
@@ -169,7 +169,7 @@ TEST_F(LookUpAgain, ThePlaceIsWhereMostFits) {
   EXPECT_EQ(proposal().match.session, 1u);
 }
 
-TEST_F(LookUpAgain, AnOlderViewThatContradictsTheMapIsNotTaken) {
+TEST_F(LookUpAgain, AnOlderViewThatContradictsTheMapIsNotUsed) {
   std::vector<std::size_t> points;
   add_frame({2, 0}, street_.picture(street_.pose(kSeenAgain), true, points), 200);
   ASSERT_TRUE(places_.add({2, 0}, words_).ok());

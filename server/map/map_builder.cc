@@ -14,11 +14,11 @@ namespace relmap::map {
 
 namespace {
 
-// 10 m and a radian: as good as nothing, and still a prior that keeps the solution unique.
+// Standard deviations of 10 m and a radian: practically no information, but enough to keep the solution unique.
 const Matrix6 kUnknownStep = Vector6(100, 100, 100, 1, 1, 1).asDiagonal();
 
-// The edge from the session's last frame to a new one. A step that the robot did not see, or that spans keyframes that
-// never came, is a prior edge with the covariance of as many steps.
+// The edge from the session's last frame to a new one. It is a prior edge if the robot did not see the step, or if
+// keyframes in between are missing; the covariance is then multiplied by the number of steps.
 storage::Edge motion_edge(FrameId previous, const storage::FrameHot& previous_hot, FrameId id,
                           const Keyframe& keyframe) {
   storage::Edge edge;
@@ -104,8 +104,8 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
   if (!decoded.ok() || !session) return {};
   Keyframe& keyframe = *decoded;
   const FrameId id{record.session, keyframe.sequence};
-  if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // settled already
-  if (storage::is_going(*session))                                            // it was on its way
+  if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // taken in or skipped before
+  if (storage::is_going(*session))  // deletion began while the record was queued
     return apply_record(sequence,
                         storage::RefusalRecord{record.session, id.index, record.crc, Reason::SESSION_DELETED});
 
@@ -117,7 +117,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
   hot.T_odom_frame = keyframe.T_odom_frame;
   hot.appearance_count = static_cast<std::uint32_t>(keyframe.appearance.size());
   hot.unknown = std::move(keyframe.unknown);
-  // How one camera moved is not known in metres: its frames stand unconnected, each by itself.
+  // The motion of a single camera has no metric scale, so frames of a mono session have no edges.
   std::optional<FrameId> previous;
   if (session->frames > 0 && session->header.camera.is_stereo()) {
     previous = FrameId{record.session, session->last};
@@ -127,7 +127,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
   map_.add_frame(id, std::move(hot), {}, cold_part(keyframe, words_));
   if (previous) insert_sorted(map_.edit_hot(*previous).incoming, EdgeId{id, 0});
 
-  // A track goes on while the landmark that it stands for can still be reached; then it starts a new one.
+  // A track continues its landmark while a path leads to it; after that it starts a new one.
   PathsTo paths(map_, id);
   storage::FrameWarm& warm = map_.edit_warm(id);
   storage::FrameHot& own = map_.edit_hot(id);
@@ -151,7 +151,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
   edited.last = id.index;
   edited.last_time_us = keyframe.time_us;
   edited.next_sequence = id.index + 1;
-  // A keyframe opens its session again: one that was on its way to a frozen session does so for when that is thawed.
+  // A keyframe opens its session again. If the session was frozen meanwhile, it will be open once it is thawed.
   if (edited.state == storage::SessionState::kEnded) edited.state = storage::SessionState::kOpen;
   edited.before_frozen = storage::SessionState::kOpen;
   ++edited.frames;
@@ -226,7 +226,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::IdleWorkRecord& r
 Applied MapBuilder::apply_record(std::uint64_t, const storage::SetSessionStateRecord& record) {
   const auto session = map_.session(record.session);
   if (!session || storage::is_going(*session) || session->state == record.state) return {};
-  // The end of its trajectory neither freezes nor thaws a session.
+  // Ending applies to open sessions only: it neither freezes nor thaws one.
   if (record.state == storage::SessionState::kEnded && session->state != storage::SessionState::kOpen) return {};
   storage::Session& edited = map_.edit_session(record.session);
   const bool thaws = storage::is_frozen(*session) && record.state == storage::SessionState::kOpen;

@@ -1,5 +1,5 @@
-// Applies journal records to the map. Applying is a pure function of the map, the record and its sequence: the same
-// journal gives the same map, bit for bit, killed on the way or not. Work is counted, never timed.
+// Applies journal records to the map. Applying is a pure function of the map, the record and its sequence, so the same
+// journal gives the same map bit for bit, whether the daemon was killed meanwhile or not. Work is counted, never timed.
 #pragma once
 
 #include <cstdint>
@@ -16,23 +16,23 @@
 namespace relmap::map {
 
 struct Applied {
-  std::optional<FrameId> frame;  // a keyframe was taken in
+  std::optional<FrameId> frame;  // the frame that a keyframe became
   ClosureChange closures;
-  std::vector<EdgeChange> edges;  // how edges stand now: of a proposal, and of an operator's edit
+  std::vector<EdgeChange> edges;  // only of closure proposals and an operator's edits
   rba::RbaSummary relaxation;
-  double relax_seconds = 0;  // of wall clock; for statistics only
+  double relax_seconds = 0;  // wall clock, for statistics only
 };
 
-// Used by one thread, the worker.
+// For one thread, the worker.
 class MapBuilder {
  public:
-  // Of loop_edge_spacing and rules only the defaults are for maps that are kept; others are for comparisons.
+  // Maps that are kept use the defaults of `loop_edge_spacing` and `rules`; other values are for comparisons.
   MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaOptions rba,
              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing, ConsistencyRules rules = {});
 
-  // Applies the record and publishes the map, which rounds its estimates: so the next record finds the same map
-  // whether it follows at once or after a restart. A record that no longer fits the map (a proposal for a frame that is
-  // not there) changes nothing.
+  // Applies the record and publishes the map. Publishing rounds the estimates, so the next record finds the same map
+  // whether it follows at once or after a restart. A record that no longer fits the map (for example a proposal for a
+  // frame that has been deleted) changes nothing.
   Applied apply(std::uint64_t sequence, const storage::JournalRecord& record);
 
  private:

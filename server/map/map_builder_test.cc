@@ -63,7 +63,7 @@ TEST(MapBuilder, DerivedFactsStayInStepThroughALapWithClosures) {
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
-TEST(MapBuilder, FramesOfOneCameraStandUnconnected) {
+TEST(MapBuilder, MonoFramesHaveNoEdges) {
   sim::PointsWorldOptions options = laps(30, 60);
   options.appearance = 40;
   const sim::PointsWorld world(options);
@@ -100,17 +100,17 @@ TEST(MapBuilder, DerivedFactsStayInStepInAPlaceThatIsPassedManyTimes) {
   PointsDrive drive;
   drive_laps(drive, world, 320);
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
-  std::size_t settled = 0, most = 0;
+  std::size_t fixed = 0, max_observers = 0;
   for (std::uint32_t i = 0; i < 40; ++i)
     for (const storage::Landmark& landmark : drive.map().hot({kDriveSession, i})->landmarks) {
-      settled += storage::is_settled(landmark.observers);
-      most = std::max(most, landmark.observers.size());
+      fixed += storage::is_settled(landmark.observers);
+      max_observers = std::max(max_observers, landmark.observers.size());
     }
-  EXPECT_GT(settled, 500u);
-  EXPECT_LE(most, storage::kMaxObservers);
+  EXPECT_GT(fixed, 500u);
+  EXPECT_LE(max_observers, storage::kMaxObservers);
 }
 
-TEST(MapBuilder, ASettledPlaceIsUnsettledExactlyWhenItsClosuresAreTakenOut) {
+TEST(MapBuilder, FixedLandmarksAreReleasedExactlyWhenTheirClosuresAreRemoved) {
   const sim::PointsWorld world(laps(260, 40));
   PointsDrive drive;
   drive_laps(drive, world, 260);
@@ -172,7 +172,7 @@ TEST(MapBuilder, LoopEdgesAreSpacedAndOtherClosuresOnlyBind) {
   EXPECT_LE(carrying, 10u);
 }
 
-TEST(MapBuilder, TakingAClosureOutRestoresTheStructureOfARunWithoutIt) {
+TEST(MapBuilder, RemovingAClosureRestoresTheStructureOfARunWithoutIt) {
   const sim::PointsWorld world(laps(80, 60));
   PointsDrive drive;
   drive.drive(world, 80, kAlways);
@@ -187,7 +187,7 @@ TEST(MapBuilder, TakingAClosureOutRestoresTheStructureOfARunWithoutIt) {
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), testing::IsEmpty());
 }
 
-TEST(MapBuilder, AfterAClosureIsTakenOutTheSolutionIsThatOfARunWithoutIt) {
+TEST(MapBuilder, AfterRemovingAClosureTheSolutionIsThatOfARunWithoutIt) {
   const sim::PointsWorld world(laps(80, 60));
   PointsDrive drive, without;
   drive.drive(world, 80, kAlways);
@@ -207,7 +207,7 @@ TEST(MapBuilder, AfterAClosureIsTakenOutTheSolutionIsThatOfARunWithoutIt) {
   EXPECT_LE(solved.radians, 1e-6);
 }
 
-TEST(MapBuilder, WhatWasTakenOutCanBeRestored) {
+TEST(MapBuilder, ARemovedClosureCanBeRestored) {
   const sim::PointsWorld world(laps(75, 60));
   PointsDrive drive;
   drive.drive(world, 75, kAlways);
@@ -252,7 +252,7 @@ TEST(MapBuilder, AGapIsBridgedByAPriorEdge) {
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
-TEST(MapBuilder, ARefusedKeyframeSettlesItsSequenceAndIsCounted) {
+TEST(MapBuilder, ARefusedKeyframeIsSkippedAndCounted) {
   const sim::PointsWorld world(laps(6, 60));
   PointsDrive drive;
   drive.drive(world, 3, kNever);
@@ -292,7 +292,7 @@ TEST(MapBuilder, TheSameJournalGivesTheSameMapWhereverItWasInterrupted) {
   }
 }
 
-// Whoever thaws a session does not say that its robot goes on.
+// Thawing a session does not mean that its robot goes on.
 TEST(MapBuilder, AThawedSessionIsWhatItWasBeforeItWasFrozen) {
   const sim::PointsWorld world(laps(6, 60));
   const auto engine = storage::make_memory_engine();

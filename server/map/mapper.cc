@@ -32,10 +32,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// As relmap-vocab info prints it.
+// The format of relmap-vocab info.
 std::string hexadecimal(std::uint32_t crc) { return spdlog::fmt_lib::format("{:08x}", crc); }
 
-constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitted again
+// Pauses before a record is submitted again.
+constexpr std::chrono::milliseconds kQueueFull{5};
 constexpr std::chrono::milliseconds kDiskFails{200};
 
 storage::WordFunction words_of(const std::shared_ptr<const place::Vocabulary>& vocabulary) {
@@ -84,7 +85,7 @@ struct Mapper::Impl {
   void fail(const std::string& what, const Status& why);
   std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
 
-  // The thread of `lookups`; the worker in deterministic mode.
+  // Lookup thread; in deterministic mode the worker.
   std::vector<storage::JournalRecord> look_up_one(FrameId frame);
   void count_doubts(SessionNumber session, const Lookup& found);
   bool journal_patiently(const storage::JournalRecord& record);
@@ -105,22 +106,22 @@ struct Mapper::Impl {
   std::uint64_t epoch = 0;
   MapIdentity identity;
 
-  // What threads wait for: guarded by `mutex`, and each change is told by `changed`. Declared before the parts below,
-  // which call tell_waiting() until they are destroyed.
+  // The state that threads wait for: guarded by `mutex`, with `changed` notified of each change. Declared before the
+  // parts below, which call tell_waiting() until they are destroyed.
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
   std::deque<DurableRecord> durable;  // waiting for the worker
   std::uint64_t applied = 0;
   bool applying = false;
   bool stopping = false;       // the worker ends when `durable` is empty
-  bool shutting_down = false;  // nothing waits for the disk any more
+  bool shutting_down = false;  // waits for the disk are broken off
   Status storage;
-  std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes;  // by record, the last ones
+  std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes;  // by sequence, the last kRemembered
   Timings timings;
   std::uint64_t relaxations = 0, active_frames = 0;
   std::atomic<bool> failed = false;
 
-  // Before the map, whose threads call them.
+  // Declared before the map, whose threads call them.
   CommitScheduler commits{options.commit_interval, engine, budget, commit_hooks()};
   EditAnnouncer edits;
   ClosureAnnouncer closures;
@@ -128,7 +129,7 @@ struct Mapper::Impl {
   std::unique_ptr<storage::Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
   const std::unique_ptr<place::PlaceIndex> places;  // null without a vocabulary
-  place::PictureCache pictures;                     // of the thread that looks places up
+  place::PictureCache pictures;                     // of the lookup thread
   CameraDoubts doubts;
   LookupQueue lookups{budget};
   BackgroundWork background{options.idle_slice, background_hooks()};
@@ -136,9 +137,9 @@ struct Mapper::Impl {
   SessionRegistry sessions{engine, budget, [this] { return map->view(); },
                            [this](storage::SessionRecord record) { return submit_and_wait(std::move(record)); },
                            [this] { return failed ? health() : Status(); }};
-  std::unique_ptr<JournalWriter> writer;  // after all that its thread calls
+  std::unique_ptr<JournalWriter> writer;  // declared after everything that its thread calls
 
-  bool patient = false;  // worker: it runs, and may wait for the disk
+  bool patient = false;  // the worker is running, and may wait for the disk
   std::thread worker;
   bool stopped = false;
 };
@@ -221,7 +222,7 @@ Status Mapper::Impl::load() {
   return {};
 }
 
-// Nobody is told of an identity that a crash might take back.
+// Gives a new map its identity. It is told only once it is durable, so that a crash cannot take it back.
 void Mapper::Impl::give_identity() {
   storage::MapState& state = map->state();
   identity = state.identity;
@@ -233,7 +234,7 @@ void Mapper::Impl::give_identity() {
     spdlog::warn("robots are not told which map this is, before the next start: {}", committed.to_string());
 }
 
-// Re-applies what the journal holds beyond the last commit. Where it cannot go on, the map is served as far as it got.
+// Re-applies the journal's records after the last commit. If that fails, the map is served as far as it got.
 void Mapper::Impl::recover() {
   const Clock::time_point begun = Clock::now();
   const std::uint64_t committed = map->state().applied_sequence;
@@ -255,12 +256,12 @@ void Mapper::Impl::recover() {
     background.resume(view->pending_frames() > 0);
     find_open_lookups(replayed);
   }
-  // Without all the words, places would be missed in silence.
+  // With some words missing, places would silently not be recognised.
   if (Status indexed = index_known_places(); !indexed.ok()) fail("the words of the map's places", indexed);
 }
 
-// Frames whose lookup may not have been done, or may not have reached the journal. A proposal made twice changes
-// nothing.
+// Opens the frames whose lookup may not have been made, or may not have reached the journal. A proposal made twice
+// changes nothing.
 void Mapper::Impl::find_open_lookups(const Replayed& replayed) {
   if (!recognises_places()) return;
   const std::set<FrameId>& known = map->state().lookups;
@@ -283,7 +284,7 @@ Status Mapper::Impl::index_known_places() {
   const Status scanned = view->scan_words(is_known, [&](FrameId frame, std::span<const std::uint32_t> words) {
     if (lookups.is_open(frame)) return;
     if (!words.empty()) return add_place(frame, words);
-    // A repair leaves no words where they were lost: they are made anew from the features, if there are any.
+    // After a repair a frame may have lost its words. They are computed again from its features, if it has any.
     const auto cold = view->cold(frame);
     if (cold && !cold->appearance.empty()) add_place(frame, vocabulary->words(cold->appearance));
   });
@@ -314,7 +315,7 @@ void Mapper::Impl::start() {
                   [this] { tell_waiting(); });
 }
 
-// Deterministic mode: what an interruption may have left out.
+// Deterministic mode: does what an interruption may have left undone.
 void Mapper::Impl::catch_up() {
   if (failed) return;
   const std::set<FrameId> open = lookups.close_all();
@@ -351,7 +352,7 @@ void Mapper::Impl::work() {
 
 void Mapper::Impl::apply_one(DurableRecord record) {
   if (!failed) apply_and_publish(record.sequence, record.record);
-  if (failed) writer->settled(record.sequence);
+  if (failed) writer->finished(record.sequence);
   budget->release(storage::Share::kQueues, record.bytes);
 }
 
@@ -371,13 +372,13 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::Jour
   if (const auto* change = std::get_if<storage::SetSessionStateRecord>(&record))
     if (const auto session = map->session(change->session)) begin_deletion(*session);
   if (!options.deterministic) return;
-  // When a session's end is said depends on who was there to hear it: nothing that moves may.
+  // When a session's end is recorded depends on when the robot was heard, so it must not trigger relaxation.
   const bool of_session = std::holds_alternative<storage::SetSessionStateRecord>(record);
   const bool look = result.frame && recognises_places();
   follow_up(sequence, look ? result.frame : std::nullopt, of_session ? 0 : DeterministicDriver::kSlices);
 }
 
-// Notes what came of an applied record, and wakes those who wait for it.
+// Notes the outcome of an applied record and wakes the threads that wait for it.
 void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result) {
   background.applied(record, !map->state().pending.empty());
   const std::lock_guard lock(mutex);
@@ -402,11 +403,11 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", outcome.trouble);
   background.forget_relaxation();
   tell_waiting();
-  writer->settled(outcome.last);
+  writer->finished(outcome.last);
 }
 
-// While the disk takes nothing the worker waits with it, and only commits. nullopt: the daemon stops before it does, or
-// has not started yet.
+// Appends from the worker. While the disk takes nothing, the worker waits and only commits. Nullopt if the daemon stops
+// first, or, while it starts, if the disk takes nothing.
 std::optional<std::uint64_t> Mapper::Impl::append_patiently(const storage::JournalRecord& record) {
   for (;;) {
     if (const auto appended = writer->append_follow_up(record); appended.ok()) return *appended;
@@ -417,9 +418,9 @@ std::optional<std::uint64_t> Mapper::Impl::append_patiently(const storage::Journ
   }
 }
 
-// A part of the map could not be read while a record was applied. What is acknowledged stays in the journal and is
-// applied after a restart; until then the map is served as it was last published, and nothing more is taken in or
-// committed.
+// Makes the map read-only, for example because a part of it could not be read while a record was applied. Acknowledged
+// records stay in the journal and are applied after a restart. Until then the map is served as last published, and
+// nothing is taken in or committed.
 void Mapper::Impl::fail(const std::string& what, const Status& why) {
   std::string advice = "start the daemon again when the disk is well";
   if (why.reason() == Reason::DATA_LOSS || why.reason() == Reason::IO_ERROR)
@@ -429,7 +430,7 @@ void Mapper::Impl::fail(const std::string& what, const Status& why) {
   commits.close();
   const std::lock_guard lock(mutex);
   storage = status;
-  failed = true;  // once the reason is there: who sees it is refused by that reason
+  failed = true;  // after `storage`, which is the reason that is given to whoever sees it
   changed.notify_all();
 }
 
@@ -446,7 +447,7 @@ std::vector<storage::JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   Lookup found;
   Status trouble;
   const auto session = view->session(frame.session);
-  if (!session || storage::is_going(*session)) return {};  // nobody will recognise it
+  if (!session || storage::is_going(*session)) return {};  // it is no place any more
   try {
     found = look_up(*view, *places, pictures, frame);
   } catch (const StatusError& error) {
@@ -469,8 +470,8 @@ void Mapper::Impl::count_doubts(SessionNumber session, const Lookup& found) {
       doubts.confirm(session, proposal->match.session);
 }
 
-// Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue, and the disk may take
-// nothing for a while; a proposal waits its turn.
+// Waits until the record is durable, because only then is the lookup done. The queue may be full of robots' keyframes,
+// or the disk may take nothing for a while. False if the daemon stops or the map becomes read-only first.
 bool Mapper::Impl::journal_patiently(const storage::JournalRecord& record) {
   for (;;) {
     auto durable_at = std::make_shared<std::promise<bool>>();
@@ -490,7 +491,7 @@ bool Mapper::Impl::all_done_locked() const {
          lookups.waiting() == 0 && background.done();
 }
 
-// Not ok: why nothing is taken in, or why what is taken in cannot be committed.
+// As MapperStats::storage.
 Status Mapper::Impl::health() const {
   const Status journal = writer->health();
   const std::lock_guard lock(mutex);
@@ -499,10 +500,10 @@ Status Mapper::Impl::health() const {
 
 Status Mapper::Impl::submit(storage::JournalRecord record, Done done) {
   if (failed) return health();
-  // While commits fail, what is dirty cannot leave memory: no more is taken in than fits.
+  // While commits fail, dirty parts cannot leave memory, so no more is taken in than fits.
   if (budget->used(storage::Share::kDirty) > budget->allowance(storage::Share::kDirty))
     if (Status status = health(); !status.ok()) return status;
-  // The queue is the lookups' too; what they find must still fit in.
+  // Lookups share the queue's memory, and what they find must still fit in.
   if (std::holds_alternative<storage::KeyframeRecord>(record) && lookups.is_full())
     return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
   return writer->submit(std::move(record), std::move(done));
@@ -603,7 +604,7 @@ void Mapper::watch_closures(ClosureAnnouncer::Watcher watcher) { impl_->closures
 
 void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
   const std::uint64_t told = impl_->edits.watch(std::move(watcher));
-  // What was told to nobody is in the view that the caller takes next: the worker shows it right after.
+  // The edits that the first watcher was told of may not be published yet; the worker publishes them right after.
   std::unique_lock lock(impl_->mutex);
   while (view()->version() < told && !impl_->failed) impl_->changed.wait_for(lock, std::chrono::milliseconds(1));
 }

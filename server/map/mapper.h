@@ -1,7 +1,8 @@
-// The map at work: journal, worker, lookup. What ingest and RPC handlers talk to.
+// The running map: journal, worker and lookup. Ingest and RPC handlers use this class.
 //
 //   submit() -> journal thread: group commit -> durable, `done` called -> worker thread: applied to the map, relaxed,
-//   published -> lookup thread: place recognition and verification on a view -> closure proposals, submitted in turn.
+//   published -> lookup thread: place recognition and verification on a view -> closure proposals, submitted like
+//   others
 //
 // All methods are thread-safe.
 #pragma once
@@ -28,90 +29,92 @@ namespace relmap::map {
 
 struct MapperOptions {
   rba::RbaOptions rba;
-  // Lookup and idle work at fixed points: the same input gives the same map. Slower: one record at a time.
+  // Makes lookups and idle work at fixed points, so that the same input gives the same map. Slower, since records are
+  // written one at a time.
   bool deterministic = false;
-  bool closures = true;  // off: no place recognition (for "before" measurements)
+  bool closures = true;  // false: no place recognition, to measure what closures improve
   std::chrono::milliseconds commit_interval{1000};
   std::uint64_t idle_slice = 20000;  // counted work per idle record
-  // The data folder: named in messages, and where the place index is kept. Empty: in memory only, within its share.
+  // The data folder. It is named in messages, and holds the files of the place index. Empty: the index is kept in
+  // memory only, within its share.
   std::string folder;
 };
 
 struct MapperStats {
-  std::uint64_t durable_sequence = 0;  // of the journal
+  std::uint64_t durable_sequence = 0;  // journal sequences
   std::uint64_t applied_sequence = 0;
   std::size_t queued = 0;      // records durable but not applied
   std::size_t lookup_lag = 0;  // keyframes applied but not looked up
   std::size_t places = 0;
-  std::size_t places_left_out = 0;   // found no room: they will not be recognised until the next start
+  std::size_t places_left_out = 0;   // for lack of memory; they will not be recognised before the next start
   std::uint64_t pending_frames = 0;  // waiting for relaxation
   std::vector<CameraDoubt> doubts;   // sessions whose pictures contradict their calibration
-  // Of the last 10,000 keyframes: time the worker spent in relax().
+  // Time that the worker spent in relax(), over the last 10,000 keyframes.
   double rba_p50_us = 0, rba_p99_us = 0, rba_max_us = 0;
   double active_frames_mean = 0;
   std::uint64_t rba_solves = 0;
-  // Not ok: why nothing is taken in (READ_ONLY until the next start, anything else until it passes), or why what is
-  // taken in cannot be committed.
+  // Not ok: why nothing is taken in (READ_ONLY lasts until the next start, other reasons until the disk recovers), or
+  // why commits fail.
   Status storage;
 };
 
 class Mapper {
  public:
-  // Takes the engine, loads the map, re-applies the journal, starts the threads. What was opened for reading only, or
-  // cannot be re-applied in full, is served READ_ONLY.
+  // Acquires the engine, loads the map, re-applies the journal and starts the threads. A map that can only be read, or
+  // whose journal cannot be re-applied in full, is served READ_ONLY.
   static Result<std::unique_ptr<Mapper>> open(std::shared_ptr<storage::Engine> engine,
                                               std::shared_ptr<storage::Budget> budget,
                                               std::shared_ptr<const place::Vocabulary> vocabulary,
                                               MapperOptions options);
-  // As stop().
+  // Calls stop().
   ~Mapper();
 
-  // The number of the session with this uuid; a new one is allocated and journalled. CALIBRATION_CHANGED if it began
-  // with another camera or flags.
+  // Returns the number of the session with this uuid; a new session gets a number and is journalled. Fails as
+  // SessionRegistry::begin() does.
   Result<SessionNumber> begin_session(const SessionHeader& header);
 
-  // Queues the record for the journal. `done` is called once, from the journal thread, with its sequence when it is
-  // durable, or with the reason why it is not. At once, without `done`: BUDGET_EXCEEDED when the queue is full,
-  // SHUTTING_DOWN after stop(), and what stats().storage says while the disk takes nothing.
+  // Queues the record for the journal. If the result is OK, `done` is called once, from the journal thread, with the
+  // record's sequence when it is durable, or with the reason why it is not. Otherwise `done` is not called:
+  // BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN after stop(), or stats().storage while the disk takes nothing.
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   Status submit(storage::JournalRecord record, Done done);
   Result<std::uint64_t> submit_and_wait(storage::JournalRecord record);
 
-  // DEADLINE if it is not applied (and visible in view()) by then.
+  // Waits until the record is applied and visible in view(). DEADLINE if it is not by then.
   Status wait_applied(std::uint64_t sequence, std::chrono::steady_clock::time_point deadline) const;
-  // What the record changed of the map's edges: of proposals and edits of closures, the last kRemembered of them.
-  // nullopt: of no other, and of none that was applied long ago.
+  // The changes of edges by a record, known for the last kRemembered closure proposals and edits; otherwise nullopt.
   static constexpr std::size_t kRemembered = 256;
   std::optional<std::vector<EdgeChange>> edge_changes(std::uint64_t sequence) const;
-  // Until everything submitted is applied and looked up, no relaxation is pending, and what is being deleted has gone
-  // (for batch jobs and tests).
+  // Waits until everything submitted is applied and looked up, no relaxation is pending, and deletions are complete
+  // (for batch jobs and tests). DEADLINE if that takes longer.
   Status wait_idle(std::chrono::steady_clock::time_point deadline) const;
 
-  // What is dirty, now; the last journal sequence that is committed then. DEADLINE, and why a commit fails.
+  // Commits everything dirty now and returns the last committed journal sequence. DEADLINE, or why the commit failed.
   Result<std::uint64_t> commit(std::chrono::steady_clock::time_point deadline);
 
-  // Calls `watcher` from now on with every closure that awaits confirmation, comes into force, is taken out or goes
-  // with a session (not with bridges over one: nothing was recognised), and the map in which it did (for the closure's
-  // state), from the worker's thread: it must neither wait nor call back. Recovery repeats nothing. Replaces the
+  // Calls `watcher` from now on with every closure that becomes a lone candidate, comes into force, is taken out or is
+  // deleted with a session, and with the map in which it did. Bridges over deleted sessions are not reported. The call
+  // comes from the worker's thread and must neither wait nor call back. Recovery reports nothing again. Replaces the
   // watcher; an empty function unregisters it. When this returns, the previous watcher is no longer running.
   using ClosureWatcher = std::function<void(const storage::Graph& map, const storage::Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 
-  // As Map::watch_edits(), from the worker's thread. The first watcher is told at once, from the caller's thread, of
-  // all that was edited since the map was opened. Replaces the watcher; an empty function unregisters it. When this
-  // returns, the previous watcher is no longer running.
+  // Calls `watcher` from now on as Map::watch_edits() does, from the worker's thread. The first watcher is also called
+  // at once, from the caller's thread, with all chunks edited since the map was opened. Replaces the watcher; an empty
+  // function unregisters it. When this returns, the previous watcher is no longer running.
   void watch_edits(storage::Map::EditWatcher watcher);
 
   std::shared_ptr<const storage::MapView> view() const;
-  // Which map it is. Not known: it has never been made durable, since nothing can be written.
+  // The map's identity. It is not known() while it could not be made durable, because the map cannot be written.
   const MapIdentity& identity() const;
-  const place::PlaceIndex& places() const;      // only with a vocabulary
-  const place::Vocabulary& vocabulary() const;  // only with one
+  // Only for a Mapper with a vocabulary:
+  const place::PlaceIndex& places() const;
+  const place::Vocabulary& vocabulary() const;
   storage::Budget& budget() const;
   storage::Engine& engine() const;
   MapperStats stats() const;
 
-  // Stops taking records, applies what is durable, commits.
+  // Takes no more records, applies those that are durable, and commits.
   Status stop();
 
  private:

@@ -84,7 +84,7 @@ TEST(Mapper, AReopenedMapIsTheSame) {
   EXPECT_EQ(mapper->view()->sessions().size(), 1u);
 }
 
-TEST(Mapper, AMapHasOneIdentityForGood) {
+TEST(Mapper, TheIdentityOfAMapNeverChanges) {
   const auto engine = storage::make_memory_engine();
   MapIdentity first;
   {
@@ -98,7 +98,7 @@ TEST(Mapper, AMapHasOneIdentityForGood) {
   EXPECT_NE(open_mapper(storage::make_memory_engine())->identity().uuid, first.uuid);
 }
 
-// Whoever keeps something beside the map from run to run misses nothing.
+// So that a user who keeps data derived from the map between runs misses no edit.
 TEST(Mapper, TheFirstWatcherIsToldOfAllEditsSinceTheMapWasOpened) {
   const sim::PointsWorld world(small_world(70));
   const auto mapper = open_mapper(storage::make_memory_engine());
@@ -288,7 +288,7 @@ class DamagedJournal final : public storage::Engine {
   const bool throws_;
 };
 
-// Else a crash would take it back, and robots would be in a map that there is not.
+// Otherwise a crash could take it back, and robots would have the identity of a map that does not exist.
 TEST(Mapper, AnIdentityThatIsNotDurableIsNotTold) {
   const auto engine = storage::make_memory_engine();
   EXPECT_FALSE(open_mapper(std::make_shared<DamagedJournal>(engine, 0))->identity().known());  // keeps commits away
@@ -344,7 +344,7 @@ void feed_patiently(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t
   }
 }
 
-TEST(Mapper, AJournalThatFailsIsNamedAndGoesOnByItself) {
+TEST(Mapper, AFailingJournalIsReportedAndRecoversByItself) {
   const sim::PointsWorld world(small_world(30));
   const FailingDisk disk;
   const auto mapper = open_mapper(disk.open());
@@ -368,8 +368,8 @@ TEST(Mapper, AJournalThatFailsIsNamedAndGoesOnByItself) {
   EXPECT_THAT(derived_differences(*mapper->view()), testing::IsEmpty());
 }
 
-// Those that queue behind a record that fails fail with it: later ones must not overtake it.
-TEST(Mapper, WhatFailsKeepsItsOrder) {
+// Records that queue behind a failing one fail with it, so that they do not overtake it.
+TEST(Mapper, RefusedRecordsKeepTheirOrder) {
   const FailingDisk disk;
   const auto mapper = open_mapper(disk.open());
   std::mutex mutex;
@@ -391,7 +391,7 @@ TEST(Mapper, WhatFailsKeepsItsOrder) {
   EXPECT_TRUE(std::is_sorted(outcomes.begin(), outcomes.end())) << "a record was taken, and an earlier one was not";
 }
 
-TEST(Mapper, WhileCommitsFailNoMoreIsTakenInThanFitsAndThenItGoesOn) {
+TEST(Mapper, WhileCommitsFailIntakeIsLimitedToWhatFitsInMemory) {
   const sim::PointsWorld world(small_world(600));
   const FailingDisk disk;
   const auto mapper = open_mapper(disk.open(), false, 1);
@@ -418,7 +418,7 @@ TEST(Mapper, WhileCommitsFailNoMoreIsTakenInThanFitsAndThenItGoesOn) {
   EXPECT_TRUE(mapper->stop().ok());
 }
 
-TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
+TEST(Mapper, DeterministicModeGivesTheSameMapDespiteDiskFailures) {
   sim::PointsWorldOptions world_options = small_world(66);
   world_options.births = 30;
   world_options.appearance = 150;
@@ -453,7 +453,7 @@ TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
   EXPECT_EQ(maps[0], maps[1]);
 }
 
-TEST(Mapper, DeterministicModeGivesTheSameMapHoweverOftenItStopsWithAFullQueue) {
+TEST(Mapper, DeterministicModeGivesTheSameMapDespiteStopsWithAFullQueue) {
   sim::PointsWorldOptions world_options = small_world(66);
   world_options.births = 30;
   world_options.appearance = 150;
@@ -514,7 +514,7 @@ TEST(Mapper, DeterministicModeGivesTheSameMapHoweverOftenItStopsWithAFullQueue) 
   EXPECT_EQ(maps[0], maps[1]);
 }
 
-TEST(Mapper, APartThatTheWorkerCannotReadIsNamedWithWhatToDo) {
+TEST(Mapper, AnUnreadablePartIsReportedWithAdvice) {
   const sim::PointsWorld world(small_world(30));
   const auto disk = storage::ForgetfulFiles::create(1);
   const auto faults = std::make_shared<storage::Faults>();
@@ -537,7 +537,7 @@ TEST(Mapper, APartThatTheWorkerCannotReadIsNamedWithWhatToDo) {
   EXPECT_EQ(mapper->begin_session(world.keyframe(0).session).ok(), true) << "which is known";
 }
 
-TEST(Mapper, ReadersSeeWholeMapsWhileItGrows) {
+TEST(Mapper, ReadersSeeConsistentMapsWhileItGrows) {
   const sim::PointsWorld world(small_world(60));
   const auto mapper = open_mapper(storage::make_memory_engine());
   std::atomic<bool> done = false;

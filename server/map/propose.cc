@@ -34,9 +34,10 @@ Status check_end(const storage::Graph& view, FrameId frame) {
   if (!view.hot(frame) || !view.cold(frame)) return {Reason::NO_SUCH_FRAME, "no frame " + frame.to_string()};
   const storage::Session session = *view.session(frame.session);
   if (storage::is_going(session))
-    return {Reason::SESSION_DELETED, frame.to_string() + " goes with session " + session.display_name};
+    return {Reason::SESSION_DELETED,
+            frame.to_string() + " belongs to session " + session.display_name + ", which is being deleted"};
   if (!session.header.camera.is_stereo())
-    return {Reason::NOT_STEREO, frame.to_string() + " was seen by one camera, which knows no metres"};
+    return {Reason::NOT_STEREO, frame.to_string() + " was seen by a single camera, which measures no metres"};
   if (session.header.camera == kNoCamera)
     return {Reason::NO_CALIBRATION, "session " + session.display_name + " was imported without a camera"};
   return {};
@@ -58,7 +59,7 @@ Status too_recent(const storage::Graph& view, FrameId query, FrameId match) {
               " edges, its own motion says how far they are apart, and no geometry was tried"};
 }
 
-// Of the place that appearance sees there; below 1e-3 it counts as none.
+// Probability by appearance of the place that contains `match`; 0 if it is not among the candidates.
 double probability_of(const storage::Graph& view, const place::PlaceIndex& places, const Seen& query, FrameId match) {
   for (const place::PlaceCandidate& place :
        places.query(query.cold->words, view, query.picture.masked, {}, query.cold->appearance).candidates) {
@@ -72,7 +73,7 @@ place::VerifiedPlace turned_round(place::VerifiedPlace found, FrameId match) {
   found.match = match;
   found.covariance = inverse_covariance(found.T_match_query, found.covariance);
   found.T_match_query = found.T_match_query.inverse();
-  found.bindings.clear();  // they are those of the other frame
+  found.bindings.clear();  // they belong to the other frame
   return found;
 }
 
@@ -85,7 +86,7 @@ class Proposer {
   Proposer(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures)
       : view_(view), places_(places), pictures_(pictures) {}
 
-  // A closure belongs to the newer of its frames, whichever of them was looked for at the other.
+  // A closure is stored with the newer of its frames, whichever of them was the query of the verification.
   Result<storage::ClosureProposalRecord> enter(const Seen& query, place::VerifiedPlace found) {
     if (taken_in_before(view_, found.match, query.frame)) return enter_newer(query, std::move(found));
     const Seen newer(view_, found.match);
@@ -130,8 +131,8 @@ Result<storage::ClosureProposalRecord> propose_closure(const storage::Graph& vie
   auto found = verify_frame(view, newer.picture, query, match);
   if (found.ok()) return proposer.enter(newer, std::move(found).value());
   const Seen older(view, match);
-  const place::QueryPicture unmasked{
-      older.picture.features, older.picture.camera, {}};  // around the newer nothing is its past
+  // No mask: frames around the newer one are not in the older one's past.
+  const place::QueryPicture unmasked{older.picture.features, older.picture.camera, {}};
   auto reverse = verify_frame(view, unmasked, match, query);
   if (reverse.ok()) return proposer.enter(older, std::move(reverse).value());
   return {found.reason(), query.to_string() + " at " + match.to_string() + ": " + found.status().message() + "; " +

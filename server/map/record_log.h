@@ -1,4 +1,5 @@
-// What the log says of journal records: of sessions that begin, end and are closed, and of what an operator edits.
+// Log lines for journal records: for sessions that begin, end, are frozen, thawed or deleted, and for an operator's
+// edits.
 #pragma once
 
 #include <string>
@@ -7,8 +8,8 @@
 
 namespace relmap::map {
 
-// A line on a record that has been applied to `map`, with `applied` as outcome. Empty: of keyframes, gaps, refusals,
-// proposals, bindings and idle work, which come by the thousand, and of edits that changed nothing.
+// The line for a record that has been applied to `map` with the outcome `applied`. Empty for keyframes, gaps, refusals,
+// proposals, bindings and idle work, which come by the thousand, and for edits that changed nothing.
 std::string log_line(const storage::Graph& map, const storage::JournalRecord& record, const Applied& applied);
 
 }  // namespace relmap::map

@@ -19,7 +19,7 @@ class RecordLog : public TwoLaps {
   }
 };
 
-TEST_F(RecordLog, TellsOfSessionsAndOfWhatAnOperatorEditsAndOfNothingElse) {
+TEST_F(RecordLog, DescribesSessionsAndOperatorEditsOnly) {
   const std::string name =
       "session 1 '" + world_.keyframe(0).session.name + "' of robot " + world_.keyframe(0).session.robot;
   storage::SessionRecord another = session_record(world_);

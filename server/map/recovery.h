@@ -1,4 +1,4 @@
-// Crash recovery: applies the journal's records that came after the last commit again.
+// Crash recovery: re-applies the journal's records after the last commit.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 namespace relmap::map {
 
 struct Replayed {
-  std::vector<FrameId> frames;  // that the records added, in the order of the journal
+  std::vector<FrameId> frames;  // frames that the records added, in the order of the journal
   // False if the last record added a frame. In deterministic mode a frame is looked up before the next record is
   // journalled: if any record follows the last frame, that frame's lookup was done; if none does, it may be missing.
   bool looked_up = true;

@@ -11,7 +11,7 @@ namespace relmap::map {
 
 namespace {
 
-// What a session costs beside its frames: in the map's tables, as it was committed, and here.
+// Memory of a session without its frames: in the map's tables, in its committed copy, and here.
 std::size_t bytes_of(const storage::Session& session) {
   return 3 * (sizeof(storage::Session) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown)) + 768;
 }
@@ -60,7 +60,7 @@ Result<SessionNumber> SessionRegistry::begin(const SessionHeader& header) {
     budget_->release(storage::Share::kSessions, bytes);
     return why;
   };
-  // A number may be known from the journal though the engine's count, damaged, has gone back behind it.
+  // If the engine's counter was damaged and has gone back, its number may be in use already.
   const auto taken = [&](SessionNumber number) {
     return std::any_of(sessions_.begin(), sessions_.end(),
                        [&](const auto& entry) { return entry.second.number == number; });

@@ -22,7 +22,7 @@ class SessionRegistry {
  public:
   // The map as readers see it now.
   using CurrentView = std::function<std::shared_ptr<const storage::Graph>()>;
-  // Returns once the record is durable, with its sequence, or why it is not.
+  // Waits until the record is durable; returns its sequence, or why it is not durable.
   using Journal = std::function<Result<std::uint64_t>(storage::SessionRecord)>;
   // OK, or why the map is read-only.
   using Health = std::function<Status()>;
@@ -34,13 +34,13 @@ class SessionRegistry {
   SessionRegistry(const SessionRegistry&) = delete;
   SessionRegistry& operator=(const SessionRegistry&) = delete;
 
-  // Takes over the sessions of the opened map, and the engine's epoch with which new numbers are allocated. Charges
-  // their memory even beyond the share, because it is in use already. Call once, before begin().
+  // Loads the sessions of the opened map. `epoch` is the engine's, with which new numbers are allocated. Charges their
+  // memory even beyond the share, because it is in use already. Call once, before begin().
   void load(std::uint64_t epoch, std::span<const storage::Session> sessions);
 
-  // The number of the session with this uuid; a new one is allocated and journalled. SESSION_DELETED,
-  // CALIBRATION_CHANGED (it began with another camera or flags), BUDGET_EXCEEDED (as many sessions as memory allows),
-  // and what `health`, the engine and the journal say.
+  // Returns the number of the session with this uuid; a new session gets a number and is journalled. SESSION_DELETED,
+  // CALIBRATION_CHANGED (it began with another camera or flags), BUDGET_EXCEEDED (no memory for more sessions), or an
+  // error of `health`, the engine or the journal.
   Result<SessionNumber> begin(const SessionHeader& header);
 
  private:

@@ -68,7 +68,7 @@ TEST_F(SessionRegistryTest, ASessionKeepsItsNumberAndIsJournalledOnce) {
   EXPECT_EQ("morning", journalled_[0].display_name);
 }
 
-TEST_F(SessionRegistryTest, NamesakesOfARobotAreNumbered) {
+TEST_F(SessionRegistryTest, SessionsOfOneNameAreNumbered) {
   sessions_->load(epoch_, {});
   sessions_->begin(header("tour")).or_throw();
   sessions_->begin(header("tour")).or_throw();
@@ -78,7 +78,7 @@ TEST_F(SessionRegistryTest, NamesakesOfARobotAreNumbered) {
   EXPECT_EQ("tour", journalled_[2].display_name);
 }
 
-TEST_F(SessionRegistryTest, OfAKnownSessionTheCameraIsCompared) {
+TEST_F(SessionRegistryTest, TheCameraOfAKnownSessionIsCompared) {
   sessions_->load(epoch_, {});
   SessionHeader tour = header("tour");
   sessions_->begin(tour).or_throw();
@@ -99,7 +99,7 @@ TEST_F(SessionRegistryTest, ASessionThatIsBeingDeletedIsRefused) {
 }
 
 // A damaged engine may count from the beginning again.
-TEST_F(SessionRegistryTest, ANumberThatTheMapHasIsNotGivenAgain) {
+TEST_F(SessionRegistryTest, ANumberInUseIsNotGivenAgain) {
   std::vector<storage::Session> known(3);
   for (SessionNumber i = 0; i < 3; ++i) {
     known[i].number = i + 1;
@@ -109,7 +109,7 @@ TEST_F(SessionRegistryTest, ANumberThatTheMapHasIsNotGivenAgain) {
   EXPECT_EQ(4u, sessions_->begin(header("new")).or_throw());
 }
 
-TEST_F(SessionRegistryTest, WhatIsNotJournalledIsNeitherKnownNorCharged) {
+TEST_F(SessionRegistryTest, SessionsThatAreNotJournalledAreNeitherKnownNorCharged) {
   sessions_->load(epoch_, {});
   const std::size_t before = budget_->used(storage::Share::kSessions);
   journal_takes_ = Status(Reason::DISK_FULL, "no room");

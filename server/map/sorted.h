@@ -1,4 +1,4 @@
-// Sorted vectors as small sets: the derived lists of a frame.
+// Sorted vectors as small sets, used for the derived lists of a frame.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ void sort_unique(std::vector<T>& list) {
   list.erase(std::unique(list.begin(), list.end()), list.end());
 }
 
-// True if it was not there yet.
+// Inserts the value unless it is there. True if it was inserted.
 template <typename T>
 bool insert_sorted(std::vector<T>& list, const T& value) {
   const auto at = std::lower_bound(list.begin(), list.end(), value);

@@ -1,5 +1,5 @@
-// Where a robot stood still for long enough to have been carried meanwhile, by a lift, a train: to a camera that sees
-// the cabin a ride is standing still.
+// Stops that are long enough for the robot to have been carried by a lift or a train. To a camera that sees only the
+// cabin, a ride looks like standing still.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 
 namespace relmap::map {
 
-// A robot halts for a moment at any corner: what is shorter is no ride.
-inline constexpr double kMinRideSeconds = 3;  // seconds, in one go
+// A shorter stop is no ride, since a robot halts for a moment at any corner.
+inline constexpr double kMinRideSeconds = 3;  // without interruption
 
-// Along an edge of the robot's own motion, for most of its time.
+// Whether the robot stood still for most of the time of an odometry edge.
 inline bool stood(const storage::Edge& motion) { return motion.standing_s > motion.driven_s; }
 
-// The motion that led to a frame; nullptr: none did. Of what `graph.hot(frame)` gave.
+// The odometry edge that leads to the frame of `hot`; nullptr if there is none.
 inline const storage::Edge* motion_to(const storage::FrameHot& hot) {
   return !hot.edges.empty() && hot.edges.front().id.ordinal == 0 ? &hot.edges.front() : nullptr;
 }

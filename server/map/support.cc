@@ -13,7 +13,7 @@ namespace relmap::map {
 
 namespace {
 
-// Changes of edge support, gathered first so that each edge is edited once.
+// Collects changes of edge support, so that each edge is edited once.
 class SupportDelta {
  public:
   explicit SupportDelta(storage::EditableGraph& map) : map_(map) {}
@@ -24,7 +24,7 @@ class SupportDelta {
   std::vector<EdgeId> apply() {
     std::vector<EdgeId> unused;
     for (const auto& [id, change] : change_) {
-      if (change == 0 || !storage::find_edge(map_, id)) continue;  // it may have gone with its frame
+      if (change == 0 || !storage::find_edge(map_, id)) continue;  // the edge may have been deleted with its frame
       storage::Edge& edge = *map_.edit_hot(id.frame).edge(id);
       edge.support = static_cast<std::uint32_t>(static_cast<std::int64_t>(edge.support) + change);
       edge.prior_active = edge.kind == storage::EdgeKind::kPrior || edge.support < storage::kMinSupport;
@@ -48,19 +48,19 @@ struct Sightings {
   std::vector<Sighting> reached, unreached;  // ascending
 };
 
-// What the frames see; adds `sign` times the paths to it.
+// What the frames see. Adds `sign` times the paths of these observations to `delta`.
 Sightings sightings(const storage::Graph& graph, const std::set<FrameId>& frames, int sign, SupportDelta& delta) {
   std::vector<Sighting> all;
   Sightings found;
   std::vector<LandmarkId> not_needed;
   for (const FrameId frame : frames) {
     const auto warm = graph.warm(frame);
-    if (!warm) continue;  // it has gone
+    if (!warm) continue;  // deleted
     for (const LandmarkId landmark : storage::landmarks_seen(graph, *warm, &not_needed))
       all.push_back({landmark, frame});
     for (const LandmarkId landmark : not_needed) found.unreached.push_back({landmark, frame});
   }
-  std::sort(all.begin(), all.end());  // by base, so that what leads up from it is looked at once
+  std::sort(all.begin(), all.end());  // by base, so that the walk up from each base is made once
   storage::LocalGraph local(graph);
   std::vector<storage::LocalStep> steps;
   std::map<std::int32_t, int> uses;  // by local edge
@@ -88,20 +88,21 @@ std::map<LandmarkId, Change> changes(const std::vector<Sighting>& before, const 
   return changed;
 }
 
-// The list of a landmark's observers after the change.
+// The landmark's list of observers after the change.
 std::vector<FrameId> updated(const storage::Graph& graph, storage::FirstObservers& first_observers, LandmarkId landmark,
                              const Change& change) {
-  if (storage::resolve(graph, landmark) != landmark) return {};  // it means another now
+  if (storage::resolve(graph, landmark) != landmark) return {};  // it stands for another one now
   std::vector<FrameId> list = graph.hot(landmark.base)->landmarks[landmark.slot].observers;
   const FrameId last = list.empty() ? FrameId() : list.back();
-  const bool settled = storage::is_settled(list);
+  const bool was_fixed = storage::is_settled(list);
   const std::size_t removed =
       std::erase_if(list, [&](FrameId f) { return std::binary_search(change.gone.begin(), change.gone.end(), f); });
   list.insert(list.end(), change.come.begin(), change.come.end());
   storage::keep_first_observers(graph, &list);
-  // A settled landmark's list does not tell who came after its last. (A newcomer may make one pass of two.)
-  if (!settled || (removed == 0 && storage::is_settled(list) &&
-                   storage::taken_in(*graph.hot(list.back())) <= storage::taken_in(*graph.hot(last))))
+  // A fixed landmark's list does not contain later observers, which may have to move up. (Besides, a new observer
+  // between two passes may make them one.)
+  if (!was_fixed || (removed == 0 && storage::is_settled(list) &&
+                     storage::taken_in(*graph.hot(list.back())) <= storage::taken_in(*graph.hot(last))))
     return list;
   return first_observers.of(landmark);
 }
@@ -128,7 +129,7 @@ void add_support(storage::EditableGraph& map, PathsTo& paths) {
       continue;
     }
     for (const EdgeId edge : *path) delta.add(edge, +1);
-    // The newest frame of all comes last in the list.
+    // The list is in the order of arrival, and this frame is the newest.
     if (!storage::is_settled(map.hot(landmark.base)->landmarks[landmark.slot].observers))
       map.edit_hot(landmark.base).landmarks[landmark.slot].observers.push_back(id);
   }
@@ -180,12 +181,12 @@ void add_frames_beyond(const storage::Graph& graph, const std::vector<FrameId>& 
     frames->insert(frame);
     const auto hot = graph.hot(frame);
     for (const storage::Unreached& item : hot->unreached) frames->insert(item.observer);
-    bool all_near = false;  // have been added
+    bool all_near = false;  // all frames in reach have been added
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
-      const bool settled = storage::is_settled(hot->landmarks[slot].observers);
-      if (settled && all_near) continue;
+      const bool fixed = storage::is_settled(hot->landmarks[slot].observers);
+      if (fixed && all_near) continue;
       add_observers(graph, {frame, slot}, frames);
-      all_near = all_near || settled;
+      all_near = all_near || fixed;
     }
   }
 }

@@ -1,6 +1,6 @@
-// Keeps what is derived from the accepted graph and the closures in force in step with them: the observers of each
-// landmark and those out of its reach, the number of observations whose path uses each edge, and which edges need their
-// prior (docs/method.md, 2).
+// Updates what is derived from the accepted graph and the closures in force: the observers of each landmark, in reach
+// and out of reach, the number of observations whose path uses each edge (support), and which edges need their prior
+// (docs/method.md, 2).
 #pragma once
 
 #include <functional>
@@ -13,13 +13,13 @@
 
 namespace relmap::map {
 
-// Paths from several bases to one frame, each searched for once. The graph must not change meanwhile.
+// Paths from several bases to one frame, each searched only once. The graph must not change meanwhile.
 class PathsTo {
  public:
   PathsTo(const storage::Graph& graph, FrameId frame) : frame_(frame), local_(graph) {}
 
   FrameId frame() const { return frame_; }
-  // The edges of the path; null: out of reach. Valid until the next call.
+  // The edges of the path; null if the base is out of reach. Valid as long as this object.
   const std::vector<EdgeId>* find(FrameId base);
   bool reachable_from(FrameId base) { return find(base) != nullptr; }
 
@@ -34,21 +34,22 @@ class PathsTo {
   std::vector<storage::LocalStep> steps_;
 };
 
-// The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and
-// its paths into the support of their edges.
+// Call once the observations of the new frame paths.frame() are stored. Adds the frame to its landmarks' observers, and
+// its paths to the support of their edges.
 void add_support(storage::EditableGraph& map, PathsTo& paths);
 
-// Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
-// everything derived from that into step. `frames`: all that have an observation whose landmark or path may differ
-// afterwards, or that go; others do no harm. Returns the edges that observations used before and none uses now,
-// ascending.
+// Runs `change`, which may change the graph, which closures are in force, their claims and bound observations, and
+// updates everything derived from these. `frames` must contain all frames that have an observation whose landmark or
+// path may differ afterwards, and all that are deleted; additional frames do no harm. Returns the edges that
+// observations used before and none uses now, ascending.
 std::vector<EdgeId> change_support(storage::EditableGraph& map, const std::set<FrameId>& frames,
                                    const std::function<void()>& change);
 
-// Adds the frames that see a landmark, in reach or not. If it is settled, all that are near enough to do so.
+// Adds the frames that see a landmark, in reach or not. For a fixed landmark, whose list of observers is incomplete,
+// adds all frames in reach of its base.
 void add_observers(const storage::Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);
 
-// Adds the frames with an observation whose path can differ when edges that end in `newer_ends` come or go.
+// Adds the frames with an observation whose path may differ when edges that end in `newer_ends` come or go.
 void add_frames_beyond(const storage::Graph& graph, const std::vector<FrameId>& newer_ends, std::set<FrameId>* frames);
 
 }  // namespace relmap::map

@@ -89,7 +89,7 @@ class SupportTest : public testing::Test {
   std::uint64_t sequence_ = 0;
 };
 
-TEST_F(SupportTest, WhoSeesALandmarkAndHasNoPathToItComesBackWithTheEdge) {
+TEST_F(SupportTest, UnreachedObserversReturnWithTheEdge) {
   for (const SessionNumber session : {1, 2, 3}) pass(session, 0, 21);
   const ClosureId second = close({1, 10}, {2, 10}), third = close({1, 10}, {3, 10});
   const LandmarkId landmark{{2, 12}, 0};
@@ -113,7 +113,7 @@ TEST_F(SupportTest, WhoSeesALandmarkAndHasNoPathToItComesBackWithTheEdge) {
   EXPECT_EQ(observers(landmark).size(), 3u);
 }
 
-TEST_F(SupportTest, WhoSeesALandmarkThatIsNotNeededComesBackWithItWhereverHeIs) {
+TEST_F(SupportTest, ObserversOfAnUnneededLandmarkReturnWithIt) {
   for (const SessionNumber session : {1, 2, 3}) pass(session, 0, 21);
   const ClosureId second = close({1, 10}, {2, 10}), third = close({1, 10}, {3, 10});
   const LandmarkId landmark{{2, 12}, 0}, claimant{{2, 13}, 0};
@@ -154,7 +154,7 @@ TEST_F(SupportTest, WhoSeesALandmarkThatIsNotNeededComesBackWithItWhereverHeIs) 
   EXPECT_EQ(observers(landmark).size(), 4u);
 }
 
-TEST_F(SupportTest, AnObserverThatMakesOnePassOfTwoBringsTheLaterOnesBack) {
+TEST_F(SupportTest, AnObserverThatJoinsTwoPassesMakesRoomForLaterOnes) {
   const LandmarkId landmark{{1, 10}, 0};
   pass(1, 0, 21);
   see({1, 10}, landmark);
@@ -181,7 +181,7 @@ TEST_F(SupportTest, AnObserverThatMakesOnePassOfTwoBringsTheLaterOnesBack) {
   EXPECT_EQ(observers(landmark), all);
 }
 
-TEST_F(SupportTest, AnOldPassTakenOutOfASettledLandmarkMakesRoomForLaterOnes) {
+TEST_F(SupportTest, APassRemovedFromAFixedLandmarkMakesRoomForLaterOnes) {
   const LandmarkId landmark{{1, 10}, 0};
   pass(1, 0, 21);
   see({1, 10}, landmark);

@@ -16,7 +16,7 @@ class Timings {
     else
       microseconds_[next_++ % kKept] = seconds * 1e6;
   }
-  // q in 0..1; 0 if there are none.
+  // In microseconds, for q in 0..1; 0 if nothing was added.
   double quantile(double q) const { return relmap::quantile(microseconds_, q); }
 
  private:

@@ -1,4 +1,4 @@
-// A transform with its covariance, as consistency of closures is tested with it (docs/method.md, 7).
+// A transform with its covariance, for tests of the consistency of closures (docs/method.md, 7).
 #pragma once
 
 #include <cmath>
@@ -8,13 +8,13 @@
 
 namespace relmap::map {
 
-// What odometry has wrong all the way alike, of which no covariance knows: standard deviations over its length, and a
-// metre of it.
+// Systematic error of odometry, which covariances do not include: standard deviations of position over the distance,
+// and of rotation per metre (radians).
 struct Drift {
   double share = 0, radians = 0;
 };
 
-// Of six degrees of freedom, 99 %.
+// The 99 % quantile of chi-square with six degrees of freedom.
 inline constexpr double kChi2With6At99 = 16.812;
 
 struct Uncertain {
@@ -23,7 +23,7 @@ struct Uncertain {
 
   explicit Uncertain(const SE3& T_in = {}, const Matrix6& covariance_in = Matrix6::Zero())
       : T(T_in), covariance(covariance_in) {}
-  // A way along the odometry.
+  // A path along the odometry.
   Uncertain(const place::PlacedFrame& placed, Drift drift) : T(placed.T_centre_frame), covariance(placed.covariance) {
     covariance.diagonal().head<3>().array() += std::pow(drift.share * placed.way, 2);
     covariance.diagonal().tail<3>().array() += std::pow(drift.radians * placed.way, 2);

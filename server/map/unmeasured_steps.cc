@@ -12,7 +12,7 @@ namespace relmap::map {
 
 namespace {
 
-constexpr double kNearMetres = 0.3, kNearRadians = 0.1;  // from there relaxation finds the place
+constexpr double kNearMetres = 0.3, kNearRadians = 0.1;  // from within these relaxation converges to the place
 
 struct PathStep {
   storage::Edge edge;
@@ -21,7 +21,7 @@ struct PathStep {
   SE3 T() const { return route::walked(edge, forward); }
 };
 
-// Empty: out of reach.
+// The path from a to b; empty if there is none.
 std::vector<PathStep> path_between(const storage::Graph& graph, FrameId a, FrameId b) {
   storage::LocalGraph local(graph);
   std::vector<storage::LocalStep> steps;
@@ -40,7 +40,7 @@ bool allows(const storage::Edge& step, const SE3& T_ab) {
   return chi2 <= kChi2With6At99;  // false for NaN
 }
 
-// As badly known as the guess was. What its neighbours have in common with it is no more.
+// Sets the step's transform, with the covariance of the guess and without correlation to its neighbours.
 void set_step(storage::EditableGraph& map, EdgeId id, const SE3& T_ab) {
   storage::Edge& step = *map.edit_hot(id.frame).edge(id);
   step.T_ab = T_ab;
@@ -63,19 +63,19 @@ void measure_steps(storage::EditableGraph& map, const std::vector<EdgeId>& comin
     const auto closure = storage::find_edge(map, id);
     if (closure->in_graph() || closure->carried.session != 0 || !storage::is_metric(closure->verification)) continue;
     const std::vector<PathStep> path = path_between(map, closure->a, closure->b);
-    std::size_t min_known = path.size();
+    std::size_t worst = path.size();  // the step with the largest prior covariance
     SE3 whole;
     for (std::size_t i = 0; i < path.size(); ++i) {
       whole = whole * path[i].T();
-      if (is_open(path[i].edge) && (min_known == path.size() || path[i].edge.prior_covariance.trace() >
-                                                                    path[min_known].edge.prior_covariance.trace()))
-        min_known = i;
+      if (is_open(path[i].edge) &&
+          (worst == path.size() || path[i].edge.prior_covariance.trace() > path[worst].edge.prior_covariance.trace()))
+        worst = i;
     }
-    if (min_known == path.size() || is_near(closure->T_ab.inverse() * whole)) continue;
+    if (worst == path.size() || is_near(closure->T_ab.inverse() * whole)) continue;
     SE3 before, after;
-    for (std::size_t i = 0; i < min_known; ++i) before = before * path[i].T();
-    for (std::size_t i = min_known + 1; i < path.size(); ++i) after = after * path[i].T();
-    const PathStep& step = path[min_known];
+    for (std::size_t i = 0; i < worst; ++i) before = before * path[i].T();
+    for (std::size_t i = worst + 1; i < path.size(); ++i) after = after * path[i].T();
+    const PathStep& step = path[worst];
     const SE3 across = before.inverse() * closure->T_ab * after.inverse();
     const SE3 T_ab = (step.forward ? across : across.inverse()).normalized();
     if (!allows(step.edge, T_ab)) continue;

@@ -1,8 +1,7 @@
-// Steps of a robot's motion that nothing measured (is_unmeasured()), once a closure that only binds
-// landmarks leads across them. Where a guess led, what the closure binds would be predicted metres away from where it
-// is seen: from there a relaxation finds some minimum, and not the place. So the step begins where the closure says
-// that it leads, and relaxation refines that. Priors stay what the robot guessed; steps of frozen sessions stay as they
-// are.
+// Initialises steps of a robot's motion that nothing measured (is_unmeasured()) when a closure that only binds
+// landmarks leads across them. With the robot's guess, the bound landmarks would be predicted metres away from where
+// they are seen, and relaxation would end in a wrong local minimum. So the step is set to agree with the closure, and
+// relaxation refines it. Its prior stays the robot's guess. Steps of frozen sessions do not change.
 #pragma once
 
 #include <vector>
@@ -12,17 +11,17 @@
 
 namespace relmap::map {
 
-// `coming` are in force from now on, what goes for them is out of force, and the graph is what it will be. For each
-// that is no edge of the graph, and does not say that the robot was carried: where the path between its ends leads more
-// than 0.3 m or 0.1 rad away from where the closure measured it to, the least known of the guessed steps on it takes
-// the estimate (p_a = T_ab p_b, metres) with which it leads there, if the step's prior allows it (chi-square, 99 %). A
-// step is set once, and not where it is supported; unless `others_go`, whose support that may have been.
-// Appends the ends of steps that were set to `seeds`, to be relaxed around.
+// Call when the `coming` closures have come into force, others have gone out of force, and the graph is as it will be.
+// Considers each closure that is no edge of the graph and does not say that the robot was carried. If the path between
+// its ends differs from its measurement by more than 0.3 m or 0.1 rad, the most uncertain guessed step on the path gets
+// the transform with which the path agrees, provided that the step's prior allows it (chi-square, 99 %). A step is set
+// at most once. A step with support is not set, unless `others_go`: closures went out of force, which its support may
+// have come from. Appends the ends of the steps that were set to `seeds`.
 void measure_steps(storage::EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go,
                    std::vector<FrameId>* seeds);
 
-// `unused` are edges that closures which have gone were the last to support: guessed steps are again what the robot
-// guessed, and as badly known.
+// Resets guessed steps among `unused`, edges that lost their last support with a closure, to the robot's guess and its
+// covariance.
 void forget_steps(storage::EditableGraph& map, const std::vector<EdgeId>& unused);
 
 }  // namespace relmap::map

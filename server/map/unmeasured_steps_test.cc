@@ -82,7 +82,7 @@ constexpr std::uint32_t kBlind = 18;
 
 class UnmeasuredStep : public ::testing::TestWithParam<std::uint64_t> {};
 
-TEST_P(UnmeasuredStep, IsWhatTheClosuresAcrossItMeasured) {
+TEST_P(UnmeasuredStep, IsMeasuredByTheClosuresAcrossIt) {
   BlindDrive drive(kShortLap, {kBlind}, mistake(GetParam()));
   ASSERT_TRUE(storage::is_unmeasured(drive.step(kBlind)));
   EXPECT_GT(drive.metres_off(kBlind), 1);
@@ -93,7 +93,7 @@ TEST_P(UnmeasuredStep, IsWhatTheClosuresAcrossItMeasured) {
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
-TEST_P(UnmeasuredStep, IsTheGuessAgainWithoutThem) {
+TEST_P(UnmeasuredStep, IsTheGuessAgainWhenTheyAreRemoved) {
   BlindDrive drive(kShortLap, {kBlind}, mistake(GetParam()));
   const storage::Edge before = drive.step(kBlind);
   for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
@@ -111,7 +111,7 @@ TEST_P(UnmeasuredStep, IsTheGuessAgainWithoutThem) {
 
 INSTANTIATE_TEST_SUITE_P(Guesses, UnmeasuredStep, ::testing::Range(std::uint64_t{0}, std::uint64_t{12}));
 
-TEST(UnmeasuredSteps, EachIsMeasuredByAClosureOfItsOwn) {
+TEST(UnmeasuredSteps, AreEachMeasuredByAnotherClosure) {
   constexpr std::uint32_t kAgain = kBlind + 5;
   BlindDrive drive(kShortLap, {kBlind, kAgain}, mistake(3));
   // The first two come into force together: one leads across the first step, the other across both.
@@ -121,7 +121,7 @@ TEST(UnmeasuredSteps, EachIsMeasuredByAClosureOfItsOwn) {
   EXPECT_LT(drive.metres_off(kAgain), 0.1);
 }
 
-TEST(UnmeasuredSteps, AreLeftAloneByClosuresThatAreEdges) {
+TEST(UnmeasuredSteps, AreNotSetByClosuresThatAreEdges) {
   BlindDrive drive(kLongLap, {kLongLap + 6}, mistake(5));
   const storage::Edge before = drive.step(kLongLap + 6);
   for (const std::uint32_t query : {kLongLap + 8, kLongLap + 10}) drive.propose(query);
@@ -130,7 +130,7 @@ TEST(UnmeasuredSteps, AreLeftAloneByClosuresThatAreEdges) {
       << "landmarks are reached over the edge, and nothing would refine the step";
 }
 
-TEST(UnmeasuredSteps, AreLeftAloneWhereTheGuessIsBetterThanThat) {
+TEST(UnmeasuredSteps, AreNotSetAgainstAnAccurateGuess) {
   // The closures are a metre off, and the guess is known to centimetres: they are not believed of it.
   BlindDrive drive(kShortLap, {kBlind}, mistake(5), 0.05);
   const storage::Edge before = drive.step(kBlind);
@@ -139,7 +139,7 @@ TEST(UnmeasuredSteps, AreLeftAloneWhereTheGuessIsBetterThanThat) {
   EXPECT_LT((before.T_ab.inverse() * drive.step(kBlind).T_ab).log().norm(), 1e-9);
 }
 
-TEST(UnmeasuredSteps, OfFrozenSessionsStayAsTheyAre) {
+TEST(UnmeasuredSteps, OfFrozenSessionsAreNotSet) {
   BlindDrive drive(kShortLap, {kBlind}, mistake(7));
   const storage::Edge before = drive.step(kBlind);
   drive.drive().apply(storage::SetSessionStateRecord{kDriveSession, storage::SessionState::kFrozen});

@@ -20,8 +20,8 @@ class ClosureAnnouncer {
   // running.
   void watch(Watcher watcher);
 
-  // Tells the watcher of every closure that awaits confirmation, came into force, was taken out or went with a session,
-  // as `view` has it. What a watcher throws is logged and goes no further: the map is what counts.
+  // Tells the watcher of every closure that became a lone candidate, came into force, was taken out or was deleted with
+  // a session, as `view` has it. Exceptions of the watcher are logged and not passed on.
   void announce(const storage::Graph& view, const ClosureChange& closures);
 
  private:
@@ -34,12 +34,11 @@ class EditAnnouncer {
  public:
   using Watcher = storage::Map::EditWatcher;
   // Replaces the watcher; an empty function unregisters it. When this returns, the previous watcher is no longer
-  // running. The first watcher is told at once, by the caller's thread, of all that was edited before. Returns the
-  // version of the newest edit that edited() was told of: the caller must wait until the map's view has reached it
-  // before it takes a view.
+  // running. The first watcher is told at once, by the caller's thread, of everything edited before. Returns the
+  // version of the newest edit; the caller must wait until the map's view has reached it before it takes a view.
   std::uint64_t watch(Watcher watcher);
 
-  // The hot parts of these chunks differ in view `version`, which nobody can see yet.
+  // Tells the watcher that the hot parts of these chunks differ in view `version`, which is not published yet.
   void edited(std::uint64_t version, std::span<const storage::ChunkId> chunks);
 
  private:

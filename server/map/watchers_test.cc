@@ -11,7 +11,7 @@
 namespace relmap::map {
 namespace {
 
-TEST(EditAnnouncer, TheFirstWatcherHearsOfWhatWasEditedBefore) {
+TEST(EditAnnouncer, TheFirstWatcherIsToldOfEarlierEdits) {
   EditAnnouncer edits;
   const std::vector<storage::ChunkId> first = {{1, 0}, {1, 1}}, second = {{1, 1}, {2, 0}};
   edits.edited(4, first);
@@ -35,7 +35,7 @@ TEST(EditAnnouncer, TheFirstWatcherHearsOfWhatWasEditedBefore) {
   EXPECT_EQ(7u, last);
 }
 
-TEST(ClosureAnnouncer, AWatcherThatThrowsMissesThatClosureOnly) {
+TEST(ClosureAnnouncer, AWatcherThatThrowsMissesOnlyThatClosure) {
   storage::SmallGraph graph;
   graph.join({1, 0}, {1, 1});
   graph.join({1, 0}, {1, 5}, 1);

@@ -20,7 +20,7 @@ namespace relmap::ops {
 
 namespace {
 
-// Reads one value into the configuration; an empty answer means that it is well.
+// Reads one value into the configuration. Returns what is wrong with it; empty if nothing is.
 using Setter = std::function<std::string(const YAML::Node&, Config&)>;
 
 template <typename T>
@@ -30,7 +30,7 @@ std::string convert(const YAML::Node& node, T& value, const char* kind) {
 }
 
 Setter text(std::string Config::*member) {
-  return [member](const YAML::Node& node, Config& config) { return convert(node, config.*member, "a text"); };
+  return [member](const YAML::Node& node, Config& config) { return convert(node, config.*member, "text"); };
 }
 
 template <typename Get>
@@ -38,7 +38,7 @@ Setter flag(Get get) {
   return [get](const YAML::Node& node, Config& config) { return convert(node, get(config), "true or false"); };
 }
 
-// A number from low to high, both included.
+// A number from low to high, inclusive.
 template <typename Get>
 Setter number(Get get, double low, double high) {
   return [get, low, high](const YAML::Node& node, Config& config) -> std::string {
@@ -55,7 +55,7 @@ Setter number(Get get, double low, double high) {
   };
 }
 
-// [{metre: 1, driven_second: 0.5}, ...], by the names that RouteWeights have in the protocol.
+// [{metre: 1, driven_second: 0.5}, ...], with the names that RouteWeights have in the protocol.
 std::string read_mixes(const YAML::Node& node, Config& config) {
   constexpr std::size_t kMaxMixes = 8;
   if (!node.IsSequence() || node.size() > kMaxMixes) return "needs a list of at most 8 weights";
@@ -100,7 +100,7 @@ const std::map<std::string, Setter>& settings() {
       {"lcm",
        [](const YAML::Node& node, Config& config) -> std::string {
          std::string said;
-         if (auto wrong = convert(node, said, "a text"); !wrong.empty()) return wrong;
+         if (auto wrong = convert(node, said, "text"); !wrong.empty()) return wrong;
          config.lcm = lcm_url_of(said);
          return {};
        }},

@@ -1,4 +1,4 @@
-// What relmapd can be told, by a YAML file and by its command line (which wins).
+// The settings of relmapd, from a YAML file and the command line. The command line takes precedence.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +15,18 @@ namespace relmap::ops {
 
 struct Config {
   std::string data;                        // folder of the map
-  std::string listen = "127.0.0.1:50070";  // HOST:PORT of gRPC; port 0: any free one
-  bool insecure = false;                   // allows to listen beyond loopback, where everyone is operator
+  std::string listen = "127.0.0.1:50070";  // HOST:PORT of gRPC; port 0: any free port
+  bool insecure = false;                   // allows listening beyond loopback, where everyone is an operator
   std::string lcm;                         // LCM URL; empty: off
-  double max_keyframes_per_s = 100;        // that one robot may bring over LCM in the long run; 0: any number
-  std::vector<std::string> robots;         // whose keyframes are taken, by name; empty: all
+  double max_keyframes_per_s = 100;        // mean that one robot may send over LCM; 0: no limit
+  std::vector<std::string> robots;         // names of the robots whose keyframes are taken; empty: all
   std::uint64_t memory_budget_mb = 1024;
-  std::uint64_t disk_low_water_mb = 256;  // free below it: nothing is taken in
-  std::string vocabulary;                 // file; empty: the one shipped
+  std::uint64_t disk_low_water_mb = 256;  // with less free disk space nothing is taken in
+  std::string vocabulary;                 // file; empty: the shipped one
   std::string log_level = "info";
   rpc::RpcLimits rpc;
   map::MapperOptions map;
-  // What routes are found by in milliseconds, beside distance and time. Each takes memory.
+  // Metrics, beside distance and time, for which routes are found in milliseconds. Each takes memory.
   std::vector<route::RouteWeights> route_mixes{route::kByTimeStandingToo, route::kByCertainty};
 
   std::vector<route::RouteWeights> route_metrics() const {
@@ -36,16 +36,17 @@ struct Config {
   }
 };
 
-// Changes `config` as the file says; what it leaves out stays. BAD_CONFIG with "FILE:LINE: ..." for a key that is
-// unknown, given twice, or has a value of the wrong kind or out of range; NO_SUCH_FILE.
+// Sets the keys of the file in `config`; other settings do not change. BAD_CONFIG with "FILE:LINE: ..." for a key that
+// is unknown, given twice, or has a value of the wrong kind or out of range; `config` then stays as it was.
+// NO_SUCH_FILE.
 Status read_config(const std::string& path, Config& config);
-// The same from text; `name` stands for the file in messages.
+// The same for the text of a file. Messages use `name` for the file.
 Status parse_config(std::string_view text, const std::string& name, Config& config);
 
-// Config::lcm as people say it: "none" is off too, so that a command line can take back what the file says.
+// Config::lcm for a setting as given: "none" means off, so that the command line can override a URL in the file.
 std::string lcm_url_of(const std::string& said);
 
-// BAD_CONFIG if parts contradict each other or something needed is missing.
+// BAD_CONFIG if settings contradict each other or a necessary one is missing.
 Status check_config(const Config& config);
 
 struct HostPort {
@@ -54,7 +55,7 @@ struct HostPort {
   bool loopback = false;  // 127.0.0.0/8, ::1 or localhost
   std::string to_string() const;
 };
-// "127.0.0.1:50070", "[::1]:0", "localhost:50070". BAD_CONFIG.
+// Parses HOST:PORT, as in "127.0.0.1:50070", "[::1]:0" or "localhost:50070". BAD_CONFIG if it is none.
 Result<HostPort> parse_host_port(std::string_view text);
 
 }  // namespace relmap::ops

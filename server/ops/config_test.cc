@@ -16,7 +16,7 @@ std::string refusal(std::string_view text) {
   return status.message();
 }
 
-TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
+TEST(Config, ReadsKeysOfTheFileAndKeepsOtherDefaults) {
   Config config;
   ASSERT_TRUE(parse_config("data: /srv/map\n"
                            "memory_budget_mb: 64\n"
@@ -52,7 +52,7 @@ TEST(Config, AnEmptyFileChangesNothing) {
   EXPECT_TRUE(parse_config("# nothing\n", "relmapd.yaml", config).ok());
 }
 
-TEST(Config, RefusesWithTheLine) {
+TEST(Config, RefusesBadKeysWithTheirLine) {
   EXPECT_EQ(refusal("data: x\nmemroy_budget_mb: 64\n"), "relmapd.yaml:2: unknown key 'memroy_budget_mb'");
   EXPECT_EQ(refusal("rpc:\n  thread: 2\n"), "relmapd.yaml:2: unknown key 'rpc.thread'");
   EXPECT_EQ(refusal("memory_budget_mb: 1\n"),
@@ -60,7 +60,7 @@ TEST(Config, RefusesWithTheLine) {
   EXPECT_EQ(refusal("\nrpc: {threads: 1.5}\n"), "relmapd.yaml:2: 'rpc.threads' needs a whole number from 1 to 256");
   EXPECT_EQ(refusal("rba: {delta_eps: .nan}\n"), "relmapd.yaml:1: 'rba.delta_eps' needs a number from 0 to 10");
   EXPECT_EQ(refusal("deterministic: maybe\n"), "relmapd.yaml:1: 'deterministic' needs true or false");
-  EXPECT_EQ(refusal("lcm: [a, b]\n"), "relmapd.yaml:1: 'lcm' needs a text");
+  EXPECT_EQ(refusal("lcm: [a, b]\n"), "relmapd.yaml:1: 'lcm' needs text");
   EXPECT_EQ(refusal("data: a\ndata: b\n"), "relmapd.yaml:2: 'data' is given twice");
   EXPECT_TRUE(refusal("routes: {mixes: 3}\n").ends_with("needs a list of at most 8 weights"));
   EXPECT_TRUE(refusal("routes: {mixes: [3]}\n").ends_with("needs weights like {metre: 1, driven_second: 0.5}"));
@@ -85,14 +85,14 @@ TEST(Config, ARefusedFileChangesNothing) {
   EXPECT_EQ(config.data, "");
 }
 
-TEST(Config, AMissingFileIsNamed) {
+TEST(Config, AMissingFileIsReported) {
   Config config;
   const Status status = read_config("/nowhere/relmapd.yaml", config);
   EXPECT_EQ(status.reason(), Reason::NO_SUCH_FILE);
   EXPECT_NE(status.message().find("/nowhere/relmapd.yaml"), std::string::npos);
 }
 
-TEST(Config, ListeningBeyondLoopbackMustBeSaid) {
+TEST(Config, ListeningBeyondLoopbackNeedsInsecure) {
   Config config;
   config.data = "map";
   for (const char* address : {"127.0.0.1:0", "127.8.0.1:1", "[::1]:50070", "localhost:50070"}) {
@@ -108,7 +108,7 @@ TEST(Config, ListeningBeyondLoopbackMustBeSaid) {
   }
 }
 
-TEST(Config, AnLcmUrlMustBeOneThatKeyframesCanComeFrom) {
+TEST(Config, RefusesLcmUrlsThatCannotDeliverKeyframes) {
   Config config;
   config.data = "map";
   const std::string log = testing::TempDir() + "lcmlog_" + std::to_string(getpid());

@@ -25,7 +25,7 @@ namespace relmap::ops {
 
 namespace {
 
-constexpr std::chrono::seconds kPatience{5};  // for running calls, at stop
+constexpr std::chrono::seconds kPatience{5};  // that running calls get to end at a stop
 constexpr std::chrono::minutes kReportInterval{1};
 
 rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
@@ -39,8 +39,8 @@ rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
   facts.robots = stats.sessions;
   facts.incomplete = stats.pending;
   for (std::size_t number = 0; number < stats.parts_refused.size(); ++number) {
-    // Refused keyframes are settled and counted by the map once their session has begun; the rest is asked for again or
-    // was no message.
+    // Keyframes refused for good are counted by the map once their session has begun; others are asked for again, or
+    // were no message.
     const std::uint64_t count =
         stats.parts_refused[number] + stats.messages_refused[number] + stats.refused_before_begin[number];
     if (count > 0) facts.not_taken[static_cast<Reason>(number)] = count;
@@ -52,7 +52,7 @@ Result<std::shared_ptr<const place::Vocabulary>> load_vocabulary(const Config& c
   return place::Vocabulary::load(config.vocabulary.empty() ? place::default_vocabulary_path() : config.vocabulary);
 }
 
-// What is damaged beyond being served may still be mended, and words can be made anew.
+// Adds which command can repair the map, or compute its words again.
 Status with_advice(const Status& status, const Config& config) {
   if (status.reason() == Reason::DATA_LOSS)
     return {status.reason(), status.message() + "; relmap-admin repair " + config.data + " keeps what can be read"};
@@ -100,7 +100,7 @@ struct Daemon::Impl {
   const BootId boot = SessionUuid::random().bytes;
   const std::int64_t started_us = now_us();
 
-  // In the order in which they are made; destroyed the other way round.
+  // In order of construction; destroyed in reverse order.
   std::shared_ptr<storage::Budget> budget;
   std::unique_ptr<map::Mapper> mapper;
   std::unique_ptr<ingest::MapperSink> sink;
@@ -115,7 +115,7 @@ struct Daemon::Impl {
 
   std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
   bool stopped = false;
-  std::uint64_t low_water = 0;  // bytes free on the disk below which nothing is taken in
+  std::uint64_t low_water = 0;  // with fewer free bytes on the disk nothing is taken in
 };
 
 Status Daemon::Impl::open_map() {
@@ -126,7 +126,7 @@ Status Daemon::Impl::open_map() {
   storage::RocksDbOptions options;
   options.cache_bytes = budget->allowance(storage::Share::kEngine);
   options.or_read_only = true;
-  // At least as much as a commit of all that may be dirty takes.
+  // At least enough for a commit of everything that may be dirty.
   low_water = std::max<std::uint64_t>(config.disk_low_water_mb << 20, budget->allowance(storage::Share::kDirty));
   if (const auto room = storage::posix_file_system()->room(config.data); room.ok())
     low_water = std::min(low_water, room->size / 16);
@@ -135,7 +135,7 @@ Status Daemon::Impl::open_map() {
   if (!engine.ok()) return engine.status();
   const auto stats = (*engine)->stats();
   if (stats.ok() && !stats->dropped.empty()) spdlog::warn("{}: {}", config.data, stats->dropped);
-  remove_endpoint(config.data);  // of a daemon that ended without a word; the folder is ours now
+  remove_endpoint(config.data);  // left by a daemon that crashed
   map::MapperOptions map_options = config.map;
   map_options.folder = config.data;
   auto opened = map::Mapper::open(*engine, budget, *vocabulary, map_options);
@@ -199,7 +199,7 @@ void Daemon::Impl::start_lcm() {
   auto started = ingest::LcmIngest::start(
       config.lcm, *ingest, [this] { return lcm_status(); }, queue_bytes);
   if (started.ok()) {
-    budget->charge(storage::Share::kReassembly, queue_bytes);  // for as long as the daemon runs
+    budget->charge(storage::Share::kReassembly, queue_bytes);  // while the daemon runs
     lcm = std::move(started).value();
     return;
   }

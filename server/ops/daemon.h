@@ -1,4 +1,4 @@
-// The daemon as a whole: data folder, map, ways in and out; what relmapd is but for its command line.
+// The whole daemon except its command line: data folder, map, ingest and RPC server.
 #pragma once
 
 #include <memory>
@@ -10,25 +10,26 @@ namespace relmap::ops {
 
 class Daemon {
  public:
-  // Takes the data folder (made if there is none), recovers the map, serves gRPC, writes DIR/endpoint, and starts LCM
-  // ingest if the configuration names a URL; if that fails, says so in the log and in status and serves all the same.
-  // BAD_CONFIG, FOLDER_LOCKED, PORT_IN_USE, NO_SUCH_FILE (the vocabulary), WRONG_VOCABULARY, and what is wrong with the
-  // folder: NOT_A_MAP (nothing is written to it then), IO_ERROR, DATA_LOSS, UNKNOWN_FORMAT_VERSION.
+  // Locks the data folder (creating it if necessary), recovers the map, serves gRPC, starts LCM ingest if the
+  // configuration has a URL, and writes DIR/endpoint. If LCM cannot start, the log and the status name the reason and
+  // the daemon serves without it. BAD_CONFIG, FOLDER_LOCKED, PORT_IN_USE, NO_SUCH_FILE (the vocabulary),
+  // WRONG_VOCABULARY, and for the folder NOT_A_MAP (nothing is written to it then), IO_ERROR, DATA_LOSS,
+  // UNKNOWN_FORMAT_VERSION.
   static Result<std::unique_ptr<Daemon>> start(const Config& config);
-  // What start() would say of the configuration by itself, of the files that it names, and of a data folder that is
-  // none. Writes nothing, takes no lock and no port.
+  // Checks the configuration, the files that it names, and whether the data folder is a map or may become one, with the
+  // errors of start(). Writes nothing and takes no lock and no port.
   static Status check(const Config& config);
-  // As stop().
+  // Calls stop().
   ~Daemon();
 
-  // host:port that gRPC is served on.
+  // HOST:PORT at which gRPC is served.
   const std::string& address() const;
 
-  // What has to be done now and then: about once a second.
+  // Periodic work. Call about once a second.
   void tick();
 
-  // Takes nothing more in, ends running calls, applies what is durable, commits. Not ok: the last commit failed (what
-  // was acknowledged is in the journal all the same).
+  // Takes nothing more in, ends running calls, applies what is durable, and commits. Not OK if the last commit failed;
+  // acknowledged keyframes are in the journal even then.
   Status stop();
 
  private:

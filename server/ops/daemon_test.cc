@@ -32,7 +32,7 @@ class DaemonTest : public testing::Test {
   Config config_;
 };
 
-TEST_F(DaemonTest, SaysWhereItServesAndTakesItBackWhenItStops) {
+TEST_F(DaemonTest, WritesTheEndpointFileAndRemovesItWhenItStops) {
   auto daemon = Daemon::start(config_);
   ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
   EXPECT_THAT(endpoint(), testing::HasSubstr("address " + (*daemon)->address() + "\npid " + std::to_string(getpid())));
@@ -41,14 +41,14 @@ TEST_F(DaemonTest, SaysWhereItServesAndTakesItBackWhenItStops) {
   EXPECT_FALSE(std::filesystem::exists(config_.data + "/endpoint"));
 }
 
-TEST_F(DaemonTest, TheFolderIsFreeAgainAfterwards) {
+TEST_F(DaemonTest, ReleasesTheFolderWhenItStops) {
   for (int run = 0; run < 2; ++run) {
     auto daemon = Daemon::start(config_);
     ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
   }
 }
 
-TEST_F(DaemonTest, ASecondOneOnTheFolderFailsByNameAndLeavesTheFirstAlone) {
+TEST_F(DaemonTest, ASecondDaemonOnTheFolderFailsAndDoesNotDisturbTheFirst) {
   auto first = Daemon::start(config_);
   ASSERT_TRUE(first.ok());
   const std::string before = endpoint();
@@ -58,7 +58,7 @@ TEST_F(DaemonTest, ASecondOneOnTheFolderFailsByNameAndLeavesTheFirstAlone) {
   EXPECT_EQ(endpoint(), before);
 }
 
-TEST_F(DaemonTest, ASecondOneOnThePortFailsByName) {
+TEST_F(DaemonTest, ASecondDaemonOnThePortFails) {
   auto first = Daemon::start(config_);
   ASSERT_TRUE(first.ok());
   Config second = config_;
@@ -68,7 +68,7 @@ TEST_F(DaemonTest, ASecondOneOnThePortFailsByName) {
   EXPECT_FALSE(std::filesystem::exists(second.data + "/endpoint"));
 }
 
-TEST_F(DaemonTest, RefusesWhatItCannotServe) {
+TEST_F(DaemonTest, RefusesUnusableConfigurations) {
   Config config = config_;
   config.listen = "0.0.0.0:0";
   EXPECT_EQ(Daemon::start(config).reason(), Reason::BAD_CONFIG);
@@ -82,7 +82,7 @@ TEST_F(DaemonTest, RefusesWhatItCannotServe) {
   EXPECT_EQ(Daemon::start(config).reason(), Reason::IO_ERROR);
 }
 
-TEST_F(DaemonTest, ServesWithoutLcmIfThatCannotStart) {
+TEST_F(DaemonTest, ServesWithoutLcmIfLcmCannotStart) {
   std::filesystem::create_directories(folder_ + "/log");  // LCM reads no folder
   config_.lcm = "file://" + folder_ + "/log";
   auto daemon = Daemon::start(config_);
@@ -90,14 +90,14 @@ TEST_F(DaemonTest, ServesWithoutLcmIfThatCannotStart) {
   EXPECT_TRUE((*daemon)->stop().ok());
 }
 
-TEST_F(DaemonTest, AFolderOfOtherThingsIsRefusedByNameAndNothingIsWrittenToIt) {
+TEST_F(DaemonTest, AFolderOfOtherFilesIsRefusedAndNotWrittenTo) {
   const auto names = [&] {
     std::set<std::string> all;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ + "/pictures"))
       all.insert(entry.path().string());
     return all;
   };
-  std::filesystem::create_directories(folder_ + "/pictures/map");  // whose name means nothing
+  std::filesystem::create_directories(folder_ + "/pictures/map");  // a folder that only has the name of a map's
   std::ofstream(folder_ + "/pictures/a.jpg") << "a picture";
   std::ofstream(folder_ + "/pictures/map/b.jpg") << "another";
   const auto before = names();
@@ -112,8 +112,8 @@ TEST_F(DaemonTest, AFolderOfOtherThingsIsRefusedByNameAndNothingIsWrittenToIt) {
   EXPECT_EQ(names().size(), before.size() + 1);
 }
 
-// Whatever a first start may have left behind that was broken off, and what a disk has in its topmost folder.
-TEST_F(DaemonTest, AFolderThatBecomesAMapIsTaken) {
+// What an interrupted first start may leave behind, and the lost+found of a disk.
+TEST_F(DaemonTest, EmptyMissingAndUnfinishedFoldersAreTaken) {
   std::filesystem::create_directories(config_.data + "/lost+found");
   for (const char* name : {"LOCK", "FORMAT.new"}) std::ofstream(config_.data + "/" + name) << "relm";
   EXPECT_TRUE(Daemon::check(config_).ok());
@@ -130,7 +130,7 @@ TEST_F(DaemonTest, AFolderThatBecomesAMapIsTaken) {
   ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
 }
 
-TEST_F(DaemonTest, WhatCannotStartIsNotCalledSound) {
+TEST_F(DaemonTest, ConfigurationsThatCannotStartFailTheCheck) {
   EXPECT_TRUE(Daemon::check(config_).ok());
   EXPECT_FALSE(std::filesystem::exists(config_.data)) << "to check is to write nothing";
   Config config = config_;

@@ -1,5 +1,5 @@
-// DIR/endpoint: where the daemon that owns the data folder DIR answers. It is there only while the daemon serves
-// (after a crash it stays behind; its pid and boot id tell).
+// The file DIR/endpoint tells at which address the daemon that owns the data folder DIR serves. It exists while the
+// daemon serves. After a crash it stays behind, which can be told by its pid and boot id.
 //
 //   address 127.0.0.1:50070
 //   pid 4711
@@ -19,7 +19,7 @@ struct Endpoint {
   std::string boot_id;
 };
 
-// Written beside, then renamed into place. IO_ERROR.
+// Writes the file atomically, by renaming a temporary one. IO_ERROR.
 Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint);
 void remove_endpoint(const std::string& data_folder);
 

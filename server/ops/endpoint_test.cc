@@ -11,7 +11,7 @@
 namespace relmap::ops {
 namespace {
 
-TEST(Endpoint, IsWrittenWholeAndRemoved) {
+TEST(Endpoint, IsWrittenAtomicallyAndRemoved) {
   const std::string folder = testing::TempDir() + "relmap_endpoint_test";
   std::filesystem::create_directories(folder);
   ASSERT_TRUE(write_endpoint(folder, {"127.0.0.1:50070", 4711, "b007"}).ok());
@@ -24,9 +24,7 @@ TEST(Endpoint, IsWrittenWholeAndRemoved) {
   std::filesystem::remove_all(folder);
 }
 
-TEST(Endpoint, AFolderThatIsNotThereIsAnError) {
-  EXPECT_EQ(write_endpoint("/nowhere/at/all", {}).reason(), Reason::IO_ERROR);
-}
+TEST(Endpoint, AMissingFolderIsAnError) { EXPECT_EQ(write_endpoint("/nowhere/at/all", {}).reason(), Reason::IO_ERROR); }
 
 TEST(Process, KnowsItsResidentSize) {
   EXPECT_GT(resident_bytes(), 1u << 20);

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <string>
 
-// jemalloc's, if the program has it.
+// Of jemalloc; null if the program does not link it.
 extern "C" int mallctl(const char* name, void* old, std::size_t* old_size, void* fresh, std::size_t fresh_size)
     __attribute__((weak));
 

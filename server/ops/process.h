@@ -1,4 +1,4 @@
-// The process's own memory, as the system sees it.
+// Memory of this process as the system sees it.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,7 @@ namespace relmap::ops {
 std::size_t resident_bytes();
 std::size_t peak_resident_bytes();
 
-// Gives free memory back to the system, where the program's malloc is jemalloc's: by itself it does so only as it is
-// used.
+// Returns free memory to the system if the program uses jemalloc, which by itself does so only while it is being used.
 void give_back_free_memory();
 
 }  // namespace relmap::ops

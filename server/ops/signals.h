@@ -1,4 +1,4 @@
-// SIGTERM and SIGINT, taken by a thread that waits for them instead of a handler.
+// Handles SIGTERM and SIGINT by a thread that waits for them instead of a signal handler.
 #pragma once
 
 #include <chrono>
@@ -6,12 +6,12 @@
 
 namespace relmap::ops {
 
-// Blocks SIGTERM and SIGINT and ignores SIGPIPE, in this thread and all that it starts. Call it before the first
-// thread starts.
+// Blocks SIGTERM and SIGINT in this thread and all that it starts, and ignores SIGPIPE. Call it before the first thread
+// starts.
 void block_stop_signals();
 
-// Waits for SIGTERM or SIGINT and returns its number; nullopt after `timeout`. A second one then ends the process at
-// once, as if unhandled: what was acknowledged is in the journal.
+// Waits for SIGTERM or SIGINT and returns its number; nullopt after `timeout`. After it has returned a signal, another
+// one ends the process at once. That loses nothing acknowledged, since it is in the journal.
 std::optional<int> wait_for_stop_signal(std::chrono::milliseconds timeout);
 
 }  // namespace relmap::ops

@@ -12,7 +12,7 @@ namespace {
 constexpr double kFirstLambda = 1e-6;
 constexpr double kMinLambda = 1e-9;
 constexpr double kMaxLambda = 1e6;
-constexpr double kCovarianceLambda = 1e-5;  // above it the last system is no longer that of the solution
+constexpr double kCovarianceLambda = 1e-5;  // a system with more damping is factored anew for the covariances
 
 void take_step(const std::vector<Vector6>& dxi, const std::vector<Vector3>& dl, Problem* problem) {
   for (ProblemEdge& edge : problem->edges)
@@ -65,8 +65,8 @@ SolverReport LevenbergMarquardt::solve(Problem* problem, const SolverOptions& op
   ReducedSystem& system = equations_.system();
   start_.save(*problem);
   double lambda = kFirstLambda;
-  bool solved = false;                // some system could be solved
-  double factored_with = kMaxLambda;  // what `system` was damped with; that much if it is of no use
+  bool solved = false;                // at least one system could be solved
+  double factored_with = kMaxLambda;  // damping of the factored `system`; kMaxLambda if it is not factored
   while (report.iterations < options.max_iterations) {
     ++report.iterations;
     factored_with = kMaxLambda;
@@ -98,7 +98,7 @@ SolverReport LevenbergMarquardt::solve(Problem* problem, const SolverOptions& op
       }
       before_.restore(problem);
       problem->compose(&poses_);
-      // No descent left to find: the step is as small as the arithmetic.
+      // Converged: the cost rose by no more than rounding.
       if (after - cost <= 1e-9 * cost) break;
     }
     lambda *= 100;

@@ -17,7 +17,7 @@ double cost_of(const Problem& problem) {
   return true_cost(problem, poses, 2);
 }
 
-TEST(LevenbergMarquardt, EndsWhereCentralDifferencesOfTheTrueCostVanish) {
+TEST(LevenbergMarquardt, ConvergesWhereCentralDifferencesOfTheTrueCostVanish) {
   Problem problem = ProblemSample().make();
   SolverOptions options;
   options.max_iterations = 100;
@@ -63,7 +63,7 @@ TEST(LevenbergMarquardt, EndsWhereCentralDifferencesOfTheTrueCostVanish) {
     }
 }
 
-TEST(LevenbergMarquardt, NeverEndsAboveItsStartHoweverFarOffThatIs) {
+TEST(LevenbergMarquardt, NeverIncreasesTheCostHoweverFarOffTheStartIs) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     ProblemSample sample;
     sample.seed = seed;
@@ -88,7 +88,7 @@ TEST(LevenbergMarquardt, MovesNothingThatIsHeld) {
       EXPECT_EQ(problem.landmarks[l].abr, before.landmarks[l].abr);
 }
 
-TEST(LevenbergMarquardt, LeavesTheProblemAsItWasWhenItIsSingular) {
+TEST(LevenbergMarquardt, LeavesASingularProblemUnchanged) {
   Problem problem = ProblemSample().make();
   // An edge that moves, and that neither a measurement nor a prior holds.
   problem.edges.push_back({});
@@ -104,7 +104,7 @@ TEST(LevenbergMarquardt, LeavesTheProblemAsItWasWhenItIsSingular) {
     EXPECT_EQ(problem.landmarks[l].abr, before.landmarks[l].abr);
 }
 
-TEST(LevenbergMarquardt, LeavesTheProblemAsItWasWhenAMeasurementIsNoNumber) {
+TEST(LevenbergMarquardt, LeavesTheProblemUnchangedWhenAMeasurementIsNaN) {
   Problem problem = ProblemSample().make();
   for (auto& observation : problem.observations) {
     observation.counted = true;
@@ -116,7 +116,7 @@ TEST(LevenbergMarquardt, LeavesTheProblemAsItWasWhenAMeasurementIsNoNumber) {
   for (std::size_t e = 0; e < problem.edges.size(); ++e) EXPECT_EQ(problem.edges[e].T_ab.t, before.edges[e].T_ab.t);
 }
 
-TEST(LevenbergMarquardt, CovariancesAreThoseOfTheInverseOfTheReducedSystem) {
+TEST(LevenbergMarquardt, CovariancesEqualTheInverseOfTheReducedSystem) {
   Problem problem = ProblemSample().make();
   SolverOptions options;
   options.max_iterations = 50;

@@ -11,15 +11,16 @@ namespace {
 
 constexpr std::size_t kMaxCameras = 64;  // kept from one relaxation to the next
 
-// How much wronger than tracking a binding measures. A track that is the continuation of an older one by its looks
-// started at a corner of its own, a pixel beside, and stays there; a keypoint without a track is two pixels beside.
+// Standard deviation of a bound observation over that of a tracked one. A track that was bound to an older landmark by
+// its descriptor started at a corner of its own, about a pixel away, and stays there; a keypoint without a track is
+// about two pixels away.
 constexpr double kClaimedSigma = 3, kUntrackedSigma = 8;
 
-// `meant`: the landmark in force that the observation stands for.
-double sigma_of(const storage::Observation& observation, LandmarkId meant) {
+// `in_force` is the landmark in force that the observation stands for.
+double sigma_of(const storage::Observation& observation, LandmarkId in_force) {
   const double sigma = pixel_sigma(observation.level);
   if (!observation.is_tracked() && !observation.aligned) return kUntrackedSigma * sigma;
-  return observation.landmark == meant ? sigma : kClaimedSigma * sigma;
+  return observation.landmark == in_force ? sigma : kClaimedSigma * sigma;
 }
 
 }  // namespace
@@ -34,7 +35,7 @@ void LocalMap::clear() {
   landmarks.clear();
   observations.clear();
   views_.clear();
-  settled_.clear();
+  frame_fixed_.clear();
   first_landmark_.clear();
   landmark_at_.clear();
 }
@@ -141,21 +142,21 @@ void LocalMap::load_observers(std::int32_t point) {
     if (const std::int32_t observer = frame(id); observer >= 0) load_observations(observer);
 }
 
-bool LocalMap::frame_is_settled(std::int32_t of) {
-  if (settled_.size() < frames.size()) settled_.resize(frames.size(), -1);
-  if (settled_[of] >= 0) return settled_[of] != 0;
+bool LocalMap::frame_is_fixed(std::int32_t of) {
+  if (frame_fixed_.size() < frames.size()) frame_fixed_.resize(frames.size(), -1);
+  if (frame_fixed_[of] >= 0) return frame_fixed_[of] != 0;
   std::uint32_t measured = 0;
   if (const auto warm = graph_.warm(frames[of].id))
     for (const storage::Observation& record : warm->observations) {
       if (measured == storage::kMinSupport) break;
       const std::int32_t point = holds(record.origin) ? landmark(record.landmark) : -1;
-      if (point < 0 || !landmarks[point].settled) continue;
+      if (point < 0 || !landmarks[point].fixed) continue;
       const auto& list = landmarks[point].record->observers;
       measured += std::find(list.begin(), list.end(), frames[of].id) != list.end();
     }
-  settled_.resize(frames.size(), -1);
-  settled_[of] = static_cast<std::int8_t>(measured == storage::kMinSupport);
-  return settled_[of] != 0;
+  frame_fixed_.resize(frames.size(), -1);
+  frame_fixed_[of] = static_cast<std::int8_t>(measured == storage::kMinSupport);
+  return frame_fixed_[of] != 0;
 }
 
 }  // namespace relmap::rba

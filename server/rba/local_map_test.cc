@@ -54,7 +54,7 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
   EXPECT_GT(aliases, 100U);
 }
 
-TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
+TEST(LocalMap, TracksBoundByAClosureMeasureWorse) {
   LocalMap local(graph());
   std::map<double, int> tracked, claimed;  // by information
   for (std::uint32_t i = 0; i < looped().driven(); ++i) {
@@ -74,7 +74,7 @@ TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
   EXPECT_DOUBLE_EQ(tracked.begin()->first, 9 * claimed.begin()->first);
 }
 
-TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
+TEST(LocalMap, KeypointsWithoutATrackMeasureWorst) {
   testing::SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
   drive.drive();
   const ClosureId closure = accepted_closure(drive);
@@ -92,7 +92,7 @@ TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
   EXPECT_DOUBLE_EQ(tracked.information, 64 * keypoint.information);
 }
 
-TEST(LocalMap, WhatIsAlignedInThePictureMeasuresLikeATrackAndWhatIsNotNeededNothing) {
+TEST(LocalMap, AlignedBindingsMeasureLikeTracksAndUnneededOnesAreIgnored) {
   testing::SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
   drive.drive();
   const ClosureId closure = accepted_closure(drive);
@@ -138,7 +138,7 @@ TEST(LocalMap, ServesOneRelaxationAfterAnother) {
   }
 }
 
-TEST(LocalMap, FramesThatNeverCameAreNone) {
+TEST(LocalMap, UnknownFramesHaveNoIndex) {
   LocalMap local(graph());
   EXPECT_EQ(local.frame({1, 100000}), -1);
   EXPECT_EQ(local.frame({7, 0}), -1);

@@ -1,4 +1,4 @@
-// What a camera measures of a landmark that is kept by inverse depth in another frame (docs/method.md, 3).
+// How a camera measures a landmark that is stored by inverse depth in another frame (docs/method.md, 3).
 //
 // The landmark q = (a, b, 1), rho = 1/z in its base j is, in the observing frame i and scaled by rho,
 //
@@ -20,14 +20,14 @@
 
 namespace relmap::rba {
 
-// s_z is the ratio of the depths in i and j; below this the point is as good as behind the camera.
+// s_z is the ratio of the depths in i and j. A point with a smaller ratio counts as behind the camera.
 inline constexpr double kMinDepthRatio = 1e-3;
 inline constexpr double kMinInverseDepth = 1e-5;  // per metre
 
 inline Vector3 ray(const Vector3& abr) { return {abr.x(), abr.y(), 1}; }
 inline Vector3 scaled_point(const SE3& T_ij, const Vector3& abr) { return T_ij.R * ray(abr) + abr.z() * T_ij.t; }
 
-// h; false if the point is not in front of the camera. `rho` is the landmark's.
+// Predicts h from s and the landmark's rho. False if the point is not in front of the camera.
 inline bool predict(const StereoCamera& camera, const Vector3& s, double rho, StereoPixel* h) {
   if (!(s.z() > kMinDepthRatio)) return false;
   const double k = camera.f / s.z();
@@ -35,7 +35,7 @@ inline bool predict(const StereoCamera& camera, const Vector3& s, double rho, St
   return true;
 }
 
-// z - h, pixels; the third is zero for a mono measurement.
+// z - h in pixels; the third component is zero for a mono measurement.
 inline Vector3 residual(const StereoPixel& z, bool mono, const StereoPixel& h) {
   return {z.x() - h.x(), z.y() - h.y(), mono ? 0 : z.z() - h.z()};
 }
@@ -64,22 +64,23 @@ inline MeasurementJacobian measurement_jacobian(const StereoCamera& camera, cons
   return j;
 }
 
-// d theta_i / d xi_c for an edge c between x and y on the path from the base j to i, x nearer to j. The same for every
-// i beyond it. Forward: the edge is stored along the path, as T_xy.
+// d theta_i / d xi_c for an edge c between x and y on the path from the base j to i, where x is nearer to j. It is the
+// same for every i beyond the edge. `forward`: the edge is stored along the path, as T_xy.
 inline Matrix6 edge_to_theta(bool forward, const SE3& T_jx, const SE3& T_jy) {
   return forward ? Matrix6(-T_jy.adjoint()) : T_jx.adjoint();
 }
 
-// Huber's loss of a whitened residual's norm e with the corner at k: rho(e) = e^2 below, 2 k e - k^2 above; and the
-// weight rho'(e) / (2 e).
+// Huber's loss of a whitened residual's norm e with the corner at k: rho(e) = e^2 below the corner, 2 k e - k^2 above
+// it. The weight is rho'(e) / (2 e).
 inline double huber_loss(double e, double k) { return e <= k ? e * e : 2 * k * e - k * k; }
 inline double huber_weight(double e, double k) { return e <= k ? 1 : k / e; }
-// By what the inverse of the weighted normal equations overstates the covariance, if residuals are Gaussian in three
-// coordinates: E[psi^2] E[w] / E[psi']^2 a coordinate, with psi = w r (Huber, Robust Statistics, 1981, 7.6).
+// The factor between the covariance and the inverse of the weighted normal equations, which overstates it, if
+// residuals are Gaussian in three coordinates: E[psi^2] E[w] / E[psi']^2 per coordinate, with psi = w r (Huber, Robust
+// Statistics, 1981, 7.6).
 inline double huber_covariance_factor(double k) {
   const double below = std::erf(k / std::numbers::sqrt2), c = std::sqrt(2 / std::numbers::pi) * std::exp(-k * k / 2);
   const double weight = below;             // P(e < k) + k E[1/e; e > k]
-  const double slope = below - c * k / 3;  // of psi, mean over directions
+  const double slope = below - c * k / 3;  // E[psi'], averaged over directions
   const double square = below - c * (k * k * k + 3 * k) / 3 + k * k * (1 - below + c * k) / 3;
   return square * weight / (slope * slope);
 }

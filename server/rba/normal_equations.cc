@@ -30,7 +30,7 @@ Matrix3 skew_times(const Matrix3& X, double a, double b) {
   return result;
 }
 
-// Of row p and column q >= p in the upper triangle of n rows, row by row.
+// Index of row p and column q >= p in the upper triangle of n rows, stored row by row.
 std::size_t in_triangle(std::int32_t n, std::int32_t p, std::int32_t q) {
   return static_cast<std::size_t>(p * n - p * (p + 1) / 2 + q);
 }
@@ -50,7 +50,7 @@ void subtract_outer(const Matrix63& X, const Matrix63& Y, Matrix6* M) {
   for (Eigen::Index k = 0; k < 6; ++k) M->col(k) -= Y(k, 0) * X.col(0) + Y(k, 1) * X.col(1) + Y(k, 2) * X.col(2);
 }
 
-// Of V = L L', of which the lower triangle is given: L^-1. False if V is not positive definite.
+// Computes L^-1 of V = L L' from V's lower triangle. False if V is not positive definite.
 bool invert_cholesky(const Matrix3& V, Matrix3* L_inverse) {
   const double l00 = std::sqrt(V(0, 0));
   const double l10 = V(1, 0) / l00, l20 = V(2, 0) / l00;
@@ -58,7 +58,7 @@ bool invert_cholesky(const Matrix3& V, Matrix3* L_inverse) {
   const double l21 = (V(2, 1) - l20 * l10) / l11;
   const double pivot = V(2, 2) - l20 * l20 - l21 * l21;
   const double l22 = std::sqrt(pivot);
-  // The determinant against the largest it could be: the product of the diagonal (Hadamard). False for NaN.
+  // Compares the determinant with its upper bound, the product of the diagonal (Hadamard). False for NaN.
   if (!(l00 * l00 * l11 * l11 * pivot > 1e-14 * V.diagonal().prod())) return false;
   const double i00 = 1 / l00, i11 = 1 / l11, i22 = 1 / l22;
   *L_inverse << i00, 0, 0,       //
@@ -235,8 +235,8 @@ bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& 
 }
 
 void NormalEquations::sum_over_descendants(const BaseGroups& base) {
-  // Children after parents, so that from the back each row is complete when it is added to its parent's. Each step is
-  // the congruence M <- L M L' with L = I + e_p e_g', on the upper triangle of a symmetric M.
+  // Children come after parents, so going backwards each row is complete when it is added to its parent's. Each step
+  // is the congruence M <- L M L' with L = I + e_p e_g', on the upper triangle of a symmetric M.
   const std::int32_t n = base.end - base.first;
   const auto M = [&](std::int32_t p, std::int32_t q) -> Matrix6& { return M_[in_triangle(n, p, q)]; };
   for (std::int32_t g = n - 1; g > 0; --g) {
@@ -260,7 +260,7 @@ void NormalEquations::add_to_system(const BaseGroups& base) {
       const Group& column = groups_[base.first + q];
       const Matrix6 left = S_transposed * M_[in_triangle(n, p, q)];
       const Matrix6 block = left * column.S;
-      if (row.column == column.column)  // the edge itself, or the same edge on two ways from the base
+      if (row.column == column.column)  // the edge itself, or the same edge on two paths from the base
         system_.add(row.column, row.column, p == q ? block : Matrix6(block + block.transpose()));
       else if (row.column > column.column)
         system_.add(row.column, column.column, block);

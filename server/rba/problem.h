@@ -1,9 +1,9 @@
-// A relative bundle adjustment as flat arrays: everything by local index, nothing of the map. What is solved for are
-// the edges that have a column and the landmarks that are free; the others are held where they are, and what is counted
-// of them measures the edges alone (docs/method.md, 3).
+// A relative bundle adjustment as flat arrays by local index, without any reference to the map. The unknowns are the
+// edges that have a column and the free landmarks. All other edges and landmarks are held; counted observations of
+// held landmarks measure the edges only (docs/method.md, 3).
 //
-// Observations stand by landmark, landmarks by base, free ones first; the nodes of a base's path tree stand together,
-// parents before children.
+// Observations are grouped by landmark, and landmarks by base with the free ones first. The nodes of a base's path tree
+// are consecutive, parents before children.
 #pragma once
 
 #include <cstdint>
@@ -14,22 +14,22 @@
 
 namespace relmap::rba {
 
-inline constexpr double kPriorInverseDepth = 0.1;       // per metre: of a landmark whose depth nothing tells
+inline constexpr double kPriorInverseDepth = 0.1;       // per metre: for a landmark whose depth is not measured
 inline constexpr double kPriorInverseDepthSigma = 0.5;  // per metre
 
 struct ProblemEdge {
   SE3 T_ab;
-  std::int32_t column = -1;  // of its 6 x 6 blocks in the reduced system; -1: it does not move
+  std::int32_t column = -1;  // of its 6 x 6 blocks in the reduced system; -1: the edge does not move
   bool prior = false;
   SE3 prior_T_ab;
   Matrix6 prior_information = Matrix6::Zero();
 };
 
-// An edge may be there more than once, on two ways from the base.
+// A node of a base's path tree. One edge may lead to several nodes, on different paths from the base.
 struct ProblemNode {
   std::int32_t parent = -1;  // index in `nodes`; -1: the root, which is the base
   std::int32_t edge = -1;
-  bool forward = false;  // from the parent, the edge is walked a -> b
+  bool forward = false;  // the path from the parent follows the edge from a to b
 };
 
 struct ProblemBase {
@@ -46,11 +46,11 @@ struct ProblemLandmark {
 struct ProblemObservation {
   StereoPixel z;
   double information = 1;  // 1 / sigma^2, per px^2
-  std::int32_t node = 0;   // of its landmark's base's tree, index in `nodes`
-  std::int32_t frame = 0;  // whose mean error it enters; the caller's index
+  std::int32_t node = 0;   // of the observing frame in the tree of the landmark's base, index in `nodes`
+  std::int32_t frame = 0;  // the observing frame, by the caller's index
   std::int32_t camera = 0;
   bool mono = false;
-  bool counted = true;  // it enters the solve; else only the mean error of its frame
+  bool counted = true;  // it enters the solve; otherwise only the mean error of its frame
 };
 
 struct Problem {
@@ -60,9 +60,9 @@ struct Problem {
   std::vector<ProblemBase> bases;
   std::vector<ProblemLandmark> landmarks;
   std::vector<ProblemObservation> observations;
-  std::int32_t columns = 0;  // edges that move
+  std::int32_t columns = 0;  // number of edges that move
 
-  // T_node_base of every node, from the edges as they are; `poses` as long as `nodes`.
+  // Computes T_node_base of every node from the present edges. `poses` gets one element for each node.
   void compose(std::vector<SE3>* poses) const;
 };
 

@@ -77,8 +77,7 @@ struct ProblemSample {
           open.push(y);
         }
       }
-      // Some frames are seen by another way too: over the edge that closes the cycle, and back along the tree from
-      // there.
+      // Some frames are reached by a second path too: over the edge that closes the cycle, and back along the tree.
       std::vector<int> again(frames, -1);
       for (std::size_t e = 0; e < ends.size(); ++e) {
         const auto edge_of = [&](int frame) { return problem.nodes[node_of[frame]].edge; };
@@ -97,7 +96,7 @@ struct ProblemSample {
       flat.first_landmark = static_cast<std::int32_t>(problem.landmarks.size());
       for (int k = 0; k < landmarks_per_frame; ++k)
         add_landmark(truth, k % 3 == 0 ? merged(node_of, again) : node_of, base, &random, &problem);
-      // The last one is held: constant, whatever sees it.
+      // The last one is held.
       flat.end_landmark = static_cast<std::int32_t>(problem.landmarks.size());
       flat.end_free = std::max(flat.first_landmark, flat.end_landmark - 1);
       problem.bases.push_back(flat);

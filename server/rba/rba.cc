@@ -15,11 +15,12 @@ namespace relmap::rba {
 
 namespace {
 
-// Edges between a marginal covariance that is believed and the nearest static frame (docs/method.md, 3).
+// An edge's marginal covariance is taken only if at least this many edges separate it from every static frame
+// (docs/method.md, 3).
 constexpr std::uint32_t kCovarianceDistance = 5;
-// What a dense reduced system bears: a ripple that reaches further goes on in idle time, from where this one ended.
+// Keeps the reduced system dense. A ripple that would reach further goes on in idle time, from where it stopped.
 constexpr std::size_t kMaxActiveFrames = 64;
-// A window is filled with frames that are not settled from among the nearest, so many windows of them.
+// A window is filled with the nearest frames that are not fixed, among this many windows' worth of frames.
 constexpr std::uint32_t kWindowsLooked = 3;
 constexpr int kFullIterations = 100;
 constexpr double kFullRelativeDecrease = 1e-12;
@@ -31,24 +32,24 @@ struct Relaxer::Impl {
 
   // How far a relaxation goes.
   struct Extent {
-    double delta_eps;      // a frame that moved by more is activated
-    std::uint64_t budget;  // of linearised observations
+    double delta_eps;      // in sigmas: a frame whose mean error changed by more is activated
+    std::uint64_t budget;  // linearised observations
     bool full = false;
   };
 
-  // Settled frames stand still, unless they are to be unsettled; frozen ones always.
+  // Fixed frames stand still unless moves_fixed; frames of frozen sessions always do.
   bool stands_still(std::int32_t frame) {
-    return local.is_frozen(frame) || (!unsettling && local.frame_is_settled(frame));
+    return local.is_frozen(frame) || (!moves_fixed && local.frame_is_fixed(frame));
   }
 
   void begin() {
     local.clear();
     region.clear();
     solved = 0;
-    unsettling = false;
+    moves_fixed = false;
   }
 
-  // Adds the frames nearest to this one, settled ones apart, to the seeds.
+  // Adds the frames nearest to this one, except those that stand still, to the seeds.
   void add_window(std::int32_t frame) {
     near.clear();
     local.nearest(frame, kWindowsLooked * options.window, &near);
@@ -60,9 +61,9 @@ struct Relaxer::Impl {
     }
   }
 
-  // Solves from these active frames on, and writes the outcome to the map.
+  // Activates these frames, solves and ripples, and writes the outcome to the map.
   void run(const std::vector<std::int32_t>& frames, const Extent& extent, RbaSummary* summary) {
-    region.hold_settled(!extent.full && !unsettling);
+    region.hold_fixed(!extent.full && !moves_fixed);
     for (const std::int32_t frame : frames)
       if (!local.is_frozen(frame)) region.activate(frame);
     if (region.active().empty()) return;
@@ -77,7 +78,7 @@ struct Relaxer::Impl {
     write(extent);
   }
 
-  // False if the solve failed: what it tried is forgotten.
+  // False if the solve failed; its result is then discarded.
   bool solve_once(const Extent& extent, RbaSummary* summary) {
     region.build(&problem);
     rba::SolverOptions how;
@@ -119,7 +120,8 @@ struct Relaxer::Impl {
     }
   }
 
-  // `moved`: static frames, settled ones apart, whose mean error is not what it was when they were last solved for.
+  // Sets `moved` to the static frames whose mean error differs by more than eps from that of their last solve, except
+  // those that stand still.
   void find_moved(double eps) {
     moved.clear();
     for (std::size_t f = 0; f < errors.size(); ++f) {
@@ -165,7 +167,7 @@ struct Relaxer::Impl {
       if (edge.previous >= 0)
         stored.correlation_with_previous =
             storage::to_correlation(edge.with_previous, edge.covariance, local.estimates[edge.previous].covariance);
-      // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
+      // A closure keeps the prior that its verification measured, because a free loop edge fits any measurements.
       if (stored.support >= storage::kMinSupport && stored.kind == storage::EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;
         stored.prior_covariance = stored.covariance;
@@ -181,8 +183,8 @@ struct Relaxer::Impl {
   rba::LevenbergMarquardt solver;
   rba::CovarianceRequest covariance;
   std::vector<rba::MeanError> errors;  // by local frame, after the last solve that succeeded
-  std::size_t solved = 0;              // active frames of that solve
-  bool unsettling = false;
+  std::size_t solved = 0;              // number of active frames of that solve
+  bool moves_fixed = false;
   std::vector<std::int32_t> seeds, moved, near;
 };
 
@@ -191,18 +193,18 @@ Relaxer::~Relaxer() = default;
 
 void Relaxer::freeze(std::vector<SessionNumber> sessions) { impl_->local.freeze(std::move(sessions)); }
 
-RbaSummary Relaxer::relax(std::span<const FrameId> seeds, bool unsettle) {
+RbaSummary Relaxer::relax(std::span<const FrameId> seeds, bool move_fixed) {
   RbaSummary summary;
   if (impl_->options.window == 0) return summary;
   impl_->begin();
-  impl_->unsettling = unsettle;
+  impl_->moves_fixed = move_fixed;
   impl_->seeds.clear();
   for (const FrameId seed : seeds) {
     const std::int32_t frame = impl_->local.frame(seed);
     if (frame >= 0) impl_->add_window(frame);
   }
   impl_->run(impl_->seeds, {impl_->options.delta_eps, impl_->options.budget}, &summary);
-  impl_->begin();  // lets go of the map's frames
+  impl_->begin();  // releases the map's frames
   return summary;
 }
 

@@ -1,6 +1,6 @@
-// Adaptive relative bundle adjustment (docs/method.md, 2 to 4; Sibley et al., IJRR 2010, sections 3.1 to 3.5): what the
-// map worker calls. The work of a call is bounded by counted units (linearised observations), never by time, so that a
-// journal replays to the same map bit for bit.
+// Adaptive relative bundle adjustment (docs/method.md, 2 to 4; Sibley et al., IJRR 2010, sections 3.1 to 3.5), as the
+// map worker calls it. The work of a call is bounded by a count (linearised observations), never by time, so a journal
+// replays to the same map bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -13,43 +13,45 @@
 namespace relmap::rba {
 
 struct RbaOptions {
-  std::uint32_t window = 8;      // frames nearest to a new frame in the graph that it activates; 0: nothing is relaxed
-  double delta_eps = 0.05;       // sigmas: change of a frame's mean error that activates it
-  double idle_delta_eps = 0.01;  // likewise, in idle work
+  std::uint32_t window = 8;      // a new frame activates this many frames nearest to it in the graph; 0: no relaxation
+  double delta_eps = 0.05;       // in sigmas: a frame whose mean error changes by more is activated
+  double idle_delta_eps = 0.01;  // the same in idle work
   std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
   int max_iterations = 6;        // of Levenberg-Marquardt, per solve
-  double huber_px = 2.0;         // in units of sigma
+  double huber_px = 2.0;         // corner of Huber's loss in sigmas, which are pixels for a track at the lowest level
 };
 
 struct RbaSummary {
   std::uint32_t solves = 0;
   std::uint32_t iterations = 0;
-  std::uint32_t active_frames = 0;  // in all solves together, each counted once
+  std::uint32_t active_frames = 0;  // summed over the regions of this call
   std::uint64_t work = 0;           // linearised observations
-  std::uint32_t failures = 0;       // NUMERICAL: left as it was
+  std::uint32_t failures = 0;       // solves that failed (NUMERICAL) and changed nothing
   double cost_before = 0, cost_after = 0;
 };
 
-// Used by the one thread that edits the map. Keeps its memory from one call to the next: where the map is in memory,
-// and no region larger than those before nor than ReducedSystem::kMaxDense edges, none is asked for.
+// For the one thread that edits the map. Reuses its memory: a call allocates nothing if the map is in memory and the
+// region is no larger than earlier ones, nor than ReducedSystem::kMaxDense edges.
 class Relaxer {
  public:
   Relaxer(storage::Map& map, const RbaOptions& options);
   ~Relaxer();
 
-  // Sessions of which no frame is activated and no landmark moves, from now on.
+  // Sets the sessions of which no frame is activated and no landmark moves from now on.
   void freeze(std::vector<SessionNumber> sessions);
 
-  // Relaxes the map around `seeds` (a new frame; both ends of a new loop edge): window, solve, ripple, until nothing
-  // explored has moved or the budget is used up. Updates edges (estimate, covariance), landmarks, mean errors and
-  // state().pending. `unsettle`: settled landmarks and frames move as well, as where something false that helped to
-  // settle them has been taken out.
-  RbaSummary relax(std::span<const FrameId> seeds, bool unsettle = false);
+  // Relaxes the map around `seeds` (a new frame, or both ends of a new loop edge): activates the window, solves, and
+  // lets the region ripple until no frame in reach has moved or a bound (budget, size of the region) is met. Updates
+  // edges (estimate, covariance), landmarks, mean errors and state().pending. With `move_fixed`, fixed landmarks and
+  // frames move as well: for use after a false closure that helped to fix them has been taken out.
+  RbaSummary relax(std::span<const FrameId> seeds, bool move_fixed = false);
 
-  // Continues with state().pending at idle_delta_eps; work == 0 in the summary when nothing is left.
+  // Relaxes frames of state().pending with idle_delta_eps until `budget` observations are linearised or none is
+  // pending. The summary's work is 0 when there was nothing to do.
   RbaSummary relax_pending(std::uint64_t budget);
 
-  // The full relative solution, everything active, to convergence: for comparisons. Covariances stay as they are.
+  // Computes the full relative solution to convergence, with all frames active, for comparisons. Covariances do not
+  // change.
   RbaSummary relax_fully();
 
  private:

@@ -45,16 +45,16 @@ TEST(Relax, ActiveRegionAtAClosureDoesNotGrowWithTheLoop) {
   for (const std::uint32_t loop : {150U, 600U}) {
     testing::SimulatedDrive drive(circle(loop, loop + 8), RbaOptions());
     drive.drive();
-    std::uint32_t most = 0, closures = 0;
+    std::uint32_t max_active = 0, closures = 0;
     for (std::uint32_t i = 0; i < drive.driven(); ++i) {
       EXPECT_EQ(drive.steps()[i].failures, 0U);
       if (!drive.steps()[i].closure) continue;
       ++closures;
-      most = std::max(most, drive.steps()[i].active_frames);
+      max_active = std::max(max_active, drive.steps()[i].active_frames);
     }
     EXPECT_GE(closures, 3U) << loop;
-    EXPECT_LE(most, 40U) << loop;
-    EXPECT_GE(most, 12U) << loop;
+    EXPECT_LE(max_active, 40U) << loop;
+    EXPECT_GE(max_active, 12U) << loop;
     EXPECT_LT(drive.revisit_error().mean_m, 0.05) << loop;
   }
 }
@@ -121,7 +121,7 @@ TEST(Relax, RecordsErrorsOfActiveFramesOnly) {
     }
 }
 
-TEST(Relax, AnImpossibleMeasurementLeavesTheMapAsItWasAndIsCounted) {
+TEST(Relax, AnImpossibleMeasurementLeavesTheMapUnchangedAndIsCounted) {
   testing::SimulatedDrive drive(circle(400, 30), RbaOptions());
   drive.drive();
   for (storage::Observation& observation : drive.map().edit_warm(drive.frame(29)).observations)
@@ -133,7 +133,7 @@ TEST(Relax, AnImpossibleMeasurementLeavesTheMapAsItWasAndIsCounted) {
   EXPECT_EQ(storage::hash_map(drive.map()).estimates, estimates);
 }
 
-TEST(Relax, FramesThatAreNotThereAreSkipped) {
+TEST(Relax, FramesThatDoNotExistAreSkipped) {
   testing::SimulatedDrive drive(circle(400, 5), RbaOptions());
   drive.drive();
   drive.map().state().pending.insert({9, 9});
@@ -182,7 +182,7 @@ TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
 }
 
 // Errors of neighbours pull against each other: counted as independent, they would make chains look less certain.
-TEST(Relax, EdgesKeepWhatTheyHaveInCommonWithTheEdgeBefore) {
+TEST(Relax, EdgesStoreTheirCorrelationWithThePreviousEdge) {
   testing::SimulatedDrive drive(circle(400, 120), RbaOptions());
   drive.drive();
   double alone = 0, common = 0;
@@ -196,7 +196,7 @@ TEST(Relax, EdgesKeepWhatTheyHaveInCommonWithTheEdgeBefore) {
   EXPECT_GT(common / alone, -0.5);
 }
 
-TEST(Relax, APlaceThatIsPassedAgainAndAgainCostsNoMoreThanOnTheSecondTime) {
+TEST(Relax, PassesOfAKnownPlaceCostNoMoreThanTheSecondPass) {
   constexpr std::uint32_t kLap = 50, kLaps = 40;
   sim::PointsWorldOptions options;
   options.frames = kLap * kLaps;
@@ -218,7 +218,7 @@ TEST(Relax, APlaceThatIsPassedAgainAndAgainCostsNoMoreThanOnTheSecondTime) {
   EXPECT_LT(revisits.mean_m, 0.02);
 }
 
-TEST(Relax, WhatIsSettledIsHeldUnlessItIsToBeUnsettled) {
+TEST(Relax, FixedLandmarksAreHeldUnlessTheyMayMove) {
   constexpr std::uint32_t kLap = 40;
   sim::PointsWorldOptions options;
   options.frames = 8 * kLap;
@@ -227,15 +227,15 @@ TEST(Relax, WhatIsSettledIsHeldUnlessItIsToBeUnsettled) {
   drive.drive();
   while (drive.relax_idle(1'000'000).work > 0) {
   }
-  // A settled landmark of the first lap, pushed aside.
+  // A fixed landmark of the first lap, pushed aside.
   const FrameId base = drive.frame(20);
   const auto& landmarks = drive.map().hot(base)->landmarks;
-  const auto settled = std::find_if(landmarks.begin(), landmarks.end(), [](const storage::Landmark& landmark) {
+  const auto fixed = std::find_if(landmarks.begin(), landmarks.end(), [](const storage::Landmark& landmark) {
     return storage::is_settled(landmark.observers);
   });
-  ASSERT_NE(settled, landmarks.end());
-  const auto slot = static_cast<std::size_t>(settled - landmarks.begin());
-  const Vector3 was = settled->abr, aside = was + Vector3(0.01, 0, 0);
+  ASSERT_NE(fixed, landmarks.end());
+  const auto slot = static_cast<std::size_t>(fixed - landmarks.begin());
+  const Vector3 was = fixed->abr, aside = was + Vector3(0.01, 0, 0);
   drive.map().edit_hot(base).landmarks[slot].abr = aside;
   Relaxer relaxer(drive.map(), RbaOptions());
   const FrameId seeds[] = {base};

@@ -58,8 +58,8 @@ bool ReducedSystem::factor(double lambda) {
   return sparse_->factorise(lambda * sparse_->diagonal());
 }
 
-// Right-looking, block by block. The blocks on the diagonal are kept inverted: one triangular inverse for each turns
-// all other divisions into products of fixed size.
+// Right-looking block Cholesky. The diagonal blocks are stored inverted: one triangular inverse for each turns all
+// other divisions into products of fixed size.
 bool ReducedSystem::factor_dense(double lambda) {
   factor_ = blocks_;
   for (std::int32_t k = 0; k < size_; ++k) factor_[at(k, k)].diagonal() *= 1 + lambda;

@@ -12,11 +12,11 @@ namespace relmap::rba {
 namespace {
 
 const double kMinParallaxCosine = std::cos(std::numbers::pi / 180);  // one degree
-// Steps of the motion to either side of an active frame within which others may reach what they see across it: half the
-// spacing of loop edges.
+// Odometry steps to either side of an active frame within which frames may have landmarks on the other side of it: half
+// the spacing of loop edges.
 constexpr int kAround = 8;
 
-// Of the rays to the landmark in the base and, by its measurement, in the observing frame.
+// Cosine of the angle between the ray to the landmark in the base and the measured ray in the observing frame.
 double parallax_cosine(const ProblemLandmark& landmark, const ProblemObservation& observation,
                        const StereoCamera& camera, const SE3& T_ij) {
   const Vector3 in_frame((observation.z.x() - camera.cx) / camera.f, (observation.z.y() - camera.cy) / camera.f, 1);
@@ -124,7 +124,7 @@ void Region::sort_observations() {
     first_of_tree_.push_back(tree_nodes_.size());
     first_end_.push_back(ends_.size());
   }
-  // Searches may have loaded more frames; they have no observations here.
+  // path_tree() may have loaded more frames; none of them has observations here.
   active_.resize(local_.frames.size());
 }
 
@@ -235,22 +235,22 @@ void Region::choose_measurements(Problem* problem) {
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
         count(point, problem->observations[o]);
     }
-    std::int32_t keep = base.first_landmark;  // free landmarks with something to measure them, moved to the front
+    std::int32_t keep = base.first_landmark;  // end of the free landmarks that are measured, moved to the front
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
       ProblemLandmark& point = problem->landmarks[l];
       bool measured = false, all_mono = true;
-      double widest = 1;  // cosine
+      double min_cosine = 1;  // of the parallax
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
         ProblemObservation& observation = problem->observations[o];
         if (!count(point, observation)) continue;
         measured = true;
         all_mono = all_mono && observation.mono;
         if (all_mono)
-          widest = std::min(widest, parallax_cosine(point, observation, problem->cameras[observation.camera],
-                                                    poses_[observation.node]));
+          min_cosine = std::min(min_cosine, parallax_cosine(point, observation, problem->cameras[observation.camera],
+                                                            poses_[observation.node]));
       }
       if (!measured) continue;
-      point.depth_prior = all_mono && widest > kMinParallaxCosine;
+      point.depth_prior = all_mono && min_cosine > kMinParallaxCosine;
       std::swap(problem->landmarks[keep], problem->landmarks[l]);
       std::swap(landmark_of_problem_[keep], landmark_of_problem_[l]);
       ++keep;
@@ -260,7 +260,7 @@ void Region::choose_measurements(Problem* problem) {
 }
 
 void Region::choose_columns(Problem* problem) {
-  // How many measurements each edge's position decides.
+  // `uses_`: how many counted measurements have each edge on their path.
   beyond_.assign(problem->nodes.size(), 0);
   uses_.assign(problem->edges.size(), 0);
   for (const ProblemBase& base : problem->bases) {
@@ -329,12 +329,12 @@ void Region::take(const Problem& problem) {
 }
 
 void Region::far_from_boundary(const Problem& problem, std::uint32_t distance, std::vector<char>* far) {
-  // Edges from the nearest static frame, along those of the problem, up to `distance`.
+  // `depth_`: number of the problem's edges to the nearest static frame, at most `distance`.
   depth_.assign(local_.frames.size(), distance);
   for (const ProblemObservation& seen : problem.observations)
     if (seen.counted && !is_active(seen.frame)) depth_[seen.frame] = 0;
-  // A frame beside the active ones stands still though nothing that it sees may count. (What a loop edge leads to, and
-  // is not seen from, is settled: better known than what is solved for.)
+  // A frame next to an active one along the odometry is static even if no measurement from it counts. (The frame at the
+  // other end of a loop edge from which nothing counts is fixed: it is known better than what is solved for.)
   for (const std::int32_t e : edge_of_column_) {
     if (local_.edges[e].id.ordinal != 0) continue;
     for (const std::int32_t end : {local_.edges[e].a, local_.edges[e].b})

@@ -94,7 +94,7 @@ TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {
   }
 }
 
-TEST_F(RegionTest, PointsOfOneEyeWithoutParallaxHaveADepthPrior) {
+TEST_F(RegionTest, MonoPointsWithoutParallaxHaveADepthPrior) {
   for (std::uint32_t i = 20; i < 30; ++i) region_.activate(local_.frame(drive_.frame(i)));
   region_.build(&problem_);
   int with = 0, without = 0;
@@ -118,7 +118,7 @@ TEST_F(RegionTest, PointsOfOneEyeWithoutParallaxHaveADepthPrior) {
   EXPECT_GT(without, 3);
 }
 
-TEST_F(RegionTest, CovariancesAreBelievedFarFromTheBoundaryOnly) {
+TEST_F(RegionTest, CovariancesAreTakenFarFromTheBoundaryOnly) {
   for (std::uint32_t i = 67; i < 75; ++i) region_.activate(local_.frame(drive_.frame(i)));
   region_.build(&problem_);
   std::vector<char> far;
@@ -133,11 +133,11 @@ TEST_F(RegionTest, CovariancesAreBelievedFarFromTheBoundaryOnly) {
   for (const EdgeId id : believed) EXPECT_GE(id.frame.index, 70U);
 }
 
-// A circle driven ten times: what the first laps saw is settled.
-class SettledRegionTest : public DrivenRegionTest {
+// A circle driven ten times: the landmarks that the first laps saw are fixed.
+class FixedRegionTest : public DrivenRegionTest {
  protected:
   static constexpr std::uint32_t kLap = 40, kFrames = 397;
-  SettledRegionTest() : DrivenRegionTest(kFrames, kLap, 0) {}
+  FixedRegionTest() : DrivenRegionTest(kFrames, kLap, 0) {}
 
   void build(std::uint32_t first, std::uint32_t end) {
     for (std::uint32_t i = first; i < end; ++i) region_.activate(local_.frame(drive_.frame(i)));
@@ -150,7 +150,7 @@ class SettledRegionTest : public DrivenRegionTest {
   }
 };
 
-TEST_F(SettledRegionTest, SettledLandmarksAreHeldAndMeasureTheEdgesThatMove) {
+TEST_F(FixedRegionTest, FixedLandmarksAreHeldAndMeasureTheEdgesThatMove) {
   build(kFrames - 20, kFrames - 12);
   std::size_t across = 0, own = 0;
   for (const ProblemBase& base : problem_.bases)
@@ -169,10 +169,10 @@ TEST_F(SettledRegionTest, SettledLandmarksAreHeldAndMeasureTheEdgesThatMove) {
     }
   EXPECT_GT(own, 8U * 15);
   EXPECT_GT(across, 0U) << "frames next to the active ones reach the map across them";
-  for (const LocalLandmark& landmark : local_.landmarks) EXPECT_FALSE(landmark.settled && landmark.observers_loaded);
+  for (const LocalLandmark& landmark : local_.landmarks) EXPECT_FALSE(landmark.fixed && landmark.observers_loaded);
 }
 
-TEST_F(SettledRegionTest, CovariancesAreNotBelievedNextToAFrameThatStandsStill) {
+TEST_F(FixedRegionTest, CovariancesAreNotTakenNextToAStaticFrame) {
   build(kFrames - 8, kFrames);
   std::vector<char> far;
   region_.far_from_boundary(problem_, 5, &far);
@@ -185,16 +185,16 @@ TEST_F(SettledRegionTest, CovariancesAreNotBelievedNextToAFrameThatStandsStill) 
   EXPECT_GT(believed, 0U);
 }
 
-TEST_F(SettledRegionTest, FramesThatSettledThemAreSettledAndThoseOfLaterPassesAreNot) {
-  std::size_t settled = 0;
-  for (std::uint32_t i = 0; i < kLap; ++i) settled += local_.frame_is_settled(local_.frame(drive_.frame(i)));
-  EXPECT_GT(settled, 30U);
+TEST_F(FixedRegionTest, FramesOfTheFirstPassesAreFixedAndThoseOfLaterPassesAreNot) {
+  std::size_t fixed = 0;
+  for (std::uint32_t i = 0; i < kLap; ++i) fixed += local_.frame_is_fixed(local_.frame(drive_.frame(i)));
+  EXPECT_GT(fixed, 30U);
   for (std::uint32_t i = kFrames - kLap; i < kFrames; ++i)
-    EXPECT_FALSE(local_.frame_is_settled(local_.frame(drive_.frame(i)))) << i;
+    EXPECT_FALSE(local_.frame_is_fixed(local_.frame(drive_.frame(i)))) << i;
 }
 
-TEST_F(SettledRegionTest, TheFullSolutionHoldsNothing) {
-  region_.hold_settled(false);
+TEST_F(FixedRegionTest, TheFullSolutionHoldsNothing) {
+  region_.hold_fixed(false);
   build(0, kFrames);
   for (const ProblemBase& base : problem_.bases) EXPECT_EQ(base.end_free, base.end_landmark);
   for (const ProblemObservation& seen : problem_.observations) EXPECT_TRUE(seen.counted);

@@ -1,4 +1,4 @@
-// A journal and a map for tests of ingest: records become durable when the test says so, and a crash forgets the rest.
+// A fake journal and map for tests of ingest. Records become durable when the test says so; a crash loses the others.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace relmap::intake {
 
-// What a map would know after the durable records. Immutable once published.
+// The part of a map that ingest reads, made of the durable records. Immutable once published.
 class FakeGraph final : public storage::PartialGraph {
  public:
   std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
@@ -42,13 +42,13 @@ class FakeGraph final : public storage::PartialGraph {
   storage::SettledTable settled;
 };
 
-// Thread-safe, but for the public members.
+// Thread-safe except for the public members.
 class FakeSink final : public KeyframeSink {
  public:
-  std::size_t capacity = 1000;      // records queued
-  bool sync_at_once = false;        // durable within submit()
-  Status refuse_submit;             // not ok: what submit() answers
-  std::vector<std::string> faults;  // promises that the intake broke
+  std::size_t capacity = 1000;      // maximum number of queued records
+  bool sync_at_once = false;        // records become durable within submit()
+  Status refuse_submit;             // not ok: submit() returns this
+  std::vector<std::string> faults;  // contract violations by the intake
 
   Result<SessionNumber> begin_session(const SessionHeader& header) override {
     const std::lock_guard lock(mutex_);
@@ -84,15 +84,15 @@ class FakeSink final : public KeyframeSink {
 
   // Makes the first `count` records durable.
   void sync(std::size_t count = SIZE_MAX) { finish(count, {}); }
-  // As a disk that takes nothing more.
+  // Refuses all queued records, as a disk that takes nothing more.
   void fail(const Status& why) { finish(SIZE_MAX, why); }
-  // Nobody hears of the records that were not durable.
+  // Loses the queued records without calling `done`.
   void crash() {
     const std::lock_guard lock(mutex_);
     queue_.clear();
     lagging_.reset();
   }
-  // The map shows nothing newer until thaw().
+  // The view shows nothing newer until thaw_view().
   void freeze_view() {
     const std::lock_guard lock(mutex_);
     lagging_ = std::make_shared<FakeGraph>(graph_);
@@ -102,7 +102,7 @@ class FakeSink final : public KeyframeSink {
     lagging_.reset();
   }
 
-  // As an operator's edit.
+  // Changes the state as an operator's edit does.
   void set_state(SessionNumber number, storage::SessionState state) {
     const std::lock_guard lock(mutex_);
     apply(storage::SetSessionStateRecord{number, state});
@@ -121,7 +121,7 @@ class FakeSink final : public KeyframeSink {
     const std::lock_guard lock(mutex_);
     return journal_;
   }
-  // The last `records` durable ones are lost: a disk that lied.
+  // Loses the last `records` durable records, as a disk that lied about a sync.
   void forget_durable(std::size_t records) {
     const std::lock_guard lock(mutex_);
     std::vector<storage::JournalRecord> kept(journal_.begin(), journal_.end() - static_cast<std::ptrdiff_t>(records));

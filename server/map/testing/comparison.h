@@ -1,4 +1,4 @@
-// How a map out of which closures were taken differs from one that never had them: docs/method.md, 2.
+// Compares a map out of which closures were taken with one that never had them (docs/method.md, 2).
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace relmap::map {
 
-// What differs between two sessions frame by frame: motion's edges and their support, the landmarks in force, who
-// sees them. A line each; empty: nothing.
+// One line for each difference between two sessions, frame by frame: odometry edges and their support, landmarks in
+// force, their observers.
 inline std::vector<std::string> structural_differences(const storage::Graph& a, const storage::Graph& b,
                                                        SessionNumber session) {
   std::vector<std::string> differences;
@@ -53,12 +53,13 @@ inline std::vector<std::string> structural_differences(const storage::Graph& a, 
   return differences;
 }
 
-// Of the steps of a session: by the covariance of a step (root of a mean square of six), and in itself.
+// The largest difference of a session's steps: in standard deviations (root mean square of the six coordinates), and in
+// metres and radians.
 struct Difference {
   double sigmas = 0, metres = 0, radians = 0;
 };
 inline Difference largest_difference(const storage::Graph& a, const storage::Graph& b, SessionNumber session) {
-  Difference largest;
+  Difference max_difference;
   for (std::uint32_t i = 1; i <= a.session(session)->last; ++i) {
     const auto mine = a.hot({session, i}), other = b.hot({session, i});
     if (!mine || !other) continue;
@@ -66,11 +67,11 @@ inline Difference largest_difference(const storage::Graph& a, const storage::Gra
     const Vector6 xi = (step.T_ab.inverse() * mine->edges.front().T_ab).log();
     const double sigmas = std::sqrt(xi.dot(step.covariance.llt().solve(xi)) / 6);
     if (!std::isfinite(sigmas)) return {sigmas, sigmas, sigmas};
-    largest.sigmas = std::max(largest.sigmas, sigmas);
-    largest.metres = std::max(largest.metres, xi.head<3>().norm());
-    largest.radians = std::max(largest.radians, xi.tail<3>().norm());
+    max_difference.sigmas = std::max(max_difference.sigmas, sigmas);
+    max_difference.metres = std::max(max_difference.metres, xi.head<3>().norm());
+    max_difference.radians = std::max(max_difference.radians, xi.tail<3>().norm());
   }
-  return largest;
+  return max_difference;
 }
 
 }  // namespace relmap::map

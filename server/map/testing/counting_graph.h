@@ -1,4 +1,4 @@
-// Counts what is read of a graph. For tests of what something costs.
+// Counts reads of a graph, for tests of costs.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// A stereo keyframe as one camera would have seen it: what a mono session consists of. For tests.
+// Turns a stereo keyframe into one of a mono session. For tests.
 #pragma once
 
 #include <limits>

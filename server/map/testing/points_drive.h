@@ -1,4 +1,4 @@
-// A simulated drive taken into a map over the memory engine, record by record, as the daemon would, with the closures
+// A simulated drive, applied record by record to a map over the memory engine as the daemon would, with the closures
 // that perfect place recognition would propose. For tests.
 #pragma once
 
@@ -27,8 +27,8 @@ inline storage::KeyframeRecord keyframe_record(const sim::PointsWorld& world, st
   return {kDriveSession, crc, std::move(payload)};
 }
 
-// What place recognition would propose for frame i, one lap after frame i - lap: nullopt on the first lap or when fewer
-// than 5 points are seen again.
+// The closure that place recognition would propose for frame i with frame i - lap; nullopt on the first lap, or if
+// fewer than 5 points are seen again.
 inline std::optional<storage::ClosureProposalRecord> true_closure(const storage::Graph& graph,
                                                                   const sim::PointsWorld& world, std::uint32_t i,
                                                                   std::uint32_t lap) {
@@ -74,7 +74,7 @@ class PointsDrive {
   }
   const std::vector<storage::JournalRecord>& journal() const { return journal_; }
 
-  // Frames 0 .. count - 1; closures from the second lap on where `propose(i)`.
+  // Takes in frames 0 .. count - 1; from the second lap on proposes closures for the frames i with `propose(i)`.
   void drive(const sim::PointsWorld& world, std::uint32_t count, const std::function<bool(std::uint32_t)>& propose) {
     apply(session_record(world));
     for (std::uint32_t i = 0; i < count; ++i) {

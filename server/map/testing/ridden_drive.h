@@ -1,5 +1,5 @@
-// A circuit, driven once and on beyond its beginning, a part of which the robot is carried over while it stands still
-// as far as it can tell. For tests.
+// A drive round a circuit and on beyond its beginning. Along a part of the circuit the robot is carried while its
+// cameras see it standing still. For tests.
 #pragma once
 
 #include <algorithm>
@@ -15,12 +15,12 @@ namespace relmap::map {
 class RiddenDrive {
  public:
   static constexpr std::uint32_t kLap = 100;     // frames of the world, 0.2 m apart
-  static constexpr std::uint32_t kBoards = 40;   // the last that the robot sees before the ride,
-  static constexpr std::uint32_t kAlights = 51;  // and the first behind it: 2.2 m on
+  static constexpr std::uint32_t kBoards = 40;   // the last frame before the ride
+  static constexpr std::uint32_t kAlights = 51;  // the first frame after it, 2.2 m further on
   static constexpr std::uint32_t kRidden = kAlights - kBoards - 1;
 
-  // `beyond`: frames of the second lap; `stood_s`: as long as the ride took. At `halts` the robot stands still for as
-  // long before it goes on, and is not carried.
+  // `beyond` is the number of frames of the second lap, `stood_s` the duration of the ride. At the frames `halts` the
+  // robot stands still for the same time without being carried.
   explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20, std::set<std::uint32_t> halts = {})
       : world_(options(beyond)), halts_(std::move(halts)) {
     drive_.apply(session_record(world_));
@@ -30,11 +30,11 @@ class RiddenDrive {
 
   storage::Map& map() { return drive_.map(); }
   PointsDrive& drive() { return drive_; }
-  // Of frame i of the world.
+  // The map's frame for frame i of the world.
   static FrameId frame(std::uint32_t i) { return {kDriveSession, i <= kBoards ? i : i - kRidden}; }
   static EdgeId ride() { return {frame(kAlights), 0}; }
 
-  // What place recognition would say of world frame i: `metres` ahead of where it is.
+  // The closure that place recognition would propose for world frame i, off by `metres` along the view.
   storage::ClosureProposalRecord closure(std::uint32_t i, double metres = 0) const {
     storage::ClosureProposalRecord proposal;
     proposal.query = frame(i);
@@ -47,7 +47,7 @@ class RiddenDrive {
     proposal.inliers = 60;
     return proposal;
   }
-  // What it would say if the robot had not been carried, and this place looked like another.
+  // The closure that it would propose if the robot had not been carried and this place looked like another.
   storage::ClosureProposalRecord as_driven(std::uint32_t i) const { return as_driven(i, i - kLap); }
   storage::ClosureProposalRecord as_driven(std::uint32_t i, std::uint32_t at) const {
     storage::ClosureProposalRecord proposal = closure(std::max(i, kLap));

@@ -19,7 +19,7 @@ inline sim::PointsWorldOptions two_laps() {
   return options;
 }
 
-// Nothing sensed the step to frame kBlind, so that on the second lap only closures can speak of closures.
+// No sensor measured the step to frame kBlind, so on the second lap only other closures can confirm a closure.
 class TwoLaps : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -37,7 +37,7 @@ class TwoLaps : public ::testing::Test {
   }
 
   void propose(std::uint32_t query) { drive_.apply(*true_closure(drive_.map(), world_, query, kLap)); }
-  // As if the place looked like the one a metre further on.
+  // Proposes a closure with the place a metre further on.
   void propose_wrongly(std::uint32_t query) { drive_.apply(wrong_closure(query)); }
   storage::ClosureProposalRecord wrong_closure(std::uint32_t query) {
     auto wrong = *true_closure(drive_.map(), world_, query, kLap);
