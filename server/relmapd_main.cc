@@ -26,19 +26,19 @@ constexpr const char* kFooter = R"(examples:
   relmapd --config /etc/relmapd.yaml --check-config
   relmapd --data map --listen 0.0.0.0:50070 --insecure   # anyone who can reach the port may edit the map
 
-Settings that only the configuration file has: ingest.* (which robots, and how much each may send), rpc.*,
-routes.mixes, rba.*, disk_low_water_mb, commit_interval_ms (server/README.md).
+Some settings have no option and are set in the configuration file: ingest.* (which robots may send, and how much),
+rpc.*, routes.mixes, rba.*, disk_low_water_mb, commit_interval_ms. server/README.md describes them.
 
-On SIGTERM or SIGINT the daemon applies and commits everything acknowledged, then stops; a second signal ends it at
-once.
+SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
+once, without loss: the next start applies the rest.
 
 exit codes:
-  0  stopped by a signal, or the configuration is sound (--check-config)
+  0  stopped by a signal; with --check-config: the configuration is sound
   1  the last commit failed (nothing acknowledged is lost), or an internal error
-  2  BAD_CONFIG, or an invalid command line
-  3  FOLDER_LOCKED: another daemon owns the data folder
-  4  PORT_IN_USE
-  5  the data folder cannot be used: NOT_A_MAP (it holds something other than a map), IO_ERROR, DISK_FULL, READ_ONLY,
+  2  BAD_CONFIG, or wrong usage
+  3  FOLDER_LOCKED: another process owns the data folder
+  4  PORT_IN_USE: another process listens at the address of --listen
+  5  the data folder cannot be used: NOT_A_MAP (it is neither empty nor a map's), IO_ERROR, DISK_FULL, READ_ONLY,
      DATA_LOSS, UNKNOWN_FORMAT_VERSION
   6  the vocabulary cannot be used: NO_SUCH_FILE, CORRUPT, WRONG_VOCABULARY)";
 
@@ -68,7 +68,7 @@ int exit_code(Reason reason) {
   }
 }
 
-// The options given on the command line. Options that are not given leave the file's settings as they are.
+// The options of the command line. What they leave out keeps the value of the configuration file, or the default.
 struct CommandLine {
   std::string config_file;
   std::optional<std::string> data, listen, lcm, vocabulary, log_level;
@@ -76,28 +76,33 @@ struct CommandLine {
   bool deterministic = false, insecure = false, no_closures = false, check_config = false;
 
   void declare(CLI::App& app) {
-    app.add_option("--data", data, "Data folder, which holds the map and nothing else; created if it does not exist")
+    app.add_option("--data", data, "Data folder of the map, which holds nothing else; created if it does not exist")
         ->type_name("DIR");
-    app.add_option("--config", config_file, "YAML file with settings; the command line takes precedence")
+    app.add_option("--config", config_file, "YAML file of settings; options of the command line override it")
         ->type_name("FILE");
-    app.add_option("--listen", listen,
-                   "Address at which gRPC is served (default 127.0.0.1:50070); port 0: any free port, which is then in "
-                   "DIR/endpoint")
-        ->type_name("HOST:PORT");
     app.add_option(
-           "--lcm", lcm,
-           "LCM URL to take keyframes from: udpm://GROUP:PORT?ttl=N, or file://PATH for a log to replay; none: off "
-           "(default)")
+           "--listen", listen,
+           "Address that gRPC listens at (default 127.0.0.1:50070); port 0 takes any free port, which is written to "
+           "DIR/endpoint")
+        ->type_name("HOST:PORT");
+    app.add_option("--lcm", lcm,
+                   "Takes keyframes over LCM: from a multicast group (udpm://GROUP:PORT?ttl=N) or from a log "
+                   "(file://PATH); none "
+                   "turns LCM off (default)")
         ->type_name("URL");
     app.add_option("--memory-budget-mb", memory_budget_mb,
-                   "Memory for everything that grows with the map and its users, in MB (default 1024, at least 32)");
-    app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the shipped one)")->type_name("FILE");
+                   "Memory budget for everything that grows with map and load, in MB (default 1024, at least 32)");
+    app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
     app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)");
-    app.add_flag("--deterministic", deterministic,
-                 "Look up places and relax at fixed points, so that the same input gives the same map; slower");
-    app.add_flag("--no-closures", no_closures, "Do not recognise places (to measure what loop closures improve)");
-    app.add_flag("--insecure", insecure, "Allow listening beyond loopback although there is no TLS");
-    app.add_flag("--check-config", check_config, "Tell whether the daemon could start with these settings, and exit");
+    app.add_flag(
+        "--deterministic", deterministic,
+        "Look up places and relax at fixed points of the input, so that the same input gives the same map; slower");
+    app.add_flag("--no-closures", no_closures,
+                 "Do not recognise places, so that no loop is closed (to measure what closures improve)");
+    app.add_flag("--insecure", insecure,
+                 "Allow --listen beyond loopback; there is no TLS, so everyone who reaches the port may edit the map");
+    app.add_flag("--check-config", check_config,
+                 "Check whether the daemon could start with these settings, write nothing, and exit");
     relmap::terminal::add_version(app);
   }
 
@@ -142,7 +147,7 @@ int run(const Config& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Silences gRPC's own messages on a port in use and the like: this program reports what matters.
+  // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   spdlog::set_default_logger(spdlog::stderr_color_mt("relmapd"));
   CLI::App app("relmapd: a map server for fleets of stereo robots", "relmapd");

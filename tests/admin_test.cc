@@ -1,4 +1,4 @@
-// relmap-admin as an operator uses it: on the folder of a daemon at work, and on folders that nobody works on.
+// relmap-admin on the folder of a running daemon, and on folders that no process owns.
 #include <gmock/gmock.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
@@ -67,7 +67,7 @@ class Admin : public ::testing::Test {
                     options.lcm, "--spool", folder_ / "spool", "--rate", std::to_string(rate_hz), "--quiet"},
                    {folder_ / "frontend.out", folder_ / "frontend.err"});
   }
-  // The drive, mapped; nobody works on the folder afterwards.
+  // Maps the drive; no process owns the folder afterwards.
   void make_map() {
     record_drive();
     RunningDaemon daemon(options_);
@@ -147,7 +147,7 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
   EXPECT_EQ(storage::hash_map(*open_stored_map(later)), storage::hash_map(*open_stored_map(options_.data)));
 }
 
-TEST_F(Admin, WhatADaemonOwnsIsMendedAndReplacedOnlyWhenItHasStopped) {
+TEST_F(Admin, RepairAndRestoreNeedTheDaemonStopped) {
   record_drive();
   RunningDaemon daemon(options_);
   const Finished repair = admin({"--json", "repair", options_.data});
@@ -194,8 +194,8 @@ TEST_F(Admin, ABackupIntoTheMapsOwnFolderIsRefusedByTheDaemonAndWithoutOne) {
   EXPECT_EQ(admin({"verify", folder_ / "copy"}).exit_code, kFine);
 }
 
-// A backup says which map it is of; a sound one that is another is not restored for it.
-TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
+// A backup records the hash of its map; a sound map with another hash is not restored in its place.
+TEST_F(Admin, ABackupIsComparedWithItsRecordedHash) {
   make_map();
   const std::string copy = folder_ / "copy", back = folder_ / "back";
   ASSERT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine);
@@ -213,7 +213,7 @@ TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
   std::ofstream(copy + "/HASH") << line << '\n';
   ASSERT_EQ(admin({"restore", copy, back}).exit_code, kFine);
 
-  // The restored map goes on, and the hash says nothing of it any more.
+  // The restored map is written to, after which the hash no longer counts.
   std::getline(std::ifstream(back + "/HASH"), line);  // of the commit that says it was restored
   other = line;
   other.back() = other.back() == '0' ? '1' : '0';
@@ -275,8 +275,8 @@ TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
   EXPECT_THAT(told, Not(HasSubstr("rocksdb."))) << "numbers without units, for --json";
 }
 
-// What a later version writes under keys of its own goes wherever the map goes, small or in a blob file.
-TEST_F(Admin, KeysOfALaterVersionAreInTheBackupInWhatIsRestoredAndInWhatIsCompacted) {
+// Keys of a later version are copied with the map, whether their values are small or in a blob file.
+TEST_F(Admin, BackupRestoreAndCompactKeepKeysOfALaterVersion) {
   make_map();
   const std::vector<storage::Put> later{{"x", {1}}, {"zone/1", Bytes(50000, 2)}, {std::string("\xff\0", 2), {3}}};
   {
@@ -315,7 +315,7 @@ TEST_F(Admin, KeysOfALaterVersionAreInTheBackupInWhatIsRestoredAndInWhatIsCompac
   expect_kept(again);
 }
 
-TEST_F(Admin, AnInterruptedBackupIsNeverTakenForAWholeOne) {
+TEST_F(Admin, AnInterruptedBackupIsNeverMistakenForACompleteOne) {
   make_map();
   int interrupted = 0;
   for (int attempt = 0; attempt < 8; ++attempt) {
@@ -361,8 +361,8 @@ TEST_F(Admin, AMapOfAnOlderFormatIsRefusedByNameAndMigrated) {
   }
 }
 
-// Kept off the map while its words are of two vocabularies, and found again with the other one afterwards.
-TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
+// While the words are of two vocabularies, daemons refuse the map; afterwards places are recognised with the new one.
+TEST_F(Admin, ReindexCompletesAfterAKillHalfWay) {
   make_map();
   const storage::MapHash hash = storage::hash_map(*open_stored_map(options_.data));
   const std::string other = folder_ / "other.vocab";
@@ -399,7 +399,7 @@ TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
   expect_refused(with_other, " --vocabulary " + other);
   EXPECT_EQ(admin({"verify", options_.data}).exit_code, kFine);
 
-  // Back to the vocabulary that it had: the very map.
+  // Reindexed with the first vocabulary, the map is the same as before.
   const Finished back = admin({"reindex", options_.data});
   ASSERT_EQ(back.exit_code, kFine) << said(back);
   EXPECT_EQ(storage::hash_map(*open_stored_map(options_.data)), hash);
@@ -433,7 +433,7 @@ TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
 }
 
-TEST_F(Admin, AVocabularyThatIsNoneIsNamedAndNothingIsTouched) {
+TEST_F(Admin, AnInvalidVocabularyIsRefusedByNameWithoutAnyChange) {
   make_map();
   const std::string none = folder_ / "none.vocab";
   const auto reason = [&] {

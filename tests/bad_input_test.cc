@@ -1,4 +1,4 @@
-// Whatever is wrong with what comes in: it is refused by name and counted, nothing else is lost, and relmapd lives.
+// Bad input of every kind is refused by name and counted; nothing else is lost, and relmapd keeps running.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -56,7 +56,7 @@ class BadInput : public ::testing::Test {
     const client::ReasonCounts counts = status().not_taken;
     return counts.contains(reason) ? counts.at(reason) : 0;
   }
-  // `what` is said until it is counted by this reason.
+  // Sends `what` until it is counted under this reason.
   void expect_counted(Reason reason, const std::function<void()>& what) {
     const std::uint64_t before = not_taken(reason);
     EXPECT_TRUE(repeat_until(what, [&] { return not_taken(reason) > before; })) << reason_name(reason);
@@ -158,7 +158,7 @@ TEST_F(BadInput, KeyframesAreRefusedByNameAndTheOthersTaken) {
   EXPECT_EQ(status().frames, good);
 }
 
-TEST_F(BadInput, ASessionThatNeverGetsToBeginIsCountedToo) {
+TEST_F(BadInput, RefusalsBeforeASessionBeginsAreCountedOnce) {
   HandRobot robot(options_.lcm, uuid());
   for (std::uint32_t i = 0; i < 3; ++i) {
     Keyframe k = keyframe(i);
@@ -198,7 +198,7 @@ TEST_F(BadInput, DamagedPartsAreCountedAndAskedForAgain) {
   expect_counted(Reason::CORRUPT, [&] { robot.say_bytes(kKeyframeChannel, message); });
   expect_counted(Reason::CORRUPT, [&] { robot.say_bytes(kGapChannel, Bytes(10, 1)); });
 
-  // Parts that are right, of a whole that is not what its checksum says.
+  // Valid parts of a payload that does not match its checksum.
   Bytes other = next;
   other[200] ^= 1;
   expect_counted(Reason::CORRUPT, [&] {
@@ -287,7 +287,7 @@ TEST_F(BadInput, DeclaredGapsAreBridgedByPriors) {
 void put_big_endian(Bytes& bytes, std::uint32_t value, int count) {
   for (int shift = 8 * (count - 1); shift >= 0; shift -= 8) bytes.push_back(static_cast<std::uint8_t>(value >> shift));
 }
-// A picture's header that promises so many pixels, and nothing behind it.
+// The header of a picture of this size, without any data.
 Bytes png_header(std::uint32_t width, std::uint32_t height) {
   Bytes bytes{0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
   put_big_endian(bytes, width, 4);
@@ -304,7 +304,7 @@ Bytes jpeg_header(std::uint32_t width, std::uint32_t height) {
   return bytes;
 }
 
-TEST_F(BadInput, PicturesThatAreNoneOrTooLargeAreRefusedBeforeTheyAreDecoded) {
+TEST_F(BadInput, InvalidAndOversizedPicturesAreRefusedBeforeDecoding) {
   HandRobot robot(options_.lcm, uuid());
   for (std::uint32_t i = 0; i < 2; ++i) ASSERT_TRUE(robot.settle(i, payload(i)));
   expect_frames(2);
@@ -388,8 +388,8 @@ TEST_F(BadInput, ASecondDaemonOnTheFolderOrThePortFailsByName) {
   EXPECT_TRUE(daemon_->client()->status().ok());
 }
 
-// Neither is called sound and then not done, nor done in part.
-TEST(BadStart, AnLcmUrlThatIsNoneAndAFolderOfOtherThingsAreRefusedByName) {
+// Neither is accepted by --check-config and then fails, nor is it partly carried out.
+TEST(BadStart, InvalidLcmUrlsAndForeignFoldersAreRefusedByName) {
   const storage::TemporaryFolder folder;
   namespace fs = std::filesystem;
   const auto start = [&](const DaemonOptions& options, bool check) {
@@ -415,7 +415,7 @@ TEST(BadStart, AnLcmUrlThatIsNoneAndAFolderOfOtherThingsAreRefusedByName) {
   EXPECT_EQ(start({.data = folder / "map", .lcm = random_lcm_url(), .more = {}}, true).exit_code, 0);
 }
 
-TEST(NoMulticastRoute, IsNamedWithWhatMendsItAndQuestionsAreAnswered) {
+TEST(NoMulticastRoute, IsReportedWithARemedyWhileQueriesAreAnswered) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can make a network without a multicast route";
   const storage::TemporaryFolder folder;
   RunningDaemon daemon({.data = folder / "map", .lcm = random_lcm_url(), .more = {}, .own_network = Multicast::kNone});

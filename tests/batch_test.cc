@@ -1,4 +1,4 @@
-// relmap ingest: many recordings into one map, and what interruptions of any kind leave of it.
+// relmap ingest of many recordings into one map, with interruptions of every kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ class BatchIngest : public ::testing::Test {
   }
   Finished run(const std::vector<std::string>& command) const { return run_program(command, load_.patience); }
 
-  // The map of a batch that nothing interrupts; into `took` how long it was at work.
+  // The map of a batch without interruptions; sets `took` to its duration.
   void make_whole(const DaemonOptions& options, const std::vector<std::string>& more, milliseconds& took) const {
     RunningDaemon daemon(options);
     const auto begin = std::chrono::steady_clock::now();
@@ -73,8 +73,8 @@ class BatchIngest : public ::testing::Test {
     ASSERT_EQ(done.exit_code, 0) << done.standard_error;
     ASSERT_EQ(daemon.stop(), 0);
   }
-  // The map of one that is interrupted at random moments in about half of `took`: relmap killed, and asked to end, with
-  // its front-ends; the daemon killed.
+  // The map of a batch that is interrupted at random moments within about half of `took`: relmap and its front-ends are
+  // killed or sent SIGTERM, and the daemon is killed.
   void make_interrupted(const DaemonOptions& options, const std::vector<std::string>& more, milliseconds took,
                         unsigned seed) const {
     std::mt19937 random(seed);
@@ -147,7 +147,7 @@ class BatchIngest : public ::testing::Test {
   std::vector<std::string> drives_;
 };
 
-TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
+TEST_F(BatchIngest, TakesRecordingsInOnceAndNamesMissingPaths) {
   const DaemonOptions options = daemon_options("map", false);
   RunningDaemon daemon(options);
   std::filesystem::create_directories(folder_ / "empty");
@@ -184,7 +184,7 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(daemon.client()->sessions()->size(), 4u);
   drives_ = {deleted_drive};
 
-  // What was deleted is not taken in, and not said to be.
+  // A deleted session is neither taken in again nor reported as done.
   const auto of_first = std::find_if(sessions.begin(), sessions.end(),
                                      [](const client::Session& s) { return s.name.ends_with("/drive-1"); });
   ASSERT_NE(of_first, sessions.end());
@@ -253,14 +253,14 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
   EXPECT_THAT(again.standard_output, Not(HasSubstr("\"state\":\"done\"")));
   EXPECT_THAT(again.standard_output, HasSubstr("\"state\":\"was there\""));
   expect_all_there();
-  // Whoever replays it all the same brings nothing new.
+  // Replaying the log directly adds nothing.
   const Finished replayed = run({built_program("relmap-frontend"), "--source", "log", drives_[0], "--recorded",
                                  uuids[0], "--as-recorded", "--server", options.data, "--spool", "none"});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.standard_error;
   expect_all_there();
 }
 
-TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
+TEST_F(BatchIngest, TheSameCommandResumesWithAnyOptions) {
   const DaemonOptions options = daemon_options("map", true);
   RunningDaemon daemon(options);
   std::size_t sessions = 0;
@@ -291,11 +291,11 @@ TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
   EXPECT_EQ(daemon.client()->sessions()->size(), sessions + drives_.size());
 }
 
-TEST_F(BatchIngest, ADaemonThatComesBackElsewhereIsFound) {
+TEST_F(BatchIngest, ADaemonThatRestartsAtAnotherPortIsFound) {
   const DaemonOptions options = daemon_options("map", false);
   auto daemon = std::make_unique<RunningDaemon>(options);
   const std::string address = daemon->address();
-  // It stands still whenever it is looked at: however busy the machine is, it has others to begin once one is begun.
+  // It is stopped while it is examined, so that it still has recordings to begin, however busy the machine is.
   Process batch(command(options.data, {"--jobs", "1"}), ProcessOptions{});
   batch.signal(SIGSTOP);
   while (batch.running() && daemon->client()->sessions().or_throw().empty()) {
@@ -314,9 +314,9 @@ TEST_F(BatchIngest, ADaemonThatComesBackElsewhereIsFound) {
   for (const client::Session& session : sessions) EXPECT_EQ(session.frames, frames());
 }
 
-TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }
+TEST_F(BatchIngest, InterruptionsDoNotChangeFramesAndTracks) { expect_same_frames(); }
 
-TEST_F(BatchIngest, DeterministicItGivesTheSameMapToTheLastBitHoweverOftenItIsInterrupted) { expect_same_map(); }
+TEST_F(BatchIngest, DeterministicMapsAreIdenticalDespiteInterruptions) { expect_same_map(); }
 
 // A hundred thousand keyframes.
 class LongBatchIngest : public BatchIngest {
@@ -324,9 +324,9 @@ class LongBatchIngest : public BatchIngest {
   LongBatchIngest() : BatchIngest({8, 12'500, 2'500, 45, 10, seconds(3000)}) {}
 };
 
-TEST_F(LongBatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }
+TEST_F(LongBatchIngest, InterruptionsDoNotChangeFramesAndTracks) { expect_same_frames(); }
 
-TEST_F(LongBatchIngest, DeterministicItGivesTheSameMapToTheLastBit) { expect_same_map(); }
+TEST_F(LongBatchIngest, DeterministicMapsAreIdenticalDespiteInterruptions) { expect_same_map(); }
 
 }  // namespace
 }  // namespace relmap::testing

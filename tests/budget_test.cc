@@ -1,5 +1,5 @@
-// A map several times larger than the memory that relmapd may use, taken in while callers send pictures: it stays
-// within it, and answers as it would with all the memory in the world.
+// A map several times larger than relmapd's memory budget is taken in while clients send pictures. The daemon stays
+// within the budget, and answers as with plenty of memory.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -103,7 +103,7 @@ class Questions {
       remember("route " + a.to_string() + " " + b.to_string(), *reply);
     }
   }
-  // By what the keyframe sent, as a robot would ask where it is.
+  // Localises by the content of the keyframe, as a robot would.
   void place(const Keyframe& keyframe) {
     v1::LocaliseRequest where;
     *where.mutable_view()->mutable_features() = to_wire(keyframe.appearance);
@@ -119,7 +119,7 @@ class Questions {
   std::vector<std::string> answers_;
 };
 
-// Callers who ask all the time what place their pictures show.
+// Clients that continuously ask which place their pictures show.
 class PictureCallers {
  public:
   PictureCallers(const std::string& address, int callers) {
@@ -168,7 +168,7 @@ class PictureCallers {
           to_wire(StereoCamera{0.8 * kind.width, kind.width / 2.0, kind.height / 2.0, 0.12, kind.width, kind.height});
       request.mutable_view()->mutable_left()->set_data(pictures_[static_cast<std::size_t>(n % 4)]);
       const auto reply = map.ask(&v1::Map::Stub::MatchImage, request);
-      // An empty map says so when the picture has been described; a small budget has not always room for all four.
+      // An empty map answers so only after it has described the picture; a small budget may have no room for all four.
       if (reply.ok() || reply.reason() == Reason::EMPTY_MAP) {
         ++answered_;
       } else if (reply.reason() != Reason::BUDGET_EXCEEDED) {
@@ -265,7 +265,7 @@ class MemoryBudget : public ::testing::Test {
   const storage::TemporaryFolder folder_;
 };
 
-// Without pictures the bound is tighter: a cache without end would pass it.
+// Without pictures the bound is tight enough that an unbounded cache would exceed it.
 TEST_F(MemoryBudget, HoldsAMapSeveralTimesLargerAndAnswersTheSame) { hold({2000, 700, 32, 105, false}, 10); }
 
 class LongMemoryBudget : public MemoryBudget {};

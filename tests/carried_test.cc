@@ -1,5 +1,5 @@
-// Sibley et al., 1 and 4.7: a robot that is carried without noticing closes its loop all the same, and only a relative
-// map has room for what no single frame fits. docs/rba.md, A train and a lift.
+// A robot that is carried without noticing closes its loop nevertheless, and only a relative map can keep measurements
+// that no single frame fits (Sibley et al., 1 and 4.7). docs/rba.md, A train and a lift.
 #include <gtest/gtest.h>
 
 #include "tests/support/bench_figures.h"

@@ -1,4 +1,4 @@
-// relmap ingest of recordings that are not what they were when their sessions were made, and of what is in none.
+// relmap ingest of recordings that have changed since their sessions were made, and of files that are passed over.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ class ChangedRecording : public ::testing::Test {
     return folder;
   }
   std::string file(const std::string& name) const { return folder_ / name; }
-  // The recording `which` at `name`, whatever is there.
+  // Puts the recording `which` at `name`, in place of what is there.
   std::string put(const std::string& which, const std::string& name) const {
     fs::remove_all(file(name));
     fs::create_directories(fs::path(file(name)).parent_path());
@@ -84,7 +84,7 @@ class ChangedRecording : public ::testing::Test {
   }
   Finished ingest(const std::vector<std::string>& arguments) const { return run_program(command(arguments)); }
   std::vector<client::Session> sessions() const { return daemon_->client()->sessions().or_throw(); }
-  // Ended by a signal once the newest session has a frame.
+  // Ends the command by a signal once the newest session has a frame.
   void interrupt(const std::vector<std::string>& arguments) const {
     const std::size_t before = sessions().size();
     Process batch(command(arguments), {});
@@ -124,7 +124,7 @@ TEST_F(ChangedRecording, IsRefusedByNameAndTheOthersGoOn) {
   // It shrank, by lines of its times and by pictures.
   remove_pairs(drive, 12);
   EXPECT_THAT(ingest({drive}).standard_output, HasSubstr("16 pairs, and there are 12 now"));
-  // As it was, though written anew.
+  // The original content, with new files.
   put("drive", "drives/a");
   remove_pairs(drive, 16);
   const Finished same = ingest({drive, other});
@@ -164,7 +164,7 @@ TEST_F(ChangedRecording, IsRefusedAndTakenInAgainWhereAnotherLiesInItsPlace) {
   EXPECT_EQ(another.exit_code, 1);
   EXPECT_THAT(another.standard_output, HasSubstr("session 1 is made of another recording"));
 
-  // The advice helps, and once only.
+  // The advised command works, but makes only one new session.
   const std::size_t before = sessions().size();
   const Finished again = ingest({drive, "--again"});
   EXPECT_EQ(again.exit_code, 0) << again.standard_output;
@@ -173,7 +173,7 @@ TEST_F(ChangedRecording, IsRefusedAndTakenInAgainWhereAnotherLiesInItsPlace) {
   EXPECT_EQ(there.exit_code, 0) << there.standard_output;
   EXPECT_THAT(there.standard_output, HasSubstr("was there"));
   EXPECT_EQ(sessions().size(), before + 1);
-  // What it is compared with from now on is what was taken in last.
+  // From now on it is compared with what was taken in last.
   remove_pairs(drive, 12);
   const Finished shrunk = ingest({drive});
   EXPECT_EQ(shrunk.exit_code, 1);
@@ -208,8 +208,8 @@ TEST_F(ChangedRecording, OfKeyframesIsRefusedToo) {
   EXPECT_EQ(sessions()[1].name, "noon");
 }
 
-// A photograph between others moves all that come after it: what the map has of them is not sent again, and what it has
-// not would be put behind it.
+// A photograph that is added between others shifts those after it: keyframes that the map has would not be sent again,
+// and the others would be appended to the wrong ones.
 TEST_F(ChangedRecording, IsRefusedThoughItWasInterrupted) {
   const std::string photos = photographs("photos/tower");
   ASSERT_NO_FATAL_FAILURE(interrupt({"--mono", photos}));
@@ -238,7 +238,7 @@ TEST_F(ChangedRecording, IsRefusedThoughItWasInterrupted) {
   EXPECT_EQ(sessions()[3].frames, 13u);
 }
 
-TEST_F(ChangedRecording, AnAgainThatNeedsAnotherSessionGetsIt) {
+TEST_F(ChangedRecording, AnAgainWhoseSessionWasDeletedMakesAnotherOne) {
   const std::string photos = photographs("photos/tower");
   ASSERT_NO_FATAL_FAILURE(interrupt({"--mono", photos, "--again"}));
   ASSERT_EQ(
@@ -252,7 +252,7 @@ TEST_F(ChangedRecording, AnAgainThatNeedsAnotherSessionGetsIt) {
   EXPECT_EQ(anew.exit_code, 0) << anew.standard_output;
 }
 
-TEST_F(ChangedRecording, WhatTheDaemonRefusesEndsWithThree) {
+TEST_F(ChangedRecording, RefusedKeyframesGiveExitCodeThree) {
   const std::string k = file("k.bin");
   ASSERT_EQ(run_program({built_program("relmap-frontend"), recorded("drive"), "--robot", "cart", "--session", "morning",
                          "--all-keyframes", "--out", k})
@@ -268,7 +268,7 @@ TEST_F(ChangedRecording, WhatTheDaemonRefusesEndsWithThree) {
     for (const Keyframe& keyframe : keyframes) ASSERT_TRUE(writer.write(keyframe).ok());
     ASSERT_TRUE(writer.close().ok());
   };
-  // Keyframes that a recording lacks are none that the map loses.
+  // Keyframes that the recording itself lacks do not count as lost by the map.
   keyframes.erase(keyframes.begin() + 5, keyframes.begin() + 8);
   ASSERT_NO_FATAL_FAILURE(write(file("gaps.bin")));
   const Finished gaps = ingest({file("gaps.bin")});

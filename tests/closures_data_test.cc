@@ -1,4 +1,5 @@
-// Loops that appearance proposed for recorded drives, many of them false, taken in and refused by a map as they came.
+// Loops that appearance proposed for recorded drives, many of them false, are accepted or refused by a map in their
+// order.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -24,7 +25,7 @@ TEST_F(ClosuresData, OfBovisaFalseLoopsAreRefusedAndTrueOnesKept) {
   EXPECT_GE(bovisa["true_kept"], 67);
 }
 
-// It has no truth: how many agree with the motion is all there is to be known.
+// There is no truth: it is only known how many loops agree with the motion.
 TEST_F(ClosuresData, OfNewCollegeWhatContradictsMotionIsRefused) {
   const BenchFigures college({"closures", graph("NewCollege_odometry_bow_tr.g2o")});
   EXPECT_EQ(college["frames"], 12816);

@@ -1,4 +1,4 @@
-// relmapd dies again and again while keyframes come in over LCM: each of them is in the map at the end, once.
+// relmapd is killed again and again while keyframes come in over LCM; at the end each keyframe is in the map once.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -98,8 +98,8 @@ TEST_F(Crash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { fe
 
 class LongCrash : public Crash {};
 
-// Two laps: each lap more through the same places makes an update slower, and the test is about kills. Slowly, so that
-// keyframes still come in at the last of them on a busy machine, where the map takes longer to verify than to make.
+// Only two laps, since every further lap makes updates slower, and the test is about kills. The rate is low, so that
+// keyframes still come in at the last kill on a busy machine, where verifying the map takes longer than making it.
 TEST_F(LongCrash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwoHundredTimes) {
   feed_and_kill({200, 8000, 4000, 12}, 2);
 }

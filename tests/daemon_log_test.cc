@@ -1,5 +1,4 @@
-// What relmapd's log says at info of whom it serves: who connected, began, ended and left, what was edited, and after a
-// kill what was recovered.
+// relmapd's log at info level: robots that connect, begin, end and leave, edits, and what is recovered after a kill.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// A hundred stereo pairs of a flight through a room, seconds apart, through the whole server: what it has seen before
-// is recognised, bound to the old landmarks, and never taken for another place.
+// A hundred stereo pairs of a flight through a room, seconds apart, through the whole server: places seen before are
+// recognised, bound to the old landmarks, and never mistaken for others.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -26,10 +26,10 @@ namespace {
 
 constexpr std::uint32_t kBoundObservations = 20;
 
-// By the first number of the sessions' identities: what is found must not hang on what is drawn.
+// Parameter: the first number of the sessions' uuids, which seed random choices; results must not depend on these.
 class EurocData : public DataTest, public ::testing::WithParamInterface<int> {};
 
-TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
+TEST_P(EurocData, PlacesSeenBeforeInAFlightAreRecognisedAndBound) {
   const std::string data = data_ + "/euroc_v101_keyframes100";
   StreamedSessions sessions({"--deterministic"}, GetParam());
   sessions.stream("euroc", data, "drone", {"--all-keyframes"});
@@ -100,7 +100,7 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
   EXPECT_GE(bound, 34);
 }
 
-// Of pictures that are not in the map, where was each taken?
+// Localises pictures that are not in the map.
 class EurocPictures : public DataTest {
  protected:
   struct Judged {
@@ -209,8 +209,8 @@ TEST_F(EurocPictures, OfTheSessionsOwnCameraAreUndistortedByIt) {
   EXPECT_LE(judged.nees, 15);
 }
 
-// A rig is supposed, by the size of its pictures, and nobody says which eye took them. The right one's are turned by a
-// degree and more where they are taken for the left one's.
+// The rig is assumed by the size of the pictures, and it is not known which eye took them. Pictures of the right eye
+// that are taken for the left one's are off by a degree and more in rotation.
 class EurocSupposed : public EurocPictures, public ::testing::WithParamInterface<bool> {};
 
 TEST_P(EurocSupposed, PicturesAllowForTheOtherEye) {
@@ -233,7 +233,7 @@ TEST_P(EurocSupposed, PicturesAllowForTheOtherEye) {
 
 INSTANTIATE_TEST_SUITE_P(Eyes, EurocSupposed, ::testing::Bool());
 
-TEST_F(EurocPictures, OfAnUnknownCameraAreNotTakenForBetterThanTheyAre) {
+TEST_F(EurocPictures, OfAnUnknownCameraHaveHonestCovariances) {
   ask([&](const std::string& path) { return raw_picture(path); });
   const Judged judged = judge("of an unknown camera");
   EXPECT_GE(judged.metres.size(), 25u);

@@ -1,4 +1,4 @@
-// What relmap exports of a recorded flight, against where the camera was. The truth itself is good to about 3.5 cm.
+// The exports of a recorded flight against the true poses of the camera, which are accurate to about 3.5 cm.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

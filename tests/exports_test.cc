@@ -1,5 +1,5 @@
-// relmap export and relmap map, as a user runs them, on a map of three parts that nothing connects: a drive that closes
-// its loop, and a graph made elsewhere one step of which nobody knows.
+// relmap export and relmap map on a map of three unconnected parts: a drive that closes its loop, and an imported graph
+// with one step that nothing measured.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -105,7 +105,7 @@ TEST_F(Exports, PartsThatNothingConnectsAreFilesOfTheirOwn) {
   }
   EXPECT_THAT(out("map.tum"), HasSubstr("part 1 of 3. The parts are not connected"));
   EXPECT_THAT(last_.standard_error, HasSubstr("The parts are not connected"));
-  // What nobody knows is no step of 0 or 1 m, but said.
+  // The unknown step is not exported as a step of 0 or 1 m, but reported.
   for (const char* file : {"map.2-0.tum", "map.2-25.tum"})
     EXPECT_THAT(out(file), HasSubstr("# not measured: 2:24 to 2:25: unsensed")) << file;
   EXPECT_THAT(last_.standard_error, HasSubstr("not measured: 2:24 to 2:25: unsensed"));
@@ -156,7 +156,7 @@ TEST_F(Exports, AChainIsOfOneSessionWithItsGuessesMarked) {
   EXPECT_THAT(last_.standard_error, HasSubstr("left out: session 2"));
 }
 
-// What the map has made of the motion, and what the robot told: two things with two names.
+// The motion as refined by the map and the odometry that the robot sent are different things with different names.
 TEST_F(Exports, AChainIsNotTheRobotsOwnOdometry) {
   exported({"--chain", "--session", "1"});
   EXPECT_THAT(last_.standard_error, HasSubstr("chained odometry edges of session 1 ("));

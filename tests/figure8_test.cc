@@ -1,4 +1,4 @@
-// The relative solution, found as the map grows, against the full one (docs/method.md, 5).
+// The adaptive relative solution against the full one (docs/method.md, 5).
 #include <gtest/gtest.h>
 
 #include "tests/support/simulated_drive.h"

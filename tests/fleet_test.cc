@@ -1,7 +1,6 @@
-// Twenty robots over a network that loses, delays and doubles, into one daemon: nothing is lost, nothing is there
-// twice, and what a robot sent is soon acknowledged; though daemon and robots are killed, though others make trouble.
-// "Soon" is against another run on the same machine, in the same minute; how much is sent depends on what that machine
-// has left.
+// Twenty robots send to one daemon over a network that loses, delays and doubles datagrams: nothing is lost or doubled,
+// and keyframes are soon acknowledged, even if daemon and robots are killed or others make trouble. "Soon" is relative
+// to another run on the same machine in the same minute; the rate depends on what the machine can carry at that time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,8 +25,8 @@ BenchFigures fleet(double seconds, double rate, const std::vector<std::string>& 
   return BenchFigures(arguments, std::chrono::seconds(std::max(200L, std::lround(2 * seconds))));
 }
 
-// What this machine has for us just now, against one of two cores with nothing else to do, of which twenty robots need
-// the half: by keyframes that are taken in, relaxed and looked up as fast as they can be. A tenth to one.
+// The capacity of this machine at the moment relative to two idle cores, of which twenty robots need half: measured by
+// taking in, relaxing and looking up keyframes as fast as possible. From 0.1 to 1.
 double machine_share() {
   constexpr double kOfTwoCores = 900;
   const BenchFigures figures({"fleet", "--robots", "1", "--seconds", "0.2", "--no-closures", "--batch", "1000"},
@@ -37,8 +36,8 @@ double machine_share() {
   return share;
 }
 
-// On a machine that others use, one of two runs may happen to have much less of it than the other; what is slow by
-// itself is slow in every round.
+// On a machine that others use, one of two runs may by chance get much less of it than the other. A defect is slow in
+// every round.
 void expect_in_a_round(const std::function<bool(double share)>& holds) {
   for (int round = 0; round < 3; ++round)
     if (holds(machine_share()) || ::testing::Test::HasFailure()) return;
@@ -78,7 +77,7 @@ TEST(Fleet, LosesNothingThoughDaemonAndRobotsAreKilled) {
   const double rate = kRate * machine_share();
   const BenchFigures figures = fleet(20, rate, {"--kill-daemon", "3", "--kill-robots", "5", "--kills-each", "2"});
   expect_all_there_once(figures);
-  // All that was waiting has been acknowledged after each of them; else it is not a number.
+  // Everything that waited is acknowledged after each kill; else the figure is NaN.
   const std::vector<double> daemon = figures.series("settled_after_restart_s");
   EXPECT_EQ(daemon.size(), 3u);
   for (const double seconds : daemon) EXPECT_GE(seconds, 0);
@@ -97,8 +96,8 @@ TEST(LongFleet, LosesNothingInFiveMinutesThoughDaemonAndRobotsAreKilled) {
   EXPECT_LE(figures["daemon_resident_mb"], figures["memory_budget_mb"]);
 }
 
-// The flood alone is five times all others together. Whoever sends has to be read: on a machine without the time for
-// that, packets are lost before the daemon sees them, and no fairness helps; so the flood is less there.
+// The flood is five times all other traffic together. On a machine that has no time to read all of it, packets are lost
+// before the daemon sees them, and no fairness among senders helps; there the flood is reduced.
 TEST(Fleet, WhoFloodsOrSendsGarbageHurtsNobodyElse) {
   expect_in_a_round([](double share) {
     const double rate = kRate * share;

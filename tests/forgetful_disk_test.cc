@@ -1,5 +1,5 @@
-// No keyframe that was acknowledged is lost when the power fails, and none is doubled: through intake, journal and
-// worker, on a disk that forgets what was not synced.
+// After power failures no acknowledged keyframe is lost and none is doubled: intake, journal and worker on a disk that
+// forgets what was not synced.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// As forgetful_disk_test, on the engine of a data folder: the power fails under RocksDB and under the journal.
+// Like forgetful_disk_test, with the engine of a data folder: the power fails for RocksDB and the journal together.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ class Disk final : public FailingDisk {
     return storage::open_rocksdb(folder_ / "data", options);
   }
   void fail_power_after(std::uint64_t operations) override {
-    // Both are one machine: whichever gets there first takes the other with it, as far as has_power() tells.
+    // Both are on one machine: when one loses power, has_power() is false for both.
     journal_->fail_power_after(operations);
     map_->fail_power_after(operations);
   }

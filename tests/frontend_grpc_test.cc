@@ -1,5 +1,5 @@
-// relmap-frontend over gRPC, against a daemon that says what the test tells it to: batches that are broken off, the end
-// of a session, back-pressure.
+// relmap-frontend over gRPC with a daemon that the test controls: interrupted batches, the end of a session,
+// back-pressure.
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -62,7 +62,7 @@ class FrontendGrpc : public ::testing::Test {
   publishing::FakeIngest daemon_;
 };
 
-TEST_F(FrontendGrpc, ABatchThatIsBrokenOffGivesTheKeyframesOfOneThatIsNot) {
+TEST_F(FrontendGrpc, AnInterruptedBatchGivesTheSameKeyframes) {
   const Finished whole = run_program(command(drive()));
   EXPECT_EQ(whole.exit_code, 0) << whole.standard_error;
   const Settled uninterrupted = settled();
@@ -82,7 +82,7 @@ TEST_F(FrontendGrpc, ABatchThatIsBrokenOffGivesTheKeyframesOfOneThatIsNot) {
   EXPECT_EQ(daemon_.bad_payloads, 0u);
 }
 
-TEST_F(FrontendGrpc, ReadyMadeKeyframesToo) {
+TEST_F(FrontendGrpc, AnInterruptedBatchOfReadyMadeKeyframesGivesTheSameKeyframes) {
   const std::string file = *folder_ / "keyframes.bin";
   ASSERT_EQ(run_program({built_program("relmap-frontend"), drive(), "--robot", "cart", "--out", file}).exit_code, 0);
   ASSERT_EQ(run_program(command(file)).exit_code, 0);
@@ -117,7 +117,7 @@ TEST_F(FrontendGrpc, OnlyASourceThatEndedEndsItsSession) {
   for (const std::uint64_t end : daemon_.ends) EXPECT_EQ(end, daemon_.settled.size());
 }
 
-TEST_F(FrontendGrpc, SaysThatTheDaemonAsksForLess) {
+TEST_F(FrontendGrpc, ReportsThatTheDaemonAsksForLess) {
   v1::IngestReply slow;
   SessionUuid uuid = *SessionUuid::parse("7a0c1f52-5f0e-4c7d-9d43-0a8f6b1f2e11");
   slow.mutable_pace()->set_session_uuid(uuid_to_wire(uuid));

@@ -1,4 +1,4 @@
-// relmap-frontend as its user meets it: what it refuses, and what it says.
+// relmap-frontend on the command line: what it refuses, and what it reports.
 #include <gtest/gtest.h>
 
 #include <csignal>

@@ -1,5 +1,5 @@
-// A disk that is really full, and one that is really read-only: a small file system in memory, which only root can
-// mount. What a disk does that is told to fail is tested everywhere (rocksdb_faults_test, mapper_test).
+// A disk that is really full or read-only: a small file system in memory, which only root can mount. Injected disk
+// faults are tested elsewhere (rocksdb_faults_test, mapper_test).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>

@@ -1,5 +1,5 @@
-// relmap import g2o, as an operator runs it: a graph becomes a session whose loops are judged, and the same once more
-// changes nothing, also after the daemon was killed.
+// relmap import g2o: a graph becomes a session whose loops are judged; importing it again changes nothing, also after
+// the daemon was killed.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -73,18 +73,18 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
   EXPECT_EQ(accepted(), 8u);
   EXPECT_LE(daemon->client()->transform_between({1, 0}, {1, kLap + 10}).or_throw().edges, 20u);
 
-  // The first of those that agree waited for the second; the false one is told from both.
+  // The first of two agreeing loops waited for the second; the false one is distinguished from both.
   const std::string first = EdgeId{{1, kLap}, 1}.to_string(), wrong = EdgeId{{1, 100}, 1}.to_string();
   const Finished why = import({"edges", "--explain", first});
   EXPECT_EQ(why.exit_code, 0) << why.standard_error;
   for (const std::string& part :
        {first + ": loop 1:0 -> 1:" + std::to_string(kLap) +
-            ", accepted, CONSISTENT (others of neighbouring frames say the same)",
+            ", accepted, CONSISTENT (closures of neighbouring frames agree with it)",
         std::string("verified by imported"), std::string("closures of other frames\n    accepted "),
-        std::string(": candidate, LONE (nothing agrees with it yet)"), std::string(": accepted, CONSISTENT")})
+        std::string(": candidate, LONE (no other closure agrees with it yet)"), std::string(": accepted, CONSISTENT")})
     EXPECT_NE(why.standard_output.find(part), std::string::npos) << part << '\n' << why.standard_output;
   const Finished why_not = import({"edges", "--explain", wrong});
-  EXPECT_NE(why_not.standard_output.find("CONTRADICTS_MOTION (the robot's own motion between its ends says otherwise)"),
+  EXPECT_NE(why_not.standard_output.find("CONTRADICTS_MOTION (the robot's own motion between its ends contradicts it)"),
             std::string::npos)
       << why_not.standard_output;
   EXPECT_NE(why_not.standard_output.find("carries   nothing: it is not in force"), std::string::npos);
@@ -108,7 +108,7 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
   EXPECT_EQ(import({"import", "g2o"}).exit_code, 2);
 }
 
-TEST(ImportG2o, AWayAlongAStepThatNoEdgeMeasuresIsSaidFirstToBeAGuess) {
+TEST(ImportG2o, ARouteAlongAnUnmeasuredStepIsReportedAsAGuessFirst) {
   const storage::TemporaryFolder folder;
   {
     std::ofstream file(folder / "line.g2o");

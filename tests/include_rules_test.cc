@@ -1,5 +1,5 @@
-// One direction of dependency: reads every #include of ours and of the libraries we stand on, and fails on a forbidden
-// one. The table in docs/architecture.md is made of these rules: RELMAP_WRITE_DOCS=1 in the environment writes it anew.
+// Checks the direction of dependencies: reads every #include and fails on a forbidden one. The table in
+// docs/architecture.md is generated from these rules; with RELMAP_WRITE_DOCS=1 in the environment it is written anew.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -192,7 +192,7 @@ std::string table_of_rules() {
   return table;
 }
 
-TEST(IncludeRules, TheTableInTheDocumentsIsThisOne) {
+TEST(IncludeRules, TheTableInTheDocumentsIsTheSame) {
   const fs::path path = kRoot / "docs/architecture.md";
   std::string text = content_of("docs/architecture.md");
   const std::string begin = "<!-- include rules: begin -->\n", end = "<!-- include rules: end -->";
@@ -260,7 +260,7 @@ TEST(IncludeRules, HeadersKeepOpenCvAndGeneratedCodeToThemselves) {
   }
 }
 
-TEST(IncludeRules, OursAreQuotedFromTheRootAndOthersAreNot) {
+TEST(IncludeRules, OwnHeadersAreQuotedFromTheRootAndOthersAreNot) {
   for (const Include& include : includes_of_sources()) {
     const bool ours = fs::exists(kRoot / include.name);
     const bool generated = include.name.find(".pb.h") != std::string::npos || include.name.starts_with("relmap_lcm/") ||

@@ -231,7 +231,7 @@ TEST(MulticastProbe, NamesTheMissingRouteAndWhatMendsIt) {
     EXPECT_EQ(WEXITSTATUS(outcome), 0);
 }
 
-TEST(LcmUrl, IsCompletedAndNamedIfItIsNone) {
+TEST(LcmUrl, IsCompletedOrRefusedByName) {
   EXPECT_EQ(*complete_lcm_url("udpm://239.1.2.3:7000"), "udpm://239.1.2.3:7000?ttl=0&recv_buf_size=4194304");
   EXPECT_EQ(*complete_lcm_url("udpm://239.1.2.3:7000?ttl=1"), "udpm://239.1.2.3:7000?ttl=1&recv_buf_size=4194304");
   EXPECT_FALSE(stays_on_this_machine(*complete_lcm_url("udpm://239.1.2.3:7000?ttl=1")));

@@ -1,5 +1,6 @@
-// Both ends of the exchange over a channel that loses, doubles, reorders and damages, with a daemon that dies and
-// forgets what was not yet on disk: every sequence is settled exactly once, and what the robot believes is so.
+// Both ends of the keyframe protocol over a channel that loses, doubles, reorders and damages messages, with a daemon
+// that dies and forgets what was not on disk: every sequence is settled exactly once, and the robot's view of it is
+// right.
 #include <gtest/gtest.h>
 
 #include <algorithm>

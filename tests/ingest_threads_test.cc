@@ -180,7 +180,7 @@ TEST_F(IngestThreadsTest, EverythingSettlesThroughLossAndRestarts) {
   EXPECT_EQ(publisher->push(keyframe(publisher->session(), 100)).reason(), Reason::SHUTTING_DOWN);
 }
 
-TEST_F(IngestThreadsTest, TheEndIsSaidUntilItIsNoted) {
+TEST_F(IngestThreadsTest, TheSessionEndIsRepeatedUntilItIsAcknowledged) {
   const auto publisher = start_publisher();
   start_daemon();
   ASSERT_TRUE(publisher->push(keyframe(publisher->session(), 0)).ok());
@@ -190,7 +190,7 @@ TEST_F(IngestThreadsTest, TheEndIsSaidUntilItIsNoted) {
   EXPECT_GE(steady_clock::now() - begin, milliseconds(400));
 }
 
-TEST_F(IngestThreadsTest, AnEndThatNobodyNotesHoldsNothingUp) {
+TEST_F(IngestThreadsTest, AnUnacknowledgedSessionEndDoesNotBlock) {
   const auto publisher = start_publisher();
   EXPECT_FALSE(publisher->end_session(steady_clock::now() + milliseconds(100)));
   publisher->interrupt();
@@ -253,7 +253,7 @@ TEST_F(IngestThreadsTest, SourceThatCanWaitIsPausedUntilInterrupted) {
   EXPECT_FALSE(summary.heard);
 }
 
-TEST_F(IngestThreadsTest, PushIsHeldToItsSessionAndOrder) {
+TEST_F(IngestThreadsTest, PushRefusesOtherSessionsAndWrongOrder) {
   const auto publisher = start_publisher();
   ASSERT_TRUE(publisher->push(keyframe(publisher->session(), 5)).ok());
   EXPECT_EQ(publisher->push(keyframe(publisher->session(), 5)).reason(), Reason::INVALID_ARGUMENT);

@@ -1,4 +1,4 @@
-// A daemon that goes away while it is asked: relmap ends, and says why to people and to programs.
+// A daemon that goes away during a command: relmap ends, and reports why as text and as JSON.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ grpc::Status refusal(Reason reason, const std::string& message) {
   return {grpc::StatusCode::UNAVAILABLE, message, error.SerializeAsString()};
 }
 
-// It answers once, and then never gets done with stopping.
+// A daemon that answers once, and then hangs while it stops.
 class StoppingMap final : public v1::Map::Service {
  public:
   grpc::Status GetStatus(grpc::ServerContext*, const v1::GetStatusRequest*, v1::GetStatusReply*) override {
@@ -63,16 +63,16 @@ class LeavingDaemon : public ::testing::Test {
   std::unique_ptr<grpc::Server> server_;
 };
 
-TEST_F(LeavingDaemon, OneThatHangsWhileItStopsIsNotWaitedForForEver) {
+TEST_F(LeavingDaemon, OneThatHangsWhileStoppingIsNotAwaitedForEver) {
   const storage::TemporaryFolder folder;
   setenv("XDG_STATE_HOME", (folder / "state").c_str(), 1);
   const Finished ended = relmap({"ingest", folder / "nowhere", "--patience", "1"});
   EXPECT_EQ(ended.exit_code, 1);
-  EXPECT_THAT(ended.standard_error, HasSubstr("SHUTTING_DOWN: the daemon is stopping; it is waited for"));
+  EXPECT_THAT(ended.standard_error, HasSubstr("SHUTTING_DOWN: the daemon is stopping; waiting for it"));
   EXPECT_THAT(ended.standard_error, HasSubstr("1 of 1 recordings failed"));
 }
 
-TEST_F(LeavingDaemon, ARefusalIsAnObjectAndTheExitCodeThatOfItsReason) {
+TEST_F(LeavingDaemon, ARefusalIsAJsonObjectWithTheExitCodeOfItsReason) {
   const Finished stopping = relmap({"localise", "1:0"});
   EXPECT_EQ(stopping.exit_code, 1);
   EXPECT_THAT(stopping.standard_output, StartsWith(R"({"error":{"reason":"SHUTTING_DOWN","message":")"));

@@ -1,4 +1,4 @@
-// A robot that lost its spool is a stranger under its own name, until a place is recognised.
+// A robot that lost its spool begins a new session of the same name, which is connected once a place is recognised.
 #include <gtest/gtest.h>
 
 #include <filesystem>

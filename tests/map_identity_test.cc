@@ -1,6 +1,6 @@
-// A map has an identity, and a robot that was in one does not go on in another: recordings begin anew there, live
-// robots are told, and what a restored map lacks is brought again as far as it is still there, and named as far as it
-// is not.
+// A map has an identity, and sessions that began in one map do not continue in another: recordings are sent from their
+// beginning, and live robots are told. A restored map gets the missing keyframes that spools still have; the others are
+// declared as gaps.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -101,7 +101,7 @@ TEST_F(MapIdentityTest, ARecordingBeginsAnewInAnotherMapAndIsNotDoubledInTheFirs
   EXPECT_EQ(sessions_of(first)[0].uuid, sessions_of(second)[0].uuid);
 }
 
-TEST_F(MapIdentityTest, AndOverLcm) {
+TEST_F(MapIdentityTest, ARecordingBeginsAnewInAnotherMapOverLcm) {
   const std::string lcm = random_lcm_url();
   {
     RunningDaemon first(daemon_of("first", lcm));
@@ -116,7 +116,7 @@ TEST_F(MapIdentityTest, AndOverLcm) {
   expect_whole(second);
 }
 
-TEST_F(MapIdentityTest, ALiveRobotIsToldAndItsKeyframesWaitForTheirMap) {
+TEST_F(MapIdentityTest, ALiveRobotIsToldAndKeepsItsKeyframes) {
   RunningDaemon first(daemon_of("first")), second(daemon_of("second"));
   {
     Process robot(command({"--server", first.address(), "--live", "--rate", "40"}), {});
@@ -135,7 +135,7 @@ TEST_F(MapIdentityTest, ALiveRobotIsToldAndItsKeyframesWaitForTheirMap) {
   expect_whole(first);
 }
 
-TEST_F(MapIdentityTest, ARestoredMapGetsWhatTheSpoolHasAndTheRestIsNamed) {
+TEST_F(MapIdentityTest, ARestoredMapGetsWhatTheSpoolHasAndNamesTheRestAsGaps) {
   const DaemonOptions options = daemon_of("map");
   MapIdentity before;
   {
@@ -191,9 +191,9 @@ TEST_F(MapIdentityTest, ARecordingIsWholeAgainInARestoredMap) {
   expect_whole(daemon);
 }
 
-// What went on in its midst was tracked anew there: another run has other keyframes, which must not come behind its
-// own.
-TEST_F(MapIdentityTest, ARecordingThatWasInterruptedIsNotPiecedTogetherOfTwoRuns) {
+// A run that resumes in the middle tracks from there anew and has other keyframes, which must not be appended to those
+// of the first run.
+TEST_F(MapIdentityTest, AnInterruptedRecordingIsNotPiecedTogetherFromTwoRuns) {
   const DaemonOptions options = daemon_of("map");
   const auto interrupted_at = [&](const RunningDaemon& daemon, std::uint64_t frames) {
     Process robot(command({"--server", options.data, "--rate", "40"}), {});

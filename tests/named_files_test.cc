@@ -1,4 +1,4 @@
-// What documents and comments name is there: a file that moves takes its mentions along.
+// Files that documents and comments name exist, so that a file that moves takes its mentions along.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -35,14 +35,14 @@ int expect_all_there(const std::string& file, const std::string& text, const std
   return found;
 }
 
-TEST(NamedFiles, OfDocumentsAreThere) {
+TEST(NamedFiles, InDocumentsExist) {
   static const std::regex kName("`((?:proto|storage|server|client|frontend|tools|tests|docs|cmake)/[\\w./-]+)`");
   int found = 0;
   for (const std::string& file : documents()) found += expect_all_there(file, content_of(file), kName);
   EXPECT_GT(found, 300);
 }
 
-TEST(NamedFiles, OfCommentsAreThere) {
+TEST(NamedFiles, InCommentsExist) {
   static const std::regex kName(
       "//.*?[ (]((?:proto|storage|server|client|frontend|tools|tests|docs)/[\\w/]+\\.(?:h|cc|md))");
   int found = 0;

@@ -1,5 +1,5 @@
-// An operator at work on loop closures with the program: what he proposes, puts into force and takes out is told
-// before, named in the answer, undone by the command that the answer names, and outlasts the daemon's death.
+// An operator edits loop closures with the program. Every proposal, acceptance and removal can be previewed, is listed
+// in the answer, is undone by the command that the answer names, and survives a kill of the daemon.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// A drive of two laps in which nothing is recognised by itself.
+// A drive of two laps whose places are not recognised automatically.
 class Operator : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -71,7 +71,7 @@ class Operator : public ::testing::Test {
   std::unique_ptr<RunningDaemon> daemon_;
 };
 
-TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
+TEST_F(Operator, ProposesAcceptsAndWithdrawsAndSeesTheEffectInADryRun) {
   const std::string dry = edge({"propose", "1:5", "1:85", "--dry-run"});
   EXPECT_THAT(dry, HasSubstr("would be: candidate, LONE"));
   EXPECT_THAT(relmap({"edges", "--loops"}).standard_output, Not(HasSubstr("candidate"))) << "a dry run changes nothing";
@@ -79,7 +79,7 @@ TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
   const Finished proposed = relmap({"edge", "propose", "1:85", "1:5"});
   ASSERT_EQ(proposed.exit_code, 0) << proposed.standard_error;
   const std::string id = proposed.standard_output.substr(0, proposed.standard_output.find(':', 3));
-  EXPECT_THAT(proposed.standard_output, HasSubstr(id + ": candidate, LONE (nothing agrees with it yet)"));
+  EXPECT_THAT(proposed.standard_output, HasSubstr(id + ": candidate, LONE (no other closure agrees with it yet)"));
   EXPECT_THAT(proposed.standard_output, HasSubstr("not there"));
   EXPECT_THAT(proposed.standard_error, HasSubstr("relmap edge remove " + id));
   const Finished again = relmap({"edge", "propose", "1:5", "1:85"});
@@ -117,7 +117,7 @@ TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
   EXPECT_THAT(map::derived_differences(*open_stored_map(options_.data)), IsEmpty());
 }
 
-TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
+TEST_F(Operator, IsAskedBeforeAgreeingClosuresAreRemoved) {
   std::vector<std::string> ids;
   for (const int at : {5, 8, 11}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
   ASSERT_EQ(in_force(), ids);
@@ -160,8 +160,8 @@ TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
   edge({"restore", ids[0]});
 }
 
-// While he looked at what would go, a closure more came into force.
-TEST_F(Operator, TakesNothingOutThatHeWasNotShown) {
+// Another closure came into force while the operator looked at what would be removed.
+TEST_F(Operator, RemovesOnlyWhatWasShown) {
   std::vector<std::string> ids;
   for (const int at : {5, 8}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
   const auto one_more = [&](int at) {
@@ -193,7 +193,7 @@ TEST_F(Operator, TakesNothingOutThatHeWasNotShown) {
   EXPECT_THAT(in_force(), IsEmpty());
 }
 
-TEST_F(Operator, TakesOneClosureOutAndLeavesThoseThatAgreeWithIt) {
+TEST_F(Operator, RemovesOneClosureAndKeepsThoseThatAgreeWithIt) {
   std::vector<std::string> ids;
   for (const int at : {5, 8, 11}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
   ASSERT_EQ(in_force(), ids);
@@ -208,8 +208,8 @@ TEST_F(Operator, TakesOneClosureOutAndLeavesThoseThatAgreeWithIt) {
   daemon_->process().kill();
   daemon_ = std::make_unique<RunningDaemon>(options_);
   EXPECT_EQ(in_force(), others);
-  EXPECT_THAT(explain(ids[1]), HasSubstr("REMOVED_ALONE (an operator took it out, and none of those that agree with "
-                                         "it): a mirror"));
+  EXPECT_THAT(explain(ids[1]), HasSubstr("REMOVED_ALONE (an operator took out this one alone, without those that "
+                                         "agree with it): a mirror"));
   const std::string later = propose("1:14", "1:94");
   EXPECT_EQ(in_force(), (std::vector<std::string>{ids[0], ids[2], later}));
 
@@ -239,8 +239,8 @@ TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
   EXPECT_THAT(relmap({"edge", "accept", "1:5/3", "--dry-run"}).standard_error, HasSubstr("NO_SUCH_EDGE"));
 }
 
-// Two robots bring drives of one name: neither is meant by it.
-TEST_F(Operator, IsAskedWhichOfSeveralSessionsOfOneNameHeMeans) {
+// Two robots send sessions of the same name, which is therefore ambiguous.
+TEST_F(Operator, IsAskedWhichSessionOfANameIsMeant) {
   ASSERT_EQ(relmap({"ingest", folder_ / "drive", "--again", "--robot", "anna"}).exit_code, 0);
   const std::string name = daemon_->client()->sessions().or_throw().at(0).name;
   const std::vector<std::vector<std::string>> commands{
@@ -258,14 +258,14 @@ TEST_F(Operator, IsAskedWhichOfSeveralSessionsOfOneNameHeMeans) {
   EXPECT_THAT(relmap({"session", "thaw", name}).standard_output, HasSubstr("session 2 is what it was"));
 }
 
-TEST_F(Operator, HearsThatAnAnswerCouldNotBeWritten) {
+TEST_F(Operator, IsToldThatAnAnswerCannotBeWritten) {
   const std::string command = built_program("relmap") + " --server " + options_.data + " sessions >/dev/full";
   const Finished lost = run_program({"/bin/sh", "-c", command}, seconds(20));
   EXPECT_EQ(lost.exit_code, 1);
   EXPECT_THAT(lost.standard_error, HasSubstr("IO_ERROR"));
 }
 
-TEST_F(Operator, NamesWhatIsWrongWithALabel) {
+TEST_F(Operator, BadLabelsAreRefusedByName) {
   EXPECT_THAT(relmap({"label", "1:5", " "}).standard_error, HasSubstr("BAD_NAME: label is nothing but white space"));
   const std::string bad = "caf\xe9";
   EXPECT_THAT(relmap({"label", "1:5", bad}).standard_error, HasSubstr("BAD_NAME: label is not UTF-8"));

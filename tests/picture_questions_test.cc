@@ -1,5 +1,5 @@
-// Pictures that a user asks about with the program: which eye's they are, which of the sessions that show their place
-// is meant, and what is said where there is no answer.
+// Pictures that a user asks about with the program: their eye, their camera, the session that is returned, and
+// refusals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -87,7 +87,7 @@ class PictureQuestions : public ::testing::Test {
   std::unique_ptr<RunningDaemon> daemon_;
 };
 
-// Nobody names a camera, and the one that takes pictures of that size did not take it.
+// No camera is named, and the picture is not of the camera whose pictures have its size.
 TEST_F(PictureQuestions, APictureOfTheSessionsSizeMayBeOfAnotherCamera) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   const cv::Mat left = cv::imread(picture(kAsked), cv::IMREAD_GRAYSCALE);
@@ -115,8 +115,8 @@ TEST_F(PictureQuestions, APictureThatWasStretchedIsRefused) {
   EXPECT_THAT(answer.standard_error, HasSubstr("stretched in height by 1"));
 }
 
-// The eyes have different lenses here: the right one's as the left one's would be metres off, or refused.
-TEST_F(PictureQuestions, APictureOfTheRightEyeIsToldFromWhereThatStands) {
+// The eyes have different lenses: a right picture that is taken for a left one would be metres off, or refused.
+TEST_F(PictureQuestions, APictureOfTheRightEyeGivesThePoseOfThatEye) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   const StereoCalibration rig = load_calibration(drive() + "/calib.txt").or_throw();
   constexpr double kLonger = 1.25;
@@ -193,7 +193,7 @@ TEST_F(PictureQuestions, PhotographsThatWereTakenInTwiceDoNotContradictThemselve
   EXPECT_THAT(matched.standard_error, Not(HasSubstr("geometry confirms none"))) << matched.standard_output;
 }
 
-TEST_F(PictureQuestions, APairAwayFromItsCalibrationIsOfTheOneCameraThatTakesItsSize) {
+TEST_F(PictureQuestions, APairWithoutCalibrationTakesTheOnlyCameraOfItsSize) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   const std::string left = file("away/of/it/left.png"), right = file("away/of/it/right.png");
   fs::copy_file(picture(kAsked), left);
@@ -210,12 +210,12 @@ TEST_F(PictureQuestions, APairAwayFromItsCalibrationIsOfTheOneCameraThatTakesIts
   const Finished refused = relmap({"localise", left, right});
   EXPECT_EQ(refused.exit_code, 1) << refused.standard_output;
   EXPECT_THAT(refused.standard_error, HasSubstr("NO_CALIBRATION: "));
-  for (const char* said : {"sessions of different cameras", "--calibration", "--session"})
+  for (const char* said : {"sessions with different cameras", "--calibration", "--session"})
     EXPECT_THAT(refused.standard_error, HasSubstr(said));
   EXPECT_EQ(relmap({"localise", left, right, "--session", "1"}).exit_code, 0) << "as it is told to";
 }
 
-TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {
+TEST_F(PictureQuestions, ARefusalIsAJsonObject) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   ASSERT_TRUE(cv::imwrite(file("grey.png"), cv::Mat(480, 640, CV_8U, cv::Scalar(128))));
   const Finished refused = relmap({"--json", "localise", file("grey.png")});

@@ -1,6 +1,6 @@
-// Places of real photographs, through the programs: mono sessions by relmap-frontend, answers by relmapd with the
-// vocabulary that is shipped, geometry included. Floors that look alike are not taken for each other, and of a building
-// photographed by ten people the others' pictures are found among hundreds of other places.
+// Places of real photographs through the programs: mono sessions by relmap-frontend, answers by relmapd with the
+// shipped vocabulary and geometry. Floors that look alike are not confused, and pictures of one building by ten people
+// find each other among hundreds of other places.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// One definition for each name: two types, aliases or functions with the same qualified name in two files are undefined
-// behaviour once they meet in one program, and nothing but luck tells (the one-definition rule, [basic.def.odr]). Reads
-// all sources; `tools/test --full` has the linker compare what it meets, too (-Wodr).
+// Checks that each qualified name has one definition. Two types, aliases or functions with the same qualified name in
+// two files are undefined behaviour in a program that contains both, and no diagnostic is required (the one-definition
+// rule, [basic.def.odr]). Reads all sources; `tools/test --full` has the linker compare definitions, too (-Wodr).
 #include <gtest/gtest.h>
 
 #include <algorithm>

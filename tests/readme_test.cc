@@ -1,6 +1,6 @@
-// README.md says what is so. Its tour as a reader follows it: the commands are taken from its text and run as they
-// stand, each in turn, on what those before it made; nothing is put in but the folder of the programs. The programs
-// that it names. Its figures and its picture, which are of one run.
+// README.md is true. The commands of its tour are taken from its text and run as printed, in order, each on the results
+// of those before; only the folder of the programs is added. The programs that it names are built, and its figures and
+// its picture are of one run.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,8 +78,8 @@ std::string quoted(std::string text) {
 bool builds(const std::string& command) { return command.starts_with("tools/setup "); }
 bool needs_a_camera(const std::string& command) { return command.find("--source iidc") != std::string::npos; }
 
-// A shell script that runs the commands until one fails, and says which. What a camera would be needed for has to fail
-// for want of one: then all else about the command was right.
+// A shell script that runs the commands until one fails, and tells which. Commands that need a camera must fail because
+// there is none, which shows that everything else about them is right.
 std::string script_of(const std::vector<std::string>& commands) {
   std::string script = "set -o pipefail\ntrap 'kill $(jobs -p) 2>/dev/null; wait' EXIT\n";
   for (std::string command : commands) {
@@ -161,7 +161,7 @@ TEST_F(Tour, ACommandThatFailsIsNamed) {
 }
 
 // The first line of the tour is what tools/demo does, which is run often.
-TEST(Readme, ItIsBuiltAsTheDemoBuildsIt) {
+TEST(Readme, BuildsAsTheDemoDoes) {
   const std::string demo = read_text(RELMAP_SOURCE_DIR "/tools/demo");
   int seen = 0;
   for (const std::string& line : commands_of(readme(), kTour)) {

@@ -1,5 +1,5 @@
-// The main job on real recordings: stereo pairs through relmap-frontend and LCM into relmapd, as good a map as the
-// truth asks for, and right answers. simulated_street_test does the same where there are no recordings.
+// Real recordings: stereo pairs go through relmap-frontend and LCM into relmapd, and the map agrees with the truth and
+// gives right answers. simulated_street_test does the same without recordings.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -79,7 +79,7 @@ TEST_F(RealData, AStraightRoadBecomesAMapThatAnswers) {
   expect_drift_below(drive, 0.015, {30, 50}, 5);
 }
 
-TEST_F(RealData, WhatWasSeenJustNowIsSeldomTakenForAChange) {
+TEST_F(RealData, AJustSeenPlaceIsSeldomTakenForAChange) {
   expect_hardly_changed(data_ + "/kitti_raw_0926_1405");
   expect_hardly_changed(data_ + "/boofcv_backyard");
 }

@@ -1,6 +1,5 @@
-// Probabilities of places are what they say: on simulated drives, whose truth is known, of the claims that are made
-// with about the same probability about that share is true. What geometry is tried on hangs on it
-// (server/map/lookup.cc).
+// Probabilities of places are calibrated: on simulated drives with known truth, of the claims with about the same
+// probability about that share is true. The choice of candidates for geometry depends on it (server/map/lookup.cc).
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -1,6 +1,6 @@
-// What is recognised in recordings of others, by the shipped vocabulary: of the places that a picture shows again, how
-// many are among the first candidates, and how many stand above the most certain wrong one; each beside tf-idf on the
-// same words. Numbers were fitted on others, with these in view (docs/decisions/recognition.md).
+// Recognition in public recordings with the shipped vocabulary: how often the place of a picture is among the first
+// candidates, and how often it is more certain than the most certain wrong one, compared with tf-idf on the same words.
+// Parameters were fitted on other recordings, with these in view (docs/decisions/recognition.md).
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -1,5 +1,5 @@
-// A robot that is carried without noticing, through pictures: front-end and map close the loop behind the ride, and
-// take no place for another one. The same drives on foot, and a building whose halves look alike. (relmap-bench rides.)
+// A robot is carried without noticing: from its pictures, front-end and map close the loop after the ride, and mistake
+// no place for another. Also the same drives on foot, and a building whose halves look alike. (relmap-bench rides.)
 #include <gtest/gtest.h>
 
 #include <string>
@@ -24,7 +24,7 @@ BenchFigures ride(const std::string& name, int seeds, bool on_foot = false) {
   return BenchFigures(arguments, std::chrono::minutes(2 + 3 * seeds));
 }
 
-// In nine drives of ten, and never a wrong closure, but of the cabin, which is what was seen.
+// The loop is closed in nine of ten drives, without wrong closures except of the cabin, which is what was seen.
 void expect_closed(const std::string& name, int seeds) {
   const BenchFigures found = ride(name, seeds);
   EXPECT_GE(found["rides_closed"], seeds == 1 ? 1 : 0.9 * seeds) << name;

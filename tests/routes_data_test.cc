@@ -1,4 +1,4 @@
-// Routes through recorded pose graphs, all of whose loops are taken for edges: cells find what Dijkstra finds.
+// Routes through recorded pose graphs with all loops as edges: cells find the same costs as Dijkstra.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -89,7 +89,7 @@ TEST_F(SessionDeletion, GoesOnByItselfAfterKillsAndLeavesTheOthersWhole) {
   EXPECT_EQ(again.exit_code, 1);
   EXPECT_THAT(again.standard_error, HasSubstr("no session"));
 
-  // The recording is not taken in again under its uuid, and says how it is.
+  // The recording is not taken in again under its uuid, and the message says what to do.
   const Finished back = ingest({drives_[1]});
   EXPECT_EQ(back.exit_code, 1);
   EXPECT_THAT(back.standard_error + back.standard_output, HasSubstr("SESSION_DELETED"));

@@ -1,5 +1,5 @@
-// Robots drive the same circuit of one world, each in its own way, from its own start and in another light. They
-// are strangers until a place is recognised; then they share one map, in which those who come later add little.
+// Robots drive the same circuit of one world, each with its own start, drive and light. Their sessions are unconnected
+// until a place is recognised; then they share one map, to which later robots add little.
 #include "tests/support/simulated_fleet.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The main job on a simulated street that is driven 1.25 times round: the twin of real_data_test that always runs.
+// A simulated street, driven 1.25 times round, becomes a map: the counterpart of real_data_test that always runs.
 #include <gtest/gtest.h>
 
 #include "frontend/vision/encoded_picture.h"

@@ -1,4 +1,4 @@
-// Recordings that look right and are wrong, through the programs: none of them ends with 0, and each is named.
+// Recordings that look right and are wrong: none ends with exit code 0, and the fault of each is named.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -97,7 +97,7 @@ class SpoiledInput : public ::testing::Test {
   static inline StereoCamera camera_;
 };
 
-TEST_F(SpoiledInput, ASoundOneEndsWithNought) {
+TEST_F(SpoiledInput, ASoundRecordingEndsWithExitCodeZero) {
   const Finished done = track(sound(), {"--json"});
   EXPECT_EQ(done.exit_code, 0) << done.standard_error;
   for (const char* said : {"\"trusted\": true, \"expected\": 51, \"seen\": 51, \"measured\": 51", "\"findings\": []",
@@ -109,7 +109,7 @@ TEST_F(SpoiledInput, ASoundOneEndsWithNought) {
 }
 
 // Good cameras in all kinds of worlds are neither refused nor warned of.
-TEST_F(SpoiledInput, SoundOnesOfManyKindsPassTheCheck) {
+TEST_F(SpoiledInput, SoundRecordingsOfManyKindsPassTheCheck) {
   const std::vector<std::vector<std::string>> kinds = {{"--seed", "21", "--light", "dusk"},
                                                        {"--seed", "22", "--scene", "motorway"},
                                                        {"--seed", "23", "--width", "256", "--noise", "6"},
@@ -163,7 +163,7 @@ TEST_F(SpoiledInput, AnEyeTurnedByADegreeAboutAnyAxis) {
   EXPECT_THAT(despite.standard_output, HasSubstr("\"measured_share\": 1.0"));
 }
 
-TEST_F(SpoiledInput, RawPicturesThatAreSaidToBeRectified) {
+TEST_F(SpoiledInput, RawPicturesThatAreDeclaredRectified) {
   const std::string drive = copy("raw");
   change(drive, "image_0", raw({0.3, -0.4, 0.2}, {-0.28, 0.07, 0.0002, 0.00002, 0}));
   change(drive, "image_1", raw({-0.5, 0.5, -0.4}, {-0.27, 0.06, -0.0001, 0.0003, 0}));
@@ -176,7 +176,7 @@ TEST_F(SpoiledInput, ADeadEye) {
   expect_refused(drive, "EYE_DEAD");
 }
 
-TEST_F(SpoiledInput, MissingRightPicturesAreCountedAgainstWhatThereShouldBe) {
+TEST_F(SpoiledInput, MissingRightPicturesAreCountedAgainstTheExpectedPairs) {
   const std::string drive = copy("missing");
   for (int pair = 0; pair < kPairs; ++pair)
     if (pair % 5 != 0 || pair == 50) fs::remove(drive + "/image_1/" + picture_name(pair));
@@ -243,7 +243,7 @@ TEST_F(SpoiledInput, OneEyeAloneIsExpectedOfAMonoSession) {
   EXPECT_THAT(done.standard_output, HasSubstr("\"trusted\": true, \"expected\": 0"));
 }
 
-TEST_F(SpoiledInput, ABatchSaysWhichOfItsRecordingsAreNotToBeTrusted) {
+TEST_F(SpoiledInput, ABatchNamesItsUntrustedRecordings) {
   setenv("XDG_STATE_HOME", file("state").c_str(), 1);
   const std::string missing = copy("batch-missing"), askew = copy("batch-askew");
   for (int pair = 0; pair < kPairs; ++pair)

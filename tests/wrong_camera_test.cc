@@ -1,7 +1,6 @@
-// Cameras that are not what they are said to be, on a simulated street: questions with a mistake in them are not
-// answered as if all were well, those of which no camera is named are not taken for better than they are, and a drive
-// with a wrong calibration does not bend the map. wrong_questions_data_test and euroc_data_test ask the same of
-// recordings.
+// Cameras that differ from their calibration, on a simulated street: queries with a wrong calibration are refused,
+// unknown lenses are in the covariance of the answer, and a drive with a wrong calibration does not bend the map.
+// wrong_questions_data_test and euroc_data_test test the same on recordings.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -110,7 +109,7 @@ std::vector<double> barrel(const StereoCamera& camera, double share) {
   return {-1.25 * share / r2, 0.25 * share / (r2 * r2), 0, 0, 0};
 }
 
-TEST(WrongCamera, PicturesThroughALensThatNobodyNamesAreNotTakenForBetterThanTheyAre) {
+TEST(WrongCamera, PicturesThroughAnUnknownLensHaveHonestCovariances) {
   const storage::TemporaryFolder folder;
   const std::string recording = drive(folder / "drive", "1");
   StreamedSessions sessions({"--deterministic"});

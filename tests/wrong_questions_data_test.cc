@@ -1,6 +1,5 @@
-// Questions with a mistake in them: eyes exchanged, a right picture of another time, a camera that did not take the
-// picture, a picture that is not rectified. None is answered as if all were well. What is asked without a mistake is
-// answered as before.
+// Queries with a mistake: exchanged eyes, a right picture of another time, a wrong camera, a picture that is not
+// rectified. None is answered wrongly, and queries without a mistake are answered as before.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of every second pair of a recording a map is made; those between are asked for.
+// Every second pair of a recording is mapped; the pairs in between are queries.
 struct Recording {
   std::string name;
   std::string source, left, right;  // layout, and the eyes' folders
@@ -188,7 +187,7 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
   std::map<std::size_t, client::Localisation> well_;  // of the pair without a mistake
 };
 
-TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
+TEST_P(WrongQuestions, AreNotAnsweredWrongly) {
   Outcome alone;  // the left picture
   for (const bool stereo : {true, false}) {
     const Outcome well = ask([&](std::size_t pair) { return question(pair, stereo); });

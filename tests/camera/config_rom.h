@@ -1,4 +1,4 @@
-// The configuration ROM of an IIDC camera (IEEE 1212): who it is, and where its command registers are.
+// The configuration ROM of an IIDC camera (IEEE 1212): its identity, and the address of its command registers.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ struct ConfigRom {
   std::string vendor, model;
   std::uint32_t command_registers = 0;  // offset from the initial register space, bytes
 
-  // Quadlets from 0xfffff0000400 on, with all their check sums.
+  // The quadlets from 0xfffff0000400 on, with their checksums.
   std::vector<std::uint32_t> quadlets() const;
 };
 

@@ -1,5 +1,5 @@
-// What a simulated camera sends where it is told nothing else: no two frames share a byte's place, by which bytes of
-// another frame are found.
+// The default content of a simulated camera's frames. Each byte depends on the number of its frame, so that bytes of
+// another frame are recognised.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace relmap::testing {
 
-// A texture, with the frame's number at byte 64.
+// Fills `bytes` with a texture; the number of the frame is at byte 64.
 void default_frame(std::uint64_t number, std::span<std::uint8_t> bytes);
 
-// The number of one, padding left out; nullopt if a byte of it, from 64 on, is another frame's.
+// The number of a default frame without its padding; nullopt if a byte from 64 on belongs to another frame.
 std::optional<std::uint64_t> default_frame_number(std::span<const std::uint8_t> bytes);
 
 }  // namespace relmap::testing

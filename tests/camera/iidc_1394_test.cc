@@ -252,7 +252,7 @@ TEST_F(Iidc1394Test, ACrashCostsOneCamera) {
   EXPECT_EQ(0u, two->counts().lost);
 }
 
-TEST_F(Iidc1394Test, SignalsToEndLeaveItToItsProgram) {
+TEST_F(Iidc1394Test, TheCameraProcessIgnoresSignalsToEnd) {
   plug();
   const auto live = open_live();
   ASSERT_TRUE(live);
@@ -263,7 +263,7 @@ TEST_F(Iidc1394Test, SignalsToEndLeaveItToItsProgram) {
 }
 
 // As if the front-end had crashed: nothing of it is left but what the process sees of its socket.
-TEST_F(Iidc1394Test, ACameraIsToldToStopWhereItsProgramEnds) {
+TEST_F(Iidc1394Test, ACameraIsStoppedWhenItsProgramEnds) {
   const auto camera = plug();
   {
     const auto there = bus();

@@ -58,7 +58,7 @@ class IidcFixture : public ::testing::Test {
   std::shared_ptr<iidc::CameraBus> usb_;
 };
 
-// What comes of a camera until `enough`, or twenty seconds.
+// What a camera has delivered.
 struct Watched {
   std::vector<std::uint64_t> numbers;  // of default_frame()s, in order
   std::uint64_t torn = 0;
@@ -68,6 +68,7 @@ struct Watched {
   std::uint64_t frames() const { return numbers.size(); }
 };
 
+// Reads frames until `enough` returns true; fails the test after twenty seconds.
 inline void watch(iidc::LiveCamera& live, Watched& seen, const std::function<bool()>& enough) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!enough() && std::chrono::steady_clock::now() < until) {

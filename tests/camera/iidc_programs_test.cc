@@ -1,5 +1,5 @@
-// The programs at a simulated camera, as a robot's user runs them: what it shows becomes a map that closes its loop; it
-// is found, set, looked through, checked, recorded.
+// The programs with a simulated camera: its pictures become a map that closes its loop, and relmap-camera finds, sets,
+// shows, checks and records it.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -193,7 +193,7 @@ TEST_F(IidcPrograms, TheFrontEndGoesOnWhereTheCameraIsPluggedInAgain) {
 }
 
 // A robot drives on, and is told at once and at the end.
-TEST_F(IidcPrograms, EyesThatAreExchangedAreSaidWhileTheCameraGoesOn) {
+TEST_F(IidcPrograms, ExchangedEyesAreReportedWhileTheCameraGoesOn) {
   const Drive drive(folder_ / "drive", 60, {"--seed", "5", "--laps", "0.5", "--step", "0.25"});
   const std::string cameras = drive.cameras(folder_ / "cameras");
   std::ofstream(cameras + "/12345678/settings.yaml") << "first_byte: left\n";
@@ -216,7 +216,7 @@ TEST_F(IidcPrograms, EyesThatAreExchangedAreSaidWhileTheCameraGoesOn) {
   EXPECT_NE(summary.find("\"trusted\": false"), std::string::npos) << summary;
 }
 
-TEST_F(IidcPrograms, NoCameraIsSaidAtOnce) {
+TEST_F(IidcPrograms, AMissingCameraIsReportedAtOnce) {
   UsbTestbed testbed;
   const Finished done = run_program(
       {built_program("relmap-frontend"), "--source", "iidc", "--robot", "cart", "--out", folder_ / "keyframes.bin"});

@@ -1,5 +1,5 @@
-// Our driver on unmodified libusb, at a camera that is simulated below it: what it finds, sets, streams, and what it
-// makes of every fault.
+// Our driver on unmodified libusb with a simulated camera: discovery, settings, streams, and its reaction to every
+// fault.
 #include <dirent.h>
 #include <gtest/gtest.h>
 
@@ -87,12 +87,12 @@ TEST_F(IidcUsb, FindsCamerasByTheirRom) {
   EXPECT_NE(none.status().message().find("12345678"), std::string::npos) << none.status().message();
 }
 
-TEST_F(IidcUsb, NoCameraIsSaidByName) {
+TEST_F(IidcUsb, AMissingCameraIsReportedByName) {
   EXPECT_TRUE(iidc::find_cameras(buses()).empty());
   EXPECT_EQ(iidc::LiveCamera::open(buses(), {}, stop_).reason(), Reason::NO_CAMERA);
 }
 
-TEST_F(IidcUsb, ACameraThatMayNotBeOpenedSaysWhatMendsIt) {
+TEST_F(IidcUsb, MissingPermissionIsReportedWithARemedy) {
   plug({}, UsbTestbed::Access::kNobody);
   const auto opened = iidc::LiveCamera::open(buses(), {}, stop_);
   EXPECT_EQ(opened.reason(), Reason::CAMERA_FORBIDDEN);
@@ -169,7 +169,7 @@ TEST_F(IidcUsb, WhatIsSetIsReadBack) {
   EXPECT_NE(forgotten.message().find("BRIGHTNESS"), std::string::npos) << forgotten.message();
 }
 
-TEST_F(IidcUsb, ARegisterThatAnswersNotOrIsNotThereIsAnError) {
+TEST_F(IidcUsb, ASilentOrMissingRegisterIsAnError) {
   auto camera = plug();
   const auto opened = link();
   ASSERT_TRUE(opened);
@@ -388,7 +388,7 @@ TEST_F(IidcUsb, AClockThatDoesNotAnswerHoldsNoFramesUpForLong) {
   EXPECT_EQ(seen.torn, 0u);
 }
 
-TEST_F(IidcUsb, WhoComesSecondDisturbsNobody) {
+TEST_F(IidcUsb, ASecondProgramDoesNotDisturbTheFirst) {
   auto camera = plug();
   const auto first = open();
   ASSERT_TRUE(first);
@@ -425,7 +425,7 @@ TEST_F(IidcUsb, ACameraThatForgotItsSettingsIsSetUpAgain) {
   EXPECT_EQ(iidc::read_feature(registers(*opened), Feature::kBrightness)->value, 100u);
 }
 
-TEST_F(IidcUsb, OneThatWaitsForItsTriggerIsNotSilent) {
+TEST_F(IidcUsb, WaitingForATriggerIsNotReportedAsSilence) {
   auto camera = plug();
   LiveOptions options;
   options.trigger = *iidc::TriggerSetting::parse("0,0");

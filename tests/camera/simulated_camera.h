@@ -22,28 +22,28 @@ struct SimulatedCameraOptions {
   std::uint64_t guid = 0x00b0'9d01'00c0'ffee;
   std::string vendor = "Point Grey Research", model = "Bumblebee2 BB2-03S2C-38";
   std::uint32_t serial = 12345678;
-  int width = 640, height = 480;    // of one eye in Format7, at most and at first
-  double rate = 48;                 // frames a second, at most
-  std::string bayer_tile = "YYYY";  // as its register tells it; YYYY: grey
-  double clock_drift_ppm = 0;       // of its cycle time
-  // Fills a frame as it is sent, of each pixel the right eye's byte first; default: default_frame().
+  int width = 640, height = 480;    // of one eye in Format7: maximum and initial value
+  double rate = 48;                 // maximum frames a second
+  std::string bayer_tile = "YYYY";  // value of its register; YYYY: grey
+  double clock_drift_ppm = 0;       // drift of its cycle time
+  // Fills a frame in the order in which it is sent: of each pixel the right eye's byte first. Default: default_frame().
   std::function<void(std::uint64_t number, std::span<std::uint8_t> interleaved)> content = {};
 };
 
-// What is wrong with it. Counts are of frames to come, and go down.
+// Faults of a camera. Counts are of frames to come, and are counted down.
 struct CameraFaults {
-  int short_frames = 0;                         // half of it comes, and an end
-  int long_frames = 0;                          // 1000 bytes more
-  int torn_frames = 0;                          // its second half is the next frame's
-  int shifted_frames = 0;                       // 1024 bytes in it get lost, without an end: all that follows moves up
-  int stalls = 0;                               // the endpoint is halted instead
-  std::chrono::milliseconds silence{0};         // from now on: frames of that time are never sent
-  std::optional<capture::FirstByte> dead_eye;   // is black
-  std::set<std::uint64_t> mute_registers;       // neither a read nor a write is ever answered
-  std::set<std::uint64_t> forgetful_registers;  // writes are accepted and not kept
-  bool bad_rom = false;                         // a bit of it is wrong: its unit directory is nowhere
-  bool busy = false;                            // another driver has its interface
-  bool no_bandwidth = false;                    // the bus takes no transfer of frames
+  int short_frames = 0;                         // only half of the frame is sent before its end
+  int long_frames = 0;                          // 1000 bytes too many are sent
+  int torn_frames = 0;                          // the second half is that of the next frame
+  int shifted_frames = 0;                       // 1024 bytes are lost, and the following bytes move up
+  int stalls = 0;                               // the endpoint is halted instead of sending the frame
+  std::chrono::milliseconds silence{0};         // from now on, the frames of this time are never sent
+  std::optional<capture::FirstByte> dead_eye;   // this eye is black
+  std::set<std::uint64_t> mute_registers;       // reads and writes are never answered
+  std::set<std::uint64_t> forgetful_registers;  // writes are accepted but not kept
+  bool bad_rom = false;                         // a bit of the ROM is wrong, so that its unit directory is not found
+  bool busy = false;                            // another driver has claimed the interface
+  bool no_bandwidth = false;                    // the bus accepts no transfer of frames
 };
 
 class SimulatedCamera {
@@ -60,32 +60,32 @@ class SimulatedCamera {
   Answer read(std::uint64_t address, std::uint32_t& quadlet);
   Answer write(std::uint64_t address, std::uint32_t quadlet);
 
-  // As Answer::kDone only; throws std::out_of_range otherwise. For tests.
+  // Reads a register of which the answer is kDone; else throws std::out_of_range. For tests.
   std::uint32_t command_register(std::uint32_t offset);
 
-  // Changes what is wrong with it.
+  // Changes the faults.
   void fail(const std::function<void(CameraFaults&)>& change);
   CameraFaults faults() const;
 
   // An edge at its trigger input.
   void trigger();
-  // Power goes and comes: as new, but for its faults.
+  // Switches power off and on: everything is reset except the faults.
   void restart();
 
   struct Frame {
     std::uint64_t number = 0;         // from 0, since restart()
     std::vector<std::uint8_t> bytes;  // as sent, padding included
-    bool ends = true;                 // a receiver that awaits more is told of its end
+    bool ends = true;                 // the receiver is told where the frame ends
     bool stalls = false;              // nothing is sent: the endpoint is halted
     Clock::time_point start, end;     // on the bus
   };
-  // When the next frame is due, if one is; take_frame() then makes it.
+  // When the next frame is due, nullopt if none is. From then on take_frame() returns it.
   std::optional<Clock::time_point> next_start() const;
   std::optional<Frame> take_frame(Clock::time_point now);
-  // Called, without a lock, when next_start() may have changed.
+  // `call` is called without a lock held whenever next_start() may have changed.
   void on_change(std::function<void()> call);
 
-  // 128 s of seconds, cycles of 125 us and their 3072 parts, as IEEE 1394 counts.
+  // The cycle time register of IEEE 1394: seconds modulo 128, cycles of 125 us, and 3072 parts of a cycle.
   std::uint32_t cycle_time(Clock::time_point at) const;
 
  private:

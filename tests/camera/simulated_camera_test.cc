@@ -66,7 +66,7 @@ std::uint32_t rom_crc(const std::vector<std::uint32_t>& quadlets) {  // as IEEE 
   return crc & 0xffff;
 }
 
-TEST_F(SimulatedCameraTest, ItsRomIsWholeUnlessToldOtherwise) {
+TEST_F(SimulatedCameraTest, ItsRomIsValidUnlessAFaultIsSet) {
   const auto whole = [&] {
     std::vector<std::uint32_t> rom;
     std::uint32_t quadlet = 0;
@@ -185,7 +185,7 @@ TEST_F(SimulatedCameraTest, ATriggerIsWaitedFor) {
   EXPECT_EQ(state, write(reg::kFeature + kTrigger, control::kOn | 3u << control::kSourceShift));  // no such source
 }
 
-TEST_F(SimulatedCameraTest, WithoutPowerOrAfterItIsInitialisedNothingComes) {
+TEST_F(SimulatedCameraTest, SendsNothingWithoutPowerOrAfterInitialisation) {
   select_stereo();
   write(reg::kIsoEnable, iidc::kOn);
   write(reg::kCameraPower, 0);
@@ -221,7 +221,7 @@ TEST(SimulatedCamera, ItsClockDrifts) {
   EXPECT_NEAR(100.01, passed, 1e-6);
 }
 
-TEST_F(SimulatedCameraTest, FailsAsAsked) {
+TEST_F(SimulatedCameraTest, HasTheFaultsThatAreSet) {
   select_stereo();
   write(reg::kIsoEnable, iidc::kOn);
   const auto content = [](const SimulatedCamera::Frame& frame) { return std::span(frame.bytes).first(640 * 480 * 2); };

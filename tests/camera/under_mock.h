@@ -1,12 +1,12 @@
-// Programs whose devices are those of a UsbTestbed: umockdev's library must be loaded before any other.
+// Runs programs with the devices of a UsbTestbed, for which umockdev's library must be loaded before any other.
 #pragma once
 
 namespace relmap::testing {
 
-// First thing in main(): starts this program anew with the library, unless it is there. What it starts inherits it.
+// To be called first in main(): restarts this program with the library unless it is loaded. Child processes inherit it.
 void start_under_mock(char** arguments);
 
-// AddressSanitizer or ThreadSanitizer: several times slower.
+// Whether AddressSanitizer or ThreadSanitizer is active, which makes programs several times slower.
 bool built_with_sanitizer();
 
 }  // namespace relmap::testing

@@ -1,5 +1,5 @@
-// A camera at a USB port: its frames go into the transfers that wait for them, in real time. No bus and no driver here;
-// statuses are negative errno, as Linux's usbfs has them.
+// A simulated camera at a USB port: its frames are written to pending transfers in real time. Statuses are negative
+// errno values, as in Linux's usbfs.
 #pragma once
 
 #include <condition_variable>
@@ -18,10 +18,10 @@
 namespace relmap::testing {
 
 struct UsbCounters {
-  std::uint64_t frames = 0;     // that the camera had to send, but for those of a silence
-  std::uint64_t delivered = 0;  // of them: all their bytes went into transfers
-  std::uint64_t lost = 0;       // of them: no transfer waited, or the endpoint was halted
-  std::uint64_t cut = 0;        // of them: transfers were lacking in the middle, or the camera was unplugged
+  std::uint64_t frames = 0;     // frames that were due, except those of a silence
+  std::uint64_t delivered = 0;  // of these, all bytes were written to transfers
+  std::uint64_t lost = 0;       // of these, no transfer was pending, or the endpoint was halted
+  std::uint64_t cut = 0;        // of these, transfers ran out in the middle, or the camera was unplugged
   std::uint64_t bulk_transfers = 0, control_transfers = 0, discarded = 0;
   std::size_t max_waiting = 0;  // bulk transfers at once
 };
@@ -47,7 +47,7 @@ struct UsbTransfer {
   void copy_to(std::uint8_t* buffer) const;
 };
 
-// A file that poll() calls writable while something is done: a pipe that is full or empty.
+// A file that poll() reports as writable while set(true): a pipe that is full or empty.
 class ReadyFile {
  public:
   explicit ReadyFile(std::string path);
@@ -69,7 +69,7 @@ class UsbPort {
   UsbPort(std::shared_ptr<SimulatedCamera> camera, const std::string& device_file);
   ~UsbPort();
 
-  // 0, or what the system call answers.
+  // These return 0 or a negative errno, like the system calls.
   int claim(UsbClient client);
   int release(UsbClient client);
   int set_configuration();
@@ -78,14 +78,14 @@ class UsbPort {
   int submit_bulk(UsbTransfer transfer);
   int submit_control(UsbTransfer transfer, const std::uint8_t setup[8], const std::uint8_t* data);
   int discard(UsbClient client, std::uint64_t id);
-  // One that is done; -EAGAIN: none, -ENODEV: and never will be.
+  // Returns a finished transfer. -EAGAIN if there is none; -ENODEV if there will never be one.
   int reap(UsbClient client, UsbTransfer& transfer);
   void closed_by(UsbClient client);
 
-  // All that waits ends, with what has come of it.
+  // Unplugs the camera: all pending transfers end with the bytes that they have.
   void unplug();
   bool plugged() const;
-  // Until the middle of a frame under way; false: none began within `patience`.
+  // Waits until the middle of a frame; false if no frame begins within `patience`.
   bool wait_for_mid_frame(std::chrono::milliseconds patience);
   UsbCounters counters() const;
 

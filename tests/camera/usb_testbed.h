@@ -1,5 +1,5 @@
-// A USB bus of simulated cameras that unmodified drivers find and open: in this process, started under_mock.h, and in
-// those that it starts. At most one at a time.
+// A USB bus of simulated cameras that unmodified drivers find and open, in this process (restarted by under_mock.h) and
+// its child processes. At most one testbed at a time.
 #pragma once
 
 #include <chrono>
@@ -13,10 +13,10 @@
 namespace relmap::testing {
 
 struct UsbTestbedOptions {
-  bool split_transfers = false;  // an old host: drivers split what is longer than 16 KiB
+  bool split_transfers = false;  // simulates an old host, where drivers split transfers longer than 16 KiB
 };
 
-// Every driver must have closed its devices before it goes.
+// Every driver must have closed its devices before the testbed is destroyed.
 class UsbTestbed {
  public:
   explicit UsbTestbed(UsbTestbedOptions options = {});
@@ -25,14 +25,14 @@ class UsbTestbed {
   UsbTestbed& operator=(const UsbTestbed&) = delete;
 
   enum class Access { kAll, kNobody };
-  // A camera that is plugged in again has the next device number. It starts as new.
+  // Plugs a camera in, with power switched on anew. A camera that is plugged in again gets the next device number.
   void plug(const std::shared_ptr<SimulatedCamera>& camera, Access access = Access::kAll);
   void unplug(const std::shared_ptr<SimulatedCamera>& camera);
-  // When half of a frame has gone over the bus; false: none came, and it is still there.
+  // Unplugs the camera when half of a frame is sent. False if no frame came; the camera is then still plugged in.
   bool unplug_in_mid_frame(const std::shared_ptr<SimulatedCamera>& camera,
                            std::chrono::milliseconds patience = std::chrono::seconds(2));
 
-  // Since it was plugged in, or until it was unplugged last.
+  // The counters since the camera was plugged in last.
   UsbCounters counters(const std::shared_ptr<SimulatedCamera>& camera) const;
 
   // UMOCKDEV_DIR, which is set in this process's environment.

@@ -1,4 +1,4 @@
-// The simulated camera under drivers that know nothing of it: libusb itself, and libdc1394.
+// The simulated camera under unmodified drivers: libusb itself, and libdc1394.
 #include "tests/camera/usb_testbed.h"
 
 #include <gtest/gtest.h>
@@ -337,7 +337,7 @@ TEST_F(UsbTestbedTest, AFrameForWhichNoTransferWaitsIsLostAndCounted) {
   EXPECT_EQ(counters.frames, counters.delivered + counters.lost + counters.cut);
 }
 
-TEST_F(UsbTestbedTest, WhatWaitsEndsWhenTheCameraIsUnpluggedInMidFrame) {
+TEST_F(UsbTestbedTest, PendingTransfersEndWhenTheCameraIsUnpluggedInMidFrame) {
   open();
   Stream stream(usb, frame_bytes, kContent, 4);
   start_sending();
@@ -362,7 +362,7 @@ TEST_F(UsbTestbedTest, WhatWaitsEndsWhenTheCameraIsUnpluggedInMidFrame) {
   EXPECT_EQ(LIBUSB_ERROR_NO_DEVICE, Stream(usb, frame_bytes, kContent, 1).refused);
 }
 
-TEST_F(UsbTestbedTest, ComingAndGoingIsTold) {
+TEST_F(UsbTestbedTest, PluggingAndUnpluggingIsReported) {
   struct Seen {
     std::vector<int> arrived, left;
   } seen;
@@ -458,7 +458,7 @@ TEST_F(UsbTestbedTest, FramesAreShortLongTornAndShiftedAsAsked) {
   EXPECT_TRUE(stream.came.back().number);
 }
 
-TEST_F(UsbTestbedTest, ASilenceIsOneOfFramesAlone) {
+TEST_F(UsbTestbedTest, ASilenceSkipsTheFramesOfItsTime) {
   open();
   Stream stream(usb, frame_bytes, kContent, 16);
   start_sending();
@@ -470,7 +470,7 @@ TEST_F(UsbTestbedTest, ASilenceIsOneOfFramesAlone) {
   EXPECT_GE(*stream.came.back().number + 1, stream.came.size() + static_cast<std::size_t>(0.4 * kRate) - 1);
 }
 
-TEST_F(UsbTestbedTest, RefusesWhoComesTooLate) {
+TEST_F(UsbTestbedTest, RefusesABusyInterfaceAndABusyBus) {
   open();
   camera->fail([](CameraFaults& faults) { faults.no_bandwidth = true; });
   EXPECT_LT(Stream(usb, frame_bytes, kContent, 1).refused, 0);
@@ -509,7 +509,7 @@ TEST_F(UsbTestbedTest, TwoCamerasSendSideBySide) {
 }
 
 // A driver in a process of its own, that is killed while frames come.
-TEST(UsbTestbedProcesses, OneThatIsKilledLeavesTheCameraToOthers) {
+TEST(UsbTestbedProcesses, AKilledProcessReleasesTheCamera) {
   constexpr const char* kRole = "RELMAP_TEST_DRIVER";
   constexpr std::size_t kFrame = kContent + 464;
   if (std::getenv(kRole)) {  // the bus is that of the process above

@@ -10,11 +10,11 @@ namespace relmap::testing {
 
 class BenchFigures {
  public:
-  // Runs a subcommand to its end, and prints what it found. Throws.
+  // Runs a subcommand of relmap-bench to its end, and prints its output. Throws if it fails.
   explicit BenchFigures(const std::vector<std::string>& arguments,
                         std::chrono::milliseconds patience = std::chrono::seconds(50));
 
-  // Throw where there is no such figure. null is NaN, which satisfies no comparison.
+  // Throw if there is no such figure. null becomes NaN, which satisfies no comparison.
   double operator[](const std::string& key) const;
   std::vector<double> series(const std::string& key) const;
 

@@ -1,4 +1,4 @@
-// Tests on real recordings. They run when RELMAP_DATA names the folder of data sets; then each set must be there.
+// Base of tests on real recordings. They run if RELMAP_DATA names the folder of data sets; a missing set is a failure.
 #pragma once
 
 #include <gtest/gtest.h>

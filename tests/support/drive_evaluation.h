@@ -1,4 +1,4 @@
-// How good is the map of a drive of which the truth is known? The figures of docs/method.md, 5.
+// Evaluates the map of a drive with known truth: the figures of docs/method.md, 5.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace relmap::testing {
 
-// Truth of a recording in KITTI's layout: a pose for each picture, of the left camera in the first one's coordinates.
+// Truth of a recording in KITTI's layout: for each picture the pose of the left camera, in the frame of the first one.
 struct DriveTruth {
   std::vector<SE3> poses;
   std::vector<std::int64_t> time_us;  // since the first picture, ascending
 };
-// FOLDER/poses.txt (or poses_gt.txt) and FOLDER/times.txt (without it: 10 Hz). NO_SUCH_FILE, CORRUPT.
+// Reads FOLDER/poses.txt (or poses_gt.txt) and FOLDER/times.txt (if absent: 10 Hz). NO_SUCH_FILE, CORRUPT.
 Result<DriveTruth> read_truth(const std::string& folder);
-// The pose of the picture taken then, to 2 ms.
+// The pose of the picture taken within 2 ms of `since_start` (microseconds); nullopt if there is none.
 std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start);
 
-// Of a closure this far from the truth: more than 0.5 m or 10 degrees.
+// Whether a closure with this error is wrong: more than 0.5 m or 10 degrees.
 bool is_wrong(const SE3& error);
 
 struct DriveEvaluation {
@@ -31,15 +31,15 @@ struct DriveEvaluation {
   std::uint32_t closures_right = 0;  // accepted
   std::uint32_t closures_wrong = 0;  // accepted, more than 0.5 m or 10 degrees off
   std::uint32_t loop_edges = 0;      // accepted closures that carry an edge
-  std::uint32_t revisits = 0;        // keyframes that come back to where an earlier one was
-  std::uint32_t revisits_bound = 0;  // of them, with >= 20 observations of landmarks based before
+  std::uint32_t revisits = 0;        // keyframes that return to the place of an earlier one
+  std::uint32_t revisits_bound = 0;  // those with >= 20 observations of landmarks based in earlier frames
   double registration_error_m = 0;
   double revisit_error_m = 0;  // mean distance between the map's and the true relative position
   double revisit_error_max_m = 0;
   std::uint32_t revisits_disconnected = 0;
 };
 
-// Of one session of the map. Its keyframes find their truth by the time since the first of them.
+// Evaluates one session of the map. Truth is assigned to keyframes by the time since the first keyframe.
 DriveEvaluation evaluate_drive(const storage::Graph& graph, SessionNumber session, const DriveTruth& truth);
 
 }  // namespace relmap::testing

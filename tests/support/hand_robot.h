@@ -1,4 +1,5 @@
-// A robot whose messages are made by hand, right or wrong: parts and gaps over LCM, and what the daemon says of them.
+// A robot whose messages are made by hand, valid or not. It sends parts and gaps over LCM, and hears the daemon's
+// acknowledgements.
 #pragma once
 
 #include <chrono>
@@ -19,24 +20,24 @@ class HandRobot {
   // Throws StatusError if LCM does not start.
   HandRobot(const std::string& lcm_url, const SessionUuid& session);
 
-  // Once; LCM may lose it.
+  // Sends a message once; LCM may lose it.
   void say(const KeyframePart& part);
   void say(const Gap& gap);
   void say_bytes(const char* channel, const Bytes& message);
-  // All its parts, but for `left_out`.
+  // Sends all parts of a payload except `left_out`.
   void say_payload(std::uint32_t sequence, const Bytes& payload, std::optional<std::uint32_t> left_out = {});
 
-  // The last acknowledgement of this session that came.
+  // The newest acknowledgement of this session.
   std::optional<Acknowledgement> acknowledgement() const;
 
-  // Does `what` again and again until an acknowledgement satisfies `done`. False after 20 s.
+  // Repeats `what` until an acknowledgement satisfies `done`; false after 20 s.
   bool until(const std::function<void()>& what, const std::function<bool(const Acknowledgement&)>& done);
-  // Says it until it is settled.
+  // Sends a payload until it is settled.
   bool settle(std::uint32_t sequence, const Bytes& payload);
-  // The reason for which the newest acknowledgement calls it refused.
+  // The reason for which the newest acknowledgement says that the sequence was refused.
   Reason refusal(std::uint32_t sequence) const;
 
-  // The index-th of its parts.
+  // The part `index` of a payload.
   KeyframePart part(std::uint32_t sequence, const Bytes& payload, std::uint32_t index) const;
 
  private:

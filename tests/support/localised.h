@@ -16,7 +16,7 @@ struct Where {
   FrameId frame;
   Vector3 t = Vector3::Zero();
 };
-// Fails the test where it is no answer.
+// Parses an answer; fails the test if there is none.
 inline Where where(const Finished& answer) {
   Where found;
   EXPECT_EQ(answer.exit_code, 0) << answer.standard_error;

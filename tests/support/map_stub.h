@@ -1,4 +1,4 @@
-// The Map service as it stands on the wire, for questions that the client library does not put.
+// The generated stub of the Map service, for requests that the client library cannot make.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -26,11 +26,11 @@ class MapStub {
   }
 
   Result<v1::GetStatusReply> status() { return ask(&v1::Map::Stub::GetStatus, v1::GetStatusRequest()); }
-  // All messages as one; the tokens left out.
+  // All messages of the reply merged into one, without tokens.
   Result<v1::FindRouteReply> find_route(const v1::FindRouteRequest& request);
 
  private:
-  // A small budget has room for few answers at a time, also for those that gRPC has not let go of yet.
+  // Retries: a small memory budget has room for few replies at a time, including those that gRPC has not freed yet.
   template <typename Reply, typename Call>
   static Result<Reply> patiently(Call call) {
     for (int patience = 100;; --patience) {

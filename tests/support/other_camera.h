@@ -1,4 +1,4 @@
-// Pictures of a simulated camera, as another one would have taken them.
+// Converts pictures of a simulated camera to those that another camera would have taken.
 #pragma once
 
 #include <opencv2/calib3d.hpp>
@@ -19,7 +19,7 @@ inline cv::Mat turn(const cv::Vec3d& degrees) {
   return R;
 }
 
-// With that lens (k1, k2, p1, p2, k3 of OpenCV), mounted a little askew.
+// The picture through a lens with this distortion (k1, k2, p1, p2, k3 of OpenCV), rotated by `degrees` about each axis.
 inline cv::Mat through_lens(const cv::Mat& picture, const StereoCamera& camera, const std::vector<double>& distortion,
                             const cv::Vec3d& degrees = {}) {
   std::vector<cv::Point2f> pixels, sources;

@@ -1,4 +1,4 @@
-// What a disk has to stand in every test of power failures.
+// The checks of every test of power failures.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@ namespace relmap::testing {
 
 inline constexpr int kFailures = 25;  // a run
 
-// `Disk` is a FailingDisk, made of a seed and whether it syncs; one for each of so many seeds.
+// Runs with power failures for `runs` seeds. `Disk` is a FailingDisk, constructed from a seed and whether it syncs.
 template <typename Disk>
 void fail_often(std::uint64_t first_seed, int runs) {
   for (std::uint64_t seed = first_seed; runs-- > 0; ++seed) {

@@ -1,5 +1,5 @@
-// A robot's keyframes through intake, journal and worker into a map on a disk that forgets what was not synced, while
-// the power fails again and again.
+// Sends a robot's keyframes through intake, journal and worker into a map on a disk that forgets what was not synced,
+// with repeated power failures.
 #pragma once
 
 #include <cstdint>
@@ -17,24 +17,24 @@ class FailingDisk {
   virtual Result<std::shared_ptr<storage::Engine>> open() = 0;
   virtual void fail_power_after(std::uint64_t operations) = 0;
   virtual bool has_power() const = 0;
-  // The last journal record, of those from `first` on, that no failure of the power could take now.
+  // The last journal record, of those from `first` on, that a power failure can no longer take away.
   virtual std::uint64_t certain_through(std::uint64_t first) const = 0;
-  // Once nothing holds the engine.
+  // To be called after the engine is destroyed.
   virtual void restart() = 0;
 };
 
 struct PowerFailureRun {
-  std::string wrong;  // what first broke the promises; empty: nothing
+  std::string wrong;  // the first broken promise; empty if there is none
   std::uint32_t keyframes = 0;
-  std::uint64_t acknowledged_at_failures = 0;  // keyframes that were acknowledged when the power failed, all together
+  std::uint64_t acknowledged_at_failures = 0;  // acknowledged keyframes at each power failure, summed
   std::uint64_t commits = 0;
   std::uint64_t closures_accepted = 0;
 };
 
-// The power fails `failures` times at random, then everything comes in. Before each acknowledgement leaves, the sync
-// that covers it must have returned (unless `watch` is off). After each failure the map on disk must verify clean, and
-// every acknowledged keyframe must be there, as it was sent; at the end every keyframe once; and the journal, applied
-// to an empty map, must give the very same map.
+// The power fails `failures` times at random; then the remaining keyframes are sent. Checks that
+//   - the sync that covers an acknowledgement has returned before it is sent (unless `watch` is false);
+//   - after each failure the map on disk verifies, and has every acknowledged keyframe as it was sent;
+//   - at the end every keyframe is in the map once, and the journal, applied to an empty map, gives the same map.
 PowerFailureRun run_with_power_failures(FailingDisk& disk, int failures, std::uint64_t seed, bool watch = true);
 
 }  // namespace relmap::testing

@@ -1,4 +1,4 @@
-// Programs of the build, run as a user would: started with arguments, waited for, ended. What cannot be started throws.
+// Runs programs of the build as a user would. Throws if a program cannot be started.
 #pragma once
 
 #include <sys/types.h>
@@ -12,18 +12,18 @@
 
 namespace relmap::testing {
 
-// A program in the folder of those built beside this test.
+// The path of a program of this build.
 std::string built_program(const std::string& name);
 
 struct ProcessOptions {
   std::string standard_output, standard_error;  // files, appended to; empty: /dev/null
-  // A network namespace of its own with nothing but loopback, with or without a route for multicast.
+  // Runs in a network namespace of its own that has only loopback, with or without a route for multicast.
   std::optional<Multicast> own_network = {};
-  // A terminal's descriptor: standard input and standard error are it. -1: standard input is the test's own.
+  // Descriptor of a terminal that becomes standard input and standard error; -1: standard input is that of the test.
   int terminal = -1;
 };
 
-// Ends with the test, however that ends.
+// The process is killed when the test ends, even if the test crashes.
 class Process {
  public:
   Process(const std::vector<std::string>& arguments, const ProcessOptions& options);
@@ -34,11 +34,11 @@ class Process {
   pid_t pid() const { return pid_; }
   bool running();
   void signal(int number);
-  // kill -9, and gone on return.
+  // kill -9; the process has ended on return.
   void kill();
   // The exit code, 128 + n after signal n; nullopt if it is still running after `patience`.
   std::optional<int> wait(std::chrono::milliseconds patience);
-  // VmHWM: the most memory that was ever resident, bytes.
+  // VmHWM: the peak of resident memory, bytes.
   std::size_t peak_resident_bytes() const;
 
  private:
@@ -50,7 +50,7 @@ struct Finished {
   int exit_code = -1;
   std::string standard_output, standard_error;
 };
-// Runs it to its end; throws if it takes longer than `patience`.
+// Runs a program to its end; throws if it takes longer than `patience`.
 Finished run_program(const std::vector<std::string>& arguments,
                      std::chrono::milliseconds patience = std::chrono::seconds(50));
 

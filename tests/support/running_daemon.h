@@ -1,4 +1,4 @@
-// relmapd as a process of its own, on a free port, with the ways to talk to it.
+// relmapd as a process of its own, on a free port, with clients for it.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@
 
 namespace relmap::testing {
 
-// A group and port that no other test uses, within this machine.
+// A multicast group and port that no other test uses, within this machine.
 std::string random_lcm_url();
 
 struct DaemonOptions {
@@ -23,19 +23,19 @@ struct DaemonOptions {
   std::optional<Multicast> own_network = {};  // see ProcessOptions
 };
 
-// Throws if the daemon does not serve within `patience`, with its log; none: it is not waited for.
+// Throws with the daemon's log if it does not serve within `patience`; 0: does not wait.
 class RunningDaemon {
  public:
   explicit RunningDaemon(const DaemonOptions& options, std::chrono::milliseconds patience = std::chrono::seconds(30));
 
   Process& process() { return *process_; }
-  // DIR/endpoint names this process.
+  // Whether DIR/endpoint names this process.
   bool serving() const;
   std::string address() const;
   std::unique_ptr<client::Client> client() const;
   std::string log() const;
 
-  // SIGTERM; the exit code, -1 if it does not stop.
+  // Sends SIGTERM; returns the exit code, or -1 if the daemon does not stop.
   int stop();
 
  private:

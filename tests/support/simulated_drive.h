@@ -1,5 +1,5 @@
-// A points world driven into a map over the memory engine, keyframe by keyframe, as the worker would: for tests and
-// benchmarks. Places are not recognised here; revisits are proposed as closures from what is known of the world.
+// Adds the keyframes of a points world to a map over the memory engine, one by one, as the worker would; for tests and
+// benchmarks. Places are not recognised: revisits are proposed as closures from the known world.
 #pragma once
 
 #include <memory>
@@ -13,19 +13,20 @@
 
 namespace relmap::testing {
 
-// What a keyframe cost.
+// The cost of a keyframe.
 struct DriveStep {
-  double relax_seconds = 0;  // of its relaxations, that at a closure included
-  double apply_seconds = 0;  // of all that the map did with it: frame, closure, support, relaxations
-  bool closure = false;      // a closure came into force
-  bool loop_edge = false;    // and became an edge of the graph
+  double relax_seconds = 0;  // for its relaxations, including that of a closure
+  double apply_seconds = 0;  // for everything: frame, closure, support, relaxations
+  bool closure = false;      // whether a closure came into force
+  bool loop_edge = false;    // whether the closure became an edge of the graph
   std::uint32_t active_frames = 0;
   std::uint32_t solves = 0, iterations = 0, failures = 0;
   std::uint64_t work = 0;  // linearised observations
 };
 
-// What a place recogniser would propose between frames i and `match` of the world, which stand in the map as these, the
-// newer first, with one observation for each of the world's landmarks; nullopt: too few points in common.
+// The closure that a place recogniser would propose between the frames i and `match` of the world, which are `query`
+// and `match_frame` in the map, the newer first, with one observation for each common landmark of the world. nullopt if
+// they have too few points in common.
 std::optional<storage::ClosureProposalRecord> simulated_closure(const storage::Map& map, const sim::PointsWorld& world,
                                                                 std::uint32_t i, FrameId query, std::uint32_t match,
                                                                 FrameId match_frame);
@@ -38,7 +39,7 @@ struct DriveClosures {
 class SimulatedDrive {
  public:
   SimulatedDrive(sim::PointsWorldOptions world, rba::RbaOptions rba, DriveClosures closures = {});
-  // Into an empty map.
+  // Drives into `map`, which must be empty.
   SimulatedDrive(sim::PointsWorldOptions world, rba::RbaOptions rba, DriveClosures closures,
                  std::unique_ptr<storage::Map> map);
 
@@ -63,8 +64,8 @@ class SimulatedDrive {
  private:
   static constexpr SessionNumber kSession = 1;
   void apply(const storage::JournalRecord& record);  // as part of the last step
-  // Of frame i, recognised in an earlier lap (for each stretch another), with the oldest view of the place that
-  // has enough points in common with it.
+  // Proposes a closure of frame i with an earlier lap (a different one for each stretch): with the oldest view of the
+  // place that has enough points in common.
   void propose_closure(std::uint32_t i);
 
   sim::PointsWorld world_;

@@ -1,4 +1,4 @@
-// Robots that drive the same circuit of one world, each in its own way, from its own start and in another light.
+// Robots that drive the same circuit of one world, each with its own start, drive seed and light.
 #pragma once
 
 #include <array>
@@ -14,14 +14,14 @@ namespace relmap::testing {
 inline constexpr std::array<const char*, 5> kFleetLights{"clear", "morning", "evening", "overcast", "dusk"};
 inline constexpr int kFleetPairsALap = 100;
 
-// One and a quarter laps, as of 10 pairs a second; the folder of the recording, which is made in `folder`.
+// Records one and a quarter laps of a robot, 10 pairs a second, in `folder`; returns the folder of the recording.
 std::string record_fleet_robot(const std::string& folder, std::size_t robot);
 
-// Poses in the world that the robots share.
+// The truth of a recording in the frame of the world that the robots share.
 DriveTruth read_fleet_truth(const std::string& recording);
 
 struct FleetClosures {
-  std::size_t accepted = 0, wrong = 0, between_robots = 0;  // wrong and between_robots: of those accepted
+  std::size_t accepted = 0, wrong = 0, between_robots = 0;  // `wrong` and `between_robots` are accepted ones
   std::size_t not_accepted = 0;
   void print() const;
 };

@@ -10,7 +10,7 @@
 
 namespace relmap::testing {
 
-// Made in `folder`, with arguments of `relmap-sim pictures`. Throws if that fails; returns the folder.
+// Makes a recording in `folder` with arguments of `relmap-sim pictures`, and returns the folder. Throws if that fails.
 inline std::string record_simulation(const std::string& folder, const std::vector<std::string>& arguments) {
   std::vector<std::string> command{built_program("relmap-sim"), "pictures", "--out", folder};
   command.insert(command.end(), arguments.begin(), arguments.end());
@@ -19,7 +19,7 @@ inline std::string record_simulation(const std::string& folder, const std::vecto
   return folder;
 }
 
-// The name of both eyes' pictures of that pair, below 1,000,000, in image_0 and image_1.
+// The file name of a pair's pictures in image_0 and image_1; `pair` < 1,000,000.
 inline std::string picture_name(int pair) {
   const std::string number = std::to_string(pair);
   return std::string(6 - number.size(), '0') + number + ".png";

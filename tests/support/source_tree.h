@@ -15,7 +15,8 @@ namespace relmap::testing {
 
 inline const std::filesystem::path kSourceTree = RELMAP_SOURCE_DIR;
 
-// Every file below the named folders of the source tree that ends so, as a path relative to it.
+// All files below the named folders of the source tree that have one of these extensions, as paths relative to the
+// tree.
 inline std::vector<std::string> files_in(std::initializer_list<const char*> folders,
                                          std::initializer_list<const char*> endings) {
   std::vector<std::string> files;

@@ -1,5 +1,4 @@
-// A recording in KITTI's layout, streamed by relmap-frontend over LCM to relmapd, and what can be asked of the map
-// then.
+// A recording in KITTI's layout that relmap-frontend has streamed over LCM to relmapd, with access to the map.
 #pragma once
 
 #include <memory>
@@ -16,22 +15,22 @@ namespace relmap::testing {
 
 class StreamedDrive {
  public:
-  // Streams all of it, as fast as it goes or at so many pairs a second, and waits until the map is done with it. Throws
-  // if anything fails on the way, or the front-end does not end with `exit_code`.
+  // Streams the recording, as fast as possible or at `rate_hz` pairs a second, and waits until the map is idle. Throws
+  // if anything fails, or if the front-end does not end with `exit_code`.
   explicit StreamedDrive(const std::string& recording, double rate_hz = 0, int exit_code = 0);
 
-  // Of the front-end's summary.
+  // A number of the front-end's summary.
   double summary(const std::string& key) const;
   const std::string& summary_json() const { return summary_; }
   client::Client& client() { return *client_; }
   const client::Session& session() const { return session_; }
   const DriveTruth& truth() const { return truth_; }
 
-  // A stereo pair of the recording as a question.
+  // A stereo pair of the recording as a query.
   client::View view(std::size_t pair) const;
-  // The pose of a pair in the coordinates of a frame of the map, in truth.
+  // The true pose of a pair in the coordinates of a frame of the map.
   SE3 true_T_frame_pair(FrameId frame, std::size_t pair) const;
-  // The keyframe that was taken last; the one nearest in time to a pair.
+  // The last keyframe; the keyframe nearest in time to a pair.
   FrameId last() const { return {session_.number, session_.last}; }
   FrameId frame_near(std::size_t pair) const;
   // The pair that became a keyframe.
@@ -39,9 +38,10 @@ class StreamedDrive {
   // Metres along the recording between two pairs.
   double metres_between(std::size_t first, std::size_t second) const;
 
-  // Stops the daemon; then the map is there to be read.
+  // Stops the daemon, and opens its map.
   storage::Map& stop();
-  // Of the session's keyframes: the front-end's own odometry, and the map's chain from the first keyframe.
+  // Poses of the session's keyframes beside the truth: by the front-end's odometry, and by chaining the map's edges
+  // from the first keyframe.
   std::vector<tracking::PosePair> odometry_chain() const;
   std::vector<tracking::PosePair> map_chain() const;
 

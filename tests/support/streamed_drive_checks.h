@@ -1,4 +1,4 @@
-// What holds for every streamed drive whose map is as it should be; gtest expectations.
+// gtest expectations for the map of a streamed drive.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 namespace relmap::testing {
 
 void expect_every_pair_processed(const StreamedDrive& drive, double pairs);
-// Of the front-end's odometry and of the map's chain; the daemon has stopped.
+// Checks the drift of the front-end's odometry and of the map's chain. The daemon must have stopped.
 void expect_drift_below(const StreamedDrive& drive, double limit, const std::vector<double>& lengths,
                         std::size_t segments);
-// Pairs are found where they were taken, within `metres`.
+// The pairs are localised within `metres` of the truth.
 void expect_localised(StreamedDrive& drive, const std::vector<std::size_t>& pairs, double metres);
-// Likewise one picture of each, of a camera that nobody names: its focal length is found as well.
+// The same for one picture of each pair without a calibration: the focal length is estimated as well.
 void expect_localised_by_a_photograph(StreamedDrive& drive, const std::vector<std::size_t>& pairs, double metres);
-// From the place of a picture to a label on frame `to`, by distance and by time: about `metres`.
+// The routes from the place of a pair to a label on frame `to`, by distance and by time, are about `metres` long.
 void expect_routed(StreamedDrive& drive, std::size_t from, FrameId to, double metres);
 
 }  // namespace relmap::testing

@@ -14,24 +14,23 @@ namespace relmap::testing {
 
 class StreamedSessions {
  public:
-  // `more`: arguments of relmapd. The sessions' identities are numbers from `first` on: they seed what the daemon
-  // draws.
+  // `more`: arguments of relmapd. The uuids of the sessions are numbers from `first` on, since uuids seed the daemon's
+  // random choices.
   explicit StreamedSessions(const std::vector<std::string>& more = {}, int first = 1);
 
-  // All of it, until the map is done with it; the front-end's summary. Throws if anything fails on the
-  // way. `more`: arguments of relmap-frontend; `exit_code`: what it is to end with.
+  // Streams a recording, waits until the map is idle, and returns the front-end's summary. Throws if anything fails.
+  // `more`: arguments of relmap-frontend; `exit_code`: the expected one.
   std::string stream(const std::string& source, const std::string& recording, const std::string& robot,
                      const std::vector<std::string>& more = {}, int exit_code = 0);
-  // All at once; recordings and robots.
+  // Streams several recordings at the same time: pairs of recording and robot.
   void stream_together(const std::string& source,
                        const std::vector<std::pair<std::string, std::string>>& recordings_and_robots);
   client::Client& client() { return *client_; }
   // For `relmap --server`.
   std::string server() const { return folder_ / "map"; }
-  // Stops the daemon; then the map is there to be read. Throws if it doubts the calibration of a session that no test
-  // has spoilt.
+  // Stops the daemon, and opens its map. Throws if the daemon doubts a calibration, unless expect_doubts() was called.
   storage::Map& stop();
-  // One of them is wrong, and the daemon will say so.
+  // To be called if the test streams a wrong calibration, which the daemon will doubt.
   void expect_doubts() { doubts_expected_ = true; }
 
  private:

@@ -1,4 +1,4 @@
-// Where the frames of several sessions really were in one world, and how far a map's edges are off.
+// True poses of the frames of several sessions in one world, and the errors of a map's edges.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@ struct EdgeError {
 
 class WorldTruth {
  public:
-  // Poses of the camera in the world, by the time since the session's first frame. Throws where a frame has none.
+  // Adds a session, with the poses of its camera in the world by the time since its first frame. Throws if a frame has
+  // no pose.
   void add(const storage::Graph& graph, SessionNumber session, const DriveTruth& truth);
   const SE3& pose(FrameId frame) const { return poses_.at(frame); }
   EdgeError error(const storage::Edge& edge) const;
@@ -28,13 +29,13 @@ class WorldTruth {
   std::unordered_map<FrameId, SE3> poses_;
 };
 
-// Edges of every kind and state that end in a frame of the session, by their ids.
+// The edges of every kind and state with an end in the session, by their ids.
 std::vector<storage::Edge> edges_of(const storage::Graph& graph, SessionNumber session);
 
-// Sessions that edges of the graph join, in one list each.
+// The connected groups of sessions, each as a list.
 std::vector<std::vector<SessionNumber>> joined_sessions(const storage::Graph& graph);
 
-// How many observations of the frame that hold are of landmarks whose bases `is_old` knows.
+// The number of the frame's observations in force whose landmarks have a base for which `is_old` returns true.
 std::uint32_t observations_of_old(const storage::Graph& graph, FrameId frame,
                                   const std::function<bool(FrameId)>& is_old);
 

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What tells the recordings of a command apart.
+// The key of a recording among those of the command.
 std::string key_of(const Sequence& sequence) {
   return sequence.recorded + '\t' + sequence.camera + '\t' + sequence.path;
 }
@@ -23,7 +23,7 @@ std::string path_of(const std::string& folder, const std::string& map, const Rec
                     const std::vector<Sequence>& sequences) {
   std::string command = map + '\n' + options.source + '\n' + options.robot + '\n' + options.calibration + '\n' +
                         (options.mono ? "mono" : "stereo");
-  // What lies at the paths may have changed since: cameras and sessions of logs may have been added.
+  // Only paths are hashed: cameras, or sessions of logs, may have been added since.
   std::string last;
   for (const Sequence& sequence : sequences)
     if (std::exchange(last, sequence.path) != sequence.path) command += "\n\t\t" + sequence.path;
@@ -47,7 +47,7 @@ AgainRecord::Identities AgainRecord::read() const {
   return identities;
 }
 
-// Whole or not at all.
+// Replaces the file atomically.
 Status AgainRecord::write(const Identities& identities) const {
   std::error_code error;
   fs::create_directories(folder_, error);
@@ -57,7 +57,7 @@ Status AgainRecord::write(const Identities& identities) const {
   out.close();
   if (out) fs::rename(draft, path_, error);
   if (!out || error)
-    return {Reason::IO_ERROR, "write " + path_ + ": without it --again could not go on where it is interrupted"};
+    return {Reason::IO_ERROR, "write " + path_ + ": without this file an interrupted --again cannot resume"};
   return {};
 }
 

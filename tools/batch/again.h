@@ -1,5 +1,5 @@
-// The sessions of `ingest --again`, which are new ones each time: kept until all of them are in the map, so that the
-// same command goes on where it was interrupted.
+// The identities of the sessions that `ingest --again` makes, new ones for each command. They are kept on disk until
+// all sessions are in the map, so that the same command resumes where it was interrupted.
 #pragma once
 
 #include <functional>
@@ -14,22 +14,22 @@ namespace relmap::batch {
 
 class AgainRecord {
  public:
-  // `folder`: where such records are kept; made if absent. `map`: which map they go into.
+  // `folder`: where the record is kept; created if absent. `map`: the map that the recordings go into.
   AgainRecord(std::string folder, const std::string& map, const RecordingOptions& options,
               const std::vector<Sequence>& sequences);
 
-  // Gives the sequences the identities that the same command gave them before; where there was none, it was done, or
-  // `outdated` says that the session of that identity does not take this recording in, keeps those that they have.
-  // IO_ERROR.
+  // Gives the sequences the identities that the same, interrupted command gave them before. A sequence keeps its
+  // present identity if there is no former one, or if `outdated` says that the former session cannot take the recording
+  // in any more. IO_ERROR.
   Status take_up(std::vector<Sequence>& sequences,
                  const std::function<bool(const SessionUuid&, const Sequence&)>& outdated) const;
-  // The next time this one is a new session, though others of the command are not done. IO_ERROR.
+  // Forgets one sequence: the same command makes a new session of it, and resumes the others. IO_ERROR.
   Status forget(const Sequence& sequence) const;
-  // All are in the map: the next time they are new ones.
+  // To be called when all are in the map: forgets all of them.
   void done() const;
 
  private:
-  using Identities = std::map<std::string, SessionUuid>;  // by what tells the recordings of a command apart
+  using Identities = std::map<std::string, SessionUuid>;  // by a key for each recording of the command
   Identities read() const;
   Status write(const Identities& identities) const;
 

@@ -16,12 +16,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kShowMs = 100;
-constexpr int kMaxStarts = 2;  // of a recording whose front-end was ended by a signal, or sent it to another map
+constexpr int kMaxStarts = 2;  // of a recording whose front-end a signal ended, or that began in another map
 
-// The daemon serves another map than it did, or has lost what came after a backup: the recording begins anew.
+// The daemon serves another map than before, or a restored one: the recording must be sent from its beginning.
 bool in_another_map(Reason reason) { return reason == Reason::WRONG_MAP || reason == Reason::MAP_RESTORED; }
 
-// By the number of photographs, which is all that is known of a session that an older version took in.
+// The change in the number of photographs, which is all that is known of sessions that an older version made.
 std::string change_of_number(const Sequence& sequence, const Summary& kept) {
   if (sequence.pictures == 0 || kept.json.empty()) return {};
   std::uint64_t taken = kept.pairs;
@@ -31,9 +31,9 @@ std::string change_of_number(const Sequence& sequence, const Summary& kept) {
   return "is made of " + counted_text(taken, "picture") + ", and there are " + count_text(sequence.pictures) + " now";
 }
 
-// As far as can be told without reading the recording again.
+// Whether the session holds the whole recording, as far as can be told without reading it.
 bool holds_all(const client::Session& session, const Sequence& sequence, const Summary& summary) {
-  // Of a log that was split another part may have been there.
+  // The session may be there by another part of a split log.
   if (!sequence.recorded.empty()) return session.next_sequence > sequence.last;
   if (session.state != client::SessionState::kFrozen) return true;
   const std::uint64_t settled = std::uint64_t{session.frames} + session.refused + session.given_up;
@@ -60,7 +60,7 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
     Task& task = tasks_.emplace_back();
     task.sequence = sequence;
     const auto found = by_uuid.find(sequence.uuid.to_string());
-    // One that is being deleted is refused by the daemon, with how to take the recording in again.
+    // The daemon refuses a session that is being deleted, and its message says what to do.
     if (found != by_uuid.end() && found->second->state != client::SessionState::kDeleting) judge(task, *found->second);
     if (!options_.recordings.again && (task.stage == Stage::kFailed || !task.begun_before))
       look_for_other(task, by_uuid);
@@ -74,11 +74,11 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
 void Batch::refuse_changed(Task& task, const client::Session& session, const std::string& change) const {
   task.stage = Stage::kFailed;
   task.failure = {Reason::SEQUENCE_CONFLICT, change + advice(Reason::SEQUENCE_CONFLICT) + "; relmap session delete " +
-                                                 std::to_string(session.number) + " takes out what was made then"};
+                                                 std::to_string(session.number) + " removes the old session"};
 }
 
-// What an --again has taken in stands for the recording, whatever has become of its own session: as it is now it is in
-// the map, and a change is one since then.
+// If --again has made another session of the recording, that session counts in place of its own one: the recording is
+// in the map, or has changed since that session was made.
 void Batch::look_for_other(Task& task, const Known& known) {
   const auto other = store_.other_of(task.sequence.uuid);
   const auto found = other ? known.find(other->to_string()) : known.end();
@@ -113,12 +113,14 @@ void Batch::judge(Task& task, const client::Session& session) {
   } else if (session.state == client::SessionState::kOpen) {
     return;  // it goes on
   } else if (!holds_all(session, sequence, kept)) {
-    if (session.state == client::SessionState::kFrozen)  // what it refuses would be settled for good
-      fail(Reason::SESSION_FROZEN, number + " is frozen, and may not hold all of the recording; thawed, it goes on" +
-                                       advice(Reason::SESSION_FROZEN));
+    if (session.state == client::SessionState::kFrozen)  // keyframes that it refuses would be settled for good
+      fail(Reason::SESSION_FROZEN,
+           number + " is frozen and may not hold the whole recording; after a thaw it can be completed" +
+               advice(Reason::SESSION_FROZEN));
     return;
   } else if (kept.recording && !sequence.unlisted.ok()) {
-    fail(sequence.unlisted.reason(), sequence.unlisted.message() + "; " + number + " is made of what was there before");
+    fail(sequence.unlisted.reason(),
+         sequence.unlisted.message() + "; " + number + " was made of what was there before");
   } else {
     task.stage = Stage::kWasThere;
   }
@@ -129,10 +131,10 @@ void Batch::keep(const Status& status) {
   if (not_kept_.ok()) not_kept_ = status;
 }
 
-// What helps where a session does not take its recording in.
+// How to take a recording in that its session refuses.
 const char* Batch::advice(Reason reason) const {
   if (!options_.recordings.again) return "; --again takes it in as a new session";
-  // The same identity is tried again, unless it has turned out to be useless.
+  // After --again, the same command tries the same identity again, unless that has proved useless.
   return reason == Reason::SESSION_FROZEN ? "" : "; the same command takes it in as another new session";
 }
 
@@ -165,7 +167,7 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
   return command;
 }
 
-// Parts of one session go in one after the other: what comes before must not be taken for lost.
+// Parts of one session are sent in order, since the daemon would take missing earlier keyframes for lost.
 bool Batch::has_turn(const Task& task) const {
   return std::none_of(tasks_.begin(), tasks_.end(), [&](const Task& other) {
     return &other != &task && other.sequence.uuid == task.sequence.uuid &&
@@ -180,7 +182,7 @@ void Batch::start_more() {
   for (std::size_t i = 0; i < tasks_.size() && busy < options_.jobs; ++i) {
     Task& task = tasks_[i];
     if (task.stage != Stage::kWaiting || !has_turn(task)) continue;
-    // What a session was begun with is not known any more where it was not kept then.
+    // Kept now: later it would not be known what the session was begun with.
     if (task.starts++ == 0 && task.sequence.recording && !task.begun_before)
       keep(store_.begin(task.sequence.uuid, *task.sequence.recording));
     task.begun = Clock::now();
@@ -203,7 +205,7 @@ void Batch::finish(std::size_t i) {
   task.summary = front_end.summary();
   task.failure = front_end.status();
   task.took = Clock::now() - task.begun;
-  // A front-end that had sent everything before it was told ends as if all were well.
+  // A front-end that has sent everything before it hears of a refusal ends as if all were well.
   for (const auto& [reason, what] : {std::pair{Reason::SESSION_FROZEN, "the session was frozen"},
                                      {Reason::SESSION_DELETED, "the session was deleted from the map"},
                                      {Reason::SEQUENCE_CONFLICT, "the session has other keyframes already"}}) {
@@ -224,7 +226,7 @@ void Batch::finish(std::size_t i) {
   } else {
     task.stage = Stage::kFailed;
     const Reason reason = task.failure.reason();
-    if (reason == Reason::SESSION_DELETED)  // another name, which the front-end advises, is nothing to be given here
+    if (reason == Reason::SESSION_DELETED)  // the front-end advises another session name, which cannot be given here
       task.failure = {reason, std::string("the session was deleted from the map") + advice(reason)};
     else if (reason == Reason::SESSION_FROZEN || reason == Reason::SEQUENCE_CONFLICT)
       task.failure = {reason, task.failure.message() + advice(reason)};

@@ -1,4 +1,4 @@
-// Runs front-ends over sequences, so many at once, until each is in the map or has failed.
+// Runs a front-end for each sequence, a limited number at a time, until each sequence is in the map or has failed.
 #pragma once
 
 #include <chrono>
@@ -18,12 +18,12 @@ namespace relmap::batch {
 struct BatchOptions {
   RecordingOptions recordings;
   std::string program = front_end_program();
-  std::string server;  // as relmap-frontend takes it
+  std::string server;  // --server of relmap-frontend
   std::size_t jobs = 1;
-  double patience_s = 60;      // of a front-end with a silent daemon
-  bool despite_check = false;  // recordings are taken in though their eyes are plainly wrong
-  std::string summaries;       // folder of what is kept beside the map (SummaryStore); empty: nothing is
-  std::string map;             // which map the recordings go into; empty: not known
+  double patience_s = 60;      // a front-end gives up after so long without progress of the daemon
+  bool despite_check = false;  // take recordings in even if their stereo pair is plainly wrong
+  std::string summaries;       // folder of the SummaryStore; empty: nothing is kept
+  std::string map;             // uuid of the map that the recordings go into; empty: not known
 };
 
 enum class Stage { kWaiting, kRunning, kDone, kWasThere, kFailed };
@@ -37,33 +37,35 @@ struct Task {
   std::chrono::steady_clock::time_point begun;
   std::chrono::steady_clock::duration took{};
   int starts = 0;
-  bool begun_before = false;  // the map has its session
+  bool begun_before = false;  // the map had its session before this run
 
   bool in_map() const { return stage == Stage::kDone || stage == Stage::kWasThere; }
-  // In the map, and not to be trusted.
+  // In the map, but not to be trusted (Summary::trusted).
   bool untrusted() const { return in_map() && !summary.trusted; }
 };
 
-// How the recording differs from what the session that has its identity is made of, with that session's number; empty:
-// it does not, or what the session is made of is not known.
+// How the recording differs from what `session`, which has its identity, was made of; the text begins with the
+// session's number. Empty if it does not differ, or if it is not known what the session was made of. `kept`: the
+// summary that the SummaryStore has.
 std::string change_since(const client::Session& session, const Sequence& sequence, bool photographs,
                          const Summary& kept);
 
 class Batch {
  public:
-  // `known`: sessions of the map; those of the sequences that have ended are left out. Recordings that are not what
-  // their sessions are made of fail (SEQUENCE_CONFLICT) before anything is sent, and so do those that cannot be read.
+  // `known`: the sessions of the map. Sequences whose sessions are there and have ended are left out. A recording that
+  // has changed since its session was made fails (SEQUENCE_CONFLICT) before anything is sent, and so does one that
+  // cannot be read.
   Batch(BatchOptions options, const std::vector<Sequence>& sequences, const std::vector<client::Session>& known);
 
-  // Until all are done or failed, or `stop` says so: then front-ends are asked to end, and what they had sent stays.
-  // `show` is called several times a second. True unless it was stopped.
+  // Runs until all tasks are done or have failed, or `stop` returns true; then front-ends are asked to end, and what
+  // they have sent stays in the map. `show` is called several times a second. Returns false if it was stopped.
   bool run(const std::function<bool()>& stop, const std::function<void(const std::vector<Task>&)>& show);
 
   const std::vector<Task>& tasks() const { return tasks_; }
-  // What could not be kept for a later run.
+  // Why something could not be kept in the SummaryStore; ok if everything was.
   const Status& not_kept() const { return not_kept_; }
 
-  // What runs one of them.
+  // The command line of the front-end for a sequence.
   std::vector<std::string> command(const Sequence& sequence) const;
 
  private:

@@ -21,7 +21,7 @@ std::string rate(std::uint64_t amount, std::chrono::steady_clock::duration time)
   return seconds > 0.5 ? terminal::fixed(static_cast<double>(amount) / seconds, 1) + "/s" : "";
 }
 
-// What a recording is counted in.
+// The unit in which recordings are counted.
 const char* unit_of(const Task& task) { return task.sequence.pictures > 0 ? " pictures" : " pairs"; }
 const char* unit_of(const std::vector<Task>& tasks) {
   const auto is_photographs = [](const Task& task) { return task.sequence.pictures > 0; };
@@ -48,7 +48,7 @@ TerminalSize terminal_size() {
   return {size.ws_row, size.ws_col};
 }
 
-// A line that wraps could not be drawn over.
+// Cuts a line to the terminal's width: a wrapped line could not be erased.
 std::string cut(const std::string& line, std::size_t columns) {
   std::size_t bytes = 0;
   for (std::size_t seen = 0; bytes < line.size() && seen + 1 < columns; ++seen) {

@@ -1,5 +1,5 @@
-// How far a batch has come: on a terminal a bar for each recording that is running and one for all; elsewhere a line
-// now and then, and one when a recording is done.
+// Shows the progress of a batch: on a terminal a bar for each running recording and one for all; elsewhere a line every
+// ten seconds. A finished recording gets a line in both.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@ class BatchProgress {
   BatchProgress& operator=(const BatchProgress&) = delete;
 
   void show(const std::vector<Task>& tasks);
-  // Takes the bars away.
+  // Erases the bars.
   void end();
 
  private:
@@ -33,13 +33,13 @@ class BatchProgress {
   const Clock::time_point begun_ = Clock::now();
   Clock::time_point shown_{};
   std::vector<Stage> stages_;
-  std::size_t lines_ = 0;  // drawn
+  std::size_t lines_ = 0;  // number of lines drawn
 };
 
-// Pairs read by now, of all; done ones count with what their summaries say.
+// How far all recordings together are. A finished recording counts with the pairs of its summary.
 struct Extent {
   std::uint64_t pairs = 0;
-  double share = 0;  // 0..1, of the recordings that this run has to take in
+  double share = 0;  // 0..1, of the recordings that this run takes in
 };
 Extent extent_of(const std::vector<Task>& tasks);
 

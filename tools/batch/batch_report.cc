@@ -35,7 +35,7 @@ std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
   return text;
 }
 
-// Of keyframes and of pictures, by reason.
+// The keyframes and pictures that were lost, by reason.
 std::string losses(const ReportRow& row) {
   const Summary& summary = row.task->summary;
   std::string text = counts_text(summary.refused);
@@ -48,12 +48,12 @@ std::string losses(const ReportRow& row) {
   return text;
 }
 
-// What was lost, what is wrong with the eyes, and why the whole failed: then nothing is told of what came before.
+// The column of a row: why the recording failed, else what was lost; and what is wrong with the stereo pair.
 std::string refusals(const ReportRow& row) {
   const Status& failure = row.task->failure;
   std::string text = failure.ok() ? losses(row) : std::string();
   for (const Status& finding : row.task->summary.findings)
-    if (failure.message().find(finding.message()) == std::string::npos)  // that says it already
+    if (failure.message().find(finding.message()) == std::string::npos)  // the failure names it already
       text += (text.empty() ? "" : "; ") + ("eyes: " + finding.to_string());
   if (!failure.ok()) text += (text.empty() ? "" : "; ") + failure.to_string();
   return text.empty() ? "-" : text;
@@ -83,7 +83,7 @@ std::string loss_text(const ReportRow& row) {
          (row.lost() == 1 ? " was" : " were") + " refused" + (reasons.empty() ? "" : ": " + reasons);
 }
 
-// What begins with a path in the recording, by the path from there.
+// Paths within the recording are shortened to the part after its folder.
 std::string within(const Sequence& recording, const std::string& text) {
   return text.starts_with(recording.path + '/') ? text.substr(recording.path.size() + 1) : text;
 }
@@ -111,8 +111,7 @@ void print_left_out(const Task& task, terminal::Console& console) {
   console.out() << task.sequence.session << ": left out:\n";
   for (std::size_t i = 0; i < std::min(kNamed, all.size()); ++i)
     console.out() << "  " << left_out_text(task, all[i]) << '\n';
-  if (all.size() > kNamed)
-    console.out() << "  and " << count_text(all.size() - kNamed) << " more, which --json names\n";
+  if (all.size() > kNamed) console.out() << "  and " << count_text(all.size() - kNamed) << " more (--json lists all)\n";
 }
 
 std::vector<Json> json_of(const std::vector<Status>& statuses) {
@@ -133,7 +132,7 @@ Json json_of(const std::map<std::string, std::uint64_t>& counts) {
 std::uint64_t ReportRow::lost() const {
   if (!task->in_map()) return 0;
   const std::uint64_t told = task->summary.refused_in_all();
-  // The map counts what it refused of a session, whose parts may be in several logs.
+  // The map counts refusals by session, and the parts of a session may be in several logs.
   return task->stage == Stage::kDone && !task->sequence.recorded.empty() ? told : std::max(told, refused);
 }
 
@@ -185,7 +184,7 @@ void print_report(const std::vector<ReportRow>& rows, terminal::Console& console
     if (const std::string loss = loss_text(row); !loss.empty()) console.out() << loss << '\n';
   std::vector<std::vector<std::string>> cells;
   for (const ReportRow& row : rows) {
-    // What a front-end measured before it failed is no figure of the recording.
+    // What a front-end measured before it failed says nothing of the whole recording.
     const Summary summary = row.task->stage == Stage::kFailed ? Summary() : row.task->summary;
     const auto of_session = [&](std::uint64_t n) { return row.session ? count(n) : "-"; };
     cells.push_back(

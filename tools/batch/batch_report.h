@@ -1,4 +1,4 @@
-// What came of a batch: a row for each recording.
+// The report of a batch: a row for each recording.
 #pragma once
 
 #include <string>
@@ -12,26 +12,27 @@ namespace relmap::batch {
 
 struct ReportRow {
   const Task* task = nullptr;
-  SessionNumber session = 0;  // in the map; 0: it did not begin
+  SessionNumber session = 0;  // in the map; 0: the session did not begin
   std::uint64_t keyframes = 0;
   std::uint64_t refused = 0, given_up = 0;
-  std::uint64_t loops = 0;  // accepted, from its frames to older ones
-  std::string doubt;        // why its camera's calibration is in doubt; empty: it is not
+  std::uint64_t loops = 0;  // accepted closures from its frames to older ones
+  std::string doubt;        // why the map doubts the camera's calibration; empty: it does not
 
-  // Keyframes that the daemon refused for good, of what is said to be in the map.
+  // Keyframes that the daemon refused for good, if the recording counts as in the map; else 0.
   std::uint64_t lost() const;
-  // By itself (Task::untrusted()), or by what it contradicts.
+  // Whether the recording cannot be trusted: by its summary, or since the map doubts its calibration.
   bool untrusted() const { return task->untrusted() || (task->in_map() && !doubt.empty()); }
 };
 
-// `sessions`, `loops` and `doubts` as the map has them now.
+// `sessions`, `loops` and `doubts` are those of the map after the batch.
 std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
                                    const std::vector<client::Edge>& loops,
                                    const std::vector<client::DoubtfulCamera>& doubts = {});
 
-// A daemon forgets its doubts when it ends, and a recording that was not to be trusted is so still: what an earlier one
-// said is said again, until the one that said it withdraws it. `boot`: of the daemon whose doubts the rows tell; empty:
-// not known, and nothing is changed. IO_ERROR.
+// Keeps the doubts of the rows in the store, and adds those that an earlier daemon had: a daemon forgets its doubts
+// when it ends, but the recording still cannot be trusted. A doubt is dropped only when the daemon that had it
+// withdraws it. `boot`: boot id of the daemon whose doubts the rows have; empty: not known, and nothing is changed.
+// IO_ERROR.
 Status keep_doubts(const SummaryStore& store, const std::string& boot, std::vector<ReportRow>& rows);
 
 void print_report(const std::vector<ReportRow>& rows, terminal::Console& console);

@@ -60,7 +60,7 @@ const std::string kDone =
     "echo '{\"pairs\": 10, \"lost\": 1, \"keyframes\": 4, \"metric_share\": 0.750, \"refused\": {\"BAD_TRACK\": 2}, "
     "\"unreadable\": {\"NOT_A_PICTURE\": 1}}'\n";
 
-TEST_F(BatchTest, NamesAndUuidsAreOfTheRecordingWhateverElseIsGiven) {
+TEST_F(BatchTest, NamesAndUuidsDependOnTheRecordingAlone) {
   const auto sequences = recordings({"a/06", "b/06", "c/07"});
   EXPECT_EQ(sequences[0].session, "a/06");
   EXPECT_EQ(recordings({"c/07"})[0].session, "c/07");
@@ -142,7 +142,7 @@ TEST_F(BatchTest, PhotographsOfSeveralCamerasGiveASessionForEach) {
   EXPECT_EQ(sequences_of({path("a/photos")}, mono, {.photographs = none})->size(), 1u) << "its front-end says why";
 }
 
-TEST_F(BatchTest, PhotographsThatCameSinceAreNotSaidToBeThere) {
+TEST_F(BatchTest, AddedPhotographsAreNotCountedAsInTheMap) {
   write_front_end(kDone);  // takes ten pictures in and cannot read another
   auto sequences = recordings({"1", "2"});
   for (Sequence& sequence : sequences) sequence.pictures = 11;
@@ -169,7 +169,7 @@ RecordingIdentity drive(std::uint64_t pairs) {
           "focal length 100 px"};
 }
 
-TEST(RecordingIdentity, WhatHasChangedIsSaid) {
+TEST(RecordingIdentity, ChangesAreDescribed) {
   EXPECT_EQ(change_text(drive(10), drive(10), false), "");
   EXPECT_EQ(change_text(drive(1200), drive(1500), false), "is made of 1,200 pairs, and there are 1,500 now");
   EXPECT_EQ(change_text(drive(12), drive(1), true), "is made of 12 pictures, and there is 1 now");
@@ -272,7 +272,7 @@ TEST_F(ChangedRecording, IsRefusedThoughItsSessionWasInterrupted) {
   EXPECT_EQ(batch.tasks()[0].stage, Stage::kDone);
 }
 
-TEST_F(ChangedRecording, OfASessionThatAnOlderVersionBeganIsFoundOutByTheDaemonAlone) {
+TEST_F(ChangedRecording, OfASessionOfAnOlderVersionIsNoticedByTheDaemonAlone) {
   write_front_end("kill -9 $$\n");
   EXPECT_EQ(later(client::SessionState::kOpen).stage, Stage::kFailed);
   write_front_end(kDrive);
@@ -280,7 +280,7 @@ TEST_F(ChangedRecording, OfASessionThatAnOlderVersionBeganIsFoundOutByTheDaemonA
   EXPECT_EQ(later(client::SessionState::kOpen).stage, Stage::kDone);
 }
 
-TEST_F(ChangedRecording, ThatCannotBeReadAnyMoreIsNotSaidToBeThere) {
+TEST_F(ChangedRecording, ThatCannotBeReadIsNotCountedAsInTheMap) {
   take_in();
   sequences_[0].recording.reset();
   sequences_[0].unlisted = {Reason::NO_SUCH_FILE, "1 holds no pictures"};
@@ -306,7 +306,7 @@ TEST_F(ChangedRecording, OfAnOlderVersionOrAnotherMapIsNotKnownToBeOne) {
   EXPECT_EQ(later(state).stage, Stage::kWasThere) << "in that map it may be of 15";
 }
 
-TEST_F(ChangedRecording, IsThereOnceItWasTakenInAgain) {
+TEST_F(ChangedRecording, IsInTheMapOnceAgainHasTakenItIn) {
   take_in();
   const Sequence own = sequences_[0];
   sequences_[0].recording = drive(15);
@@ -381,7 +381,7 @@ TEST_F(ChangedRecording, OfAnInterruptedAgainBecomesAnotherSession) {
   EXPECT_EQ(sequences_[0].uuid, third);
 }
 
-TEST_F(ChangedRecording, ThatItsDaemonFindsOutFailsToo) {
+TEST_F(ChangedRecording, FailsAlsoIfOnlyTheDaemonNoticesIt) {
   write_front_end(
       "echo '{\"keyframes\": 2, \"metric_share\": 1, \"unsettled\": 0, \"refused\": {\"SEQUENCE_CONFLICT\": 2}}'; exit "
       "3\n");
@@ -391,7 +391,7 @@ TEST_F(ChangedRecording, ThatItsDaemonFindsOutFailsToo) {
   EXPECT_THAT(task.failure.message(), AllOf(HasSubstr("refused 2 keyframes"), HasSubstr("--again")));
 }
 
-TEST_F(BatchTest, PartsOfOneSessionGoInOneAfterTheOther) {
+TEST_F(BatchTest, PartsOfOneSessionAreSentInOrder) {
   write_front_end("echo $path >> " + path("order") + "\nsleep 0.2\n" + kDone);
   std::vector<Sequence> parts(3);
   for (std::uint32_t i = 0; i < 3; ++i) {
@@ -417,7 +417,7 @@ TEST_F(BatchTest, PartsOfOneSessionGoInOneAfterTheOther) {
   EXPECT_EQ(batch.tasks()[2].stage, Stage::kWasThere);
 }
 
-TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
+TEST_F(BatchTest, RunsAtMostTheGivenNumberAtATime) {
   write_front_end("touch \"$path/running\"; ls " + folder_ + "/*/running | wc -l >> " + path("counts") +
                   "\nsleep 0.1\n" + kDone + "rm \"$path/running\"\n");
   options_.jobs = 2;
@@ -428,10 +428,10 @@ TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
     EXPECT_TRUE(batch.run([] { return false; }, [&](const auto& tasks) { progress.show(tasks); }));
   }
   std::ifstream counts(path("counts"));
-  int most = 0, runs = 0;
-  for (int n; counts >> n; ++runs) most = std::max(most, n);
+  int max_running = 0, runs = 0;
+  for (int n; counts >> n; ++runs) max_running = std::max(max_running, n);
   EXPECT_EQ(runs, 5);
-  EXPECT_EQ(most, 2);
+  EXPECT_EQ(max_running, 2);
   for (const Task& task : batch.tasks()) {
     EXPECT_EQ(task.stage, Stage::kDone) << task.failure.to_string();
     EXPECT_EQ(task.summary.pairs, 10u);
@@ -443,7 +443,7 @@ TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
   EXPECT_EQ(extent_of(batch.tasks()).pairs, 50u);
 }
 
-TEST_F(BatchTest, WhatIsInTheMapIsLeftOutAndWhatIsOpenGoesOn) {
+TEST_F(BatchTest, EndedSessionsAreLeftOutAndOpenOnesContinued) {
   write_front_end(kDone);
   const auto sequences = recordings({"1", "2", "3"});
   Batch first(options_, {sequences[0]}, {});
@@ -495,7 +495,7 @@ TEST_F(BatchTest, WhatIsInTheMapIsLeftOutAndWhatIsOpenGoesOn) {
   EXPECT_THAT(report_json(rows, 2), HasSubstr("\"state\":\"was there\""));
 }
 
-TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
+TEST_F(BatchTest, AFailureIsReportedAndTheOthersGoOn) {
   write_front_end(
       "case $path in\n"
       "*/bad) echo 'no relmapd' >&2; echo 'relmap-frontend: NOT_STEREO: the eyes are exchanged' >&2; exit 1;;\n"
@@ -525,7 +525,7 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
   EXPECT_THAT(batch.tasks()[6].failure.message(), HasSubstr("--again"));
 }
 
-TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
+TEST_F(BatchTest, AnUntrustedRecordingIsInTheMapAndReported) {
   write_front_end(
       "case $path in\n"
       "*/doubtful) echo '{\"pairs\": 51, \"keyframes\": 4, \"metric_share\": 1, \"trusted\": false, \"expected\": 51, "
@@ -586,7 +586,7 @@ TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
 }
 
 // The front-end says in its last words what its summary says of the eyes.
-TEST_F(BatchTest, EyesThatAreRefusedAreNamedOnceInTheTable) {
+TEST_F(BatchTest, RefusedEyesAreNamedOnceInTheTable) {
   write_front_end(
       "case $path in\n"
       "*/askew) echo '{\"keyframes\": 0, \"metric_share\": null, \"trusted\": false, \"findings\": [{\"reason\": "
@@ -644,7 +644,7 @@ TEST_F(BatchTest, WhatTheDaemonRefusedIsLostAndWhatTheRecordingLacksIsNot) {
 }
 
 // Too few to make it doubtful, but somebody may look for them.
-TEST_F(BatchTest, PicturesThatAreMissingAreToldInTheTextToo) {
+TEST_F(BatchTest, MissingPicturesAreReportedInTheTextToo) {
   write_front_end(
       "echo '{\"pairs\": 50, \"keyframes\": 20, \"metric_share\": 1, \"trusted\": true, \"missing\": {\"count\": 2, "
       "\"first\": [\"'$path'/image_1/000007.png\", \"'$path'/image_1/000009.png\"]}}'\n");
@@ -658,7 +658,7 @@ TEST_F(BatchTest, PicturesThatAreMissingAreToldInTheTextToo) {
                                    ": 2 pictures are missing, the first: image_1/000007.png, image_1/000009.png\n"));
 }
 
-TEST_F(BatchTest, ThePicturesThatWereLeftOutAreNamed) {
+TEST_F(BatchTest, PicturesThatWereLeftOutAreNamed) {
   std::string left_out;
   for (int i = 0; i < 5; ++i)
     left_out += std::string(i > 0 ? ", " : "") + "{\"reason\": \"NOT_A_PICTURE\", \"message\": \"'$path'/" +
@@ -675,14 +675,14 @@ TEST_F(BatchTest, ThePicturesThatWereLeftOutAreNamed) {
   terminal::Console console(out, err);
   print_report(rows, console);
   EXPECT_THAT(out.str(), HasSubstr("/photos: left out:\n  0.jpg: neither PNG nor JPEG (NOT_A_PICTURE)\n  1.jpg"));
-  EXPECT_THAT(out.str(), HasSubstr("  and 2 more, which --json names\n"));
+  EXPECT_THAT(out.str(), HasSubstr("  and 2 more (--json lists all)\n"));
   EXPECT_EQ(out.str().find("3.jpg"), std::string::npos);
   EXPECT_EQ(out.str().find("0.0 %"), std::string::npos) << "nothing was measured: " << out.str();
   for (int i = 0; i < 5; ++i)
     EXPECT_THAT(report_json(rows, 1), HasSubstr("/photos/" + std::to_string(i) + ".jpg: neither"));
 }
 
-TEST_F(BatchTest, OfOneThatFailedNoFiguresAreTold) {
+TEST_F(BatchTest, AFailedRecordingHasNoFigures) {
   write_front_end(
       "echo '{\"pairs\": 12345, \"keyframes\": 7, \"metric_share\": 0.875, \"expected\": 20000, \"measured\": 12000, "
       "\"measured_share\": 0.6125, \"error\": null}'; echo 'relmap-frontend: TOO_FEW_FEATURES: dark' >&2; exit 1\n");
@@ -697,7 +697,7 @@ TEST_F(BatchTest, OfOneThatFailedNoFiguresAreTold) {
   EXPECT_EQ(report_json(rows, 1).find("_share"), std::string::npos);
 }
 
-TEST_F(BatchTest, AFileOfKeyframesIsNamedAsItRecords) {
+TEST_F(BatchTest, AFileOfKeyframesHasItsRecordedName) {
   std::ofstream(path("k.bin")) << "keyframes";
   const auto list = [](const std::string& path, const RecordingOptions& options) -> Result<ListedRecording> {
     EXPECT_EQ(options.source, "auto");
@@ -733,7 +733,7 @@ TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {
   EXPECT_THAT(batch.tasks()[0].failure.message(), HasSubstr(path("nothing")));
 }
 
-TEST_F(BatchTest, AnInterruptAsksThemToEndAndNoMoreAreBegun) {
+TEST_F(BatchTest, AnInterruptEndsFrontEndsAndStartsNoMore) {
   write_front_end("trap 'exit 4' TERM\necho '{\"pairs\": 1}'\nwhile :; do sleep 0.02; done\n");
   Batch batch(options_, recordings({"1", "2"}), {});
   bool seen = false;

@@ -87,7 +87,7 @@ std::vector<Status> statuses(const Document& list) {
   return statuses;
 }
 
-// "relmap-frontend: NOT_STEREO: the eyes are ..." as it stands at the end of what it said on standard error.
+// Parses the last "relmap-frontend: NOT_STEREO: the eyes are ..." of its standard error.
 Status failure_in(const std::string& text, const std::string& otherwise) {
   const std::string_view all(text);
   constexpr std::string_view kPrefix = "relmap-frontend: ";
@@ -160,7 +160,7 @@ Result<FrontEnd> FrontEnd::start(const std::vector<std::string>& command) {
   if (pid == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(127);
-    ::setpgid(0, 0);  // Ctrl-C is the batch's to hand on
+    ::setpgid(0, 0);  // so that Ctrl-C reaches the batch alone, which passes it on
     ::signal(SIGINT, SIG_DFL);
     ::signal(SIGTERM, SIG_DFL);
     ::dup2(out[1], STDOUT_FILENO);
@@ -286,14 +286,14 @@ void FrontEnd::judge(int wait_status) {
     return;
   }
   const int code = WEXITSTATUS(wait_status);
-  // What was refused, or is not in the recording, does not come another time: it is counted.
+  // Refused keyframes, and those that the recording lacks, are not worth another try: they are only counted.
   const bool settled = code == 3 && summary_.unsettled == 0 && (!summary_.refused.empty() || summary_.gaps > 0);
   const bool done_but_untrusted = code == 5 && !summary_.json.empty();
   if (code == 0 || settled || done_but_untrusted) return;
   if (interrupted_)
     status_ = {Reason::SHUTTING_DOWN, "interrupted"};
   else if (code == 3)
-    status_ = {Reason::UNREACHABLE, progress_.trouble.empty() ? "not all was settled" : progress_.trouble};
+    status_ = {Reason::UNREACHABLE, progress_.trouble.empty() ? "not all keyframes were settled" : progress_.trouble};
   else
     status_ = failure_in(err_text_, "the front-end ended with " + std::to_string(code));
 }
@@ -307,7 +307,7 @@ std::string front_end_program() {
 
 namespace {
 
-// The lines that relmap-frontend says of them, each an object.
+// The lines that relmap-frontend --list prints, each a JSON object.
 Result<std::vector<Document>> listed(const std::vector<std::string>& arguments) {
   std::vector<std::string> command{front_end_program(), "--list"};
   command.insert(command.end(), arguments.begin(), arguments.end());

@@ -1,4 +1,4 @@
-// One relmap-frontend as a process: started with its arguments, read while it works, ended with its batch.
+// One relmap-frontend as a child process, whose progress and summary are read from its output.
 #pragma once
 
 #include <sys/types.h>
@@ -15,60 +15,61 @@
 
 namespace relmap::batch {
 
-// As its lines of progress say it.
+// The progress that relmap-frontend prints (--progress json).
 struct Progress {
-  std::uint64_t pairs = 0, of = 0;  // of: 0, not known
+  std::uint64_t pairs = 0, of = 0;  // `of` 0: not known
   std::uint64_t keyframes = 0, settled = 0;
-  std::string trouble;  // why the daemon does not answer; empty: it does
+  std::string trouble;  // why the daemon does not answer; empty if it does
 };
 
-// As its summary says it.
+// The summary that relmap-frontend prints at its end.
 struct Summary {
   std::string json;
   std::uint64_t pairs = 0, lost = 0, keyframes = 0, unsettled = 0, gaps = 0;
   std::optional<double> metric_share;
   std::map<std::string, std::uint64_t> refused, unreadable, stamps_refused;  // by reason
-  bool trusted = true;  // too few pairs were measured, or the eyes are not as the calibration says
-  std::uint64_t expected = 0, seen = 0, measured = 0;  // pairs: that there should be, that both eyes saw, measured
-  std::optional<double> measured_share;                // nothing: there were no pairs
-  std::uint64_t missing = 0;                           // pictures
-  std::vector<std::string> missing_first;              // of them, by their paths
-  std::vector<Status> findings;                        // of the eyes
-  std::vector<Status> left_out;                        // pictures and pairs one by one, with their files
-  std::optional<RecordingIdentity> recording;          // nothing: of a log, or an older version did not say it
+  bool trusted = true;  // false: too few pairs were measured, or the cameras contradict the calibration
+  std::uint64_t expected = 0, seen = 0, measured = 0;  // pairs: expected, seen by both eyes, measured
+  std::optional<double> measured_share;                // measured / expected; nullopt: no pairs were expected
+  std::uint64_t missing = 0;                           // pictures that are missing
+  std::vector<std::string> missing_first;              // paths of the first of them
+  std::vector<Status> findings;                        // what is wrong with the stereo pair
+  std::vector<Status> left_out;                        // why each picture or pair was left out, with its file
+  std::optional<RecordingIdentity> recording;          // nullopt: of a log, or of an older version
 
-  std::uint64_t refused_in_all() const;  // keyframes
+  std::uint64_t refused_in_all() const;  // keyframes, of all reasons together
 };
-// CORRUPT if it is none.
+// CORRUPT if `json` is no summary.
 Result<Summary> read_summary(const std::string& json);
-// "recording" of an object that is a summary, or has nothing else.
+// The key "recording" of a summary, or of an object that has only this key.
 std::optional<RecordingIdentity> read_recording(const std::string& json);
 
 class FrontEnd {
  public:
-  // IO_ERROR.
+  // Starts the program command[0] with the arguments that follow. IO_ERROR.
   static Result<FrontEnd> start(const std::vector<std::string>& command);
   FrontEnd(FrontEnd&& other) noexcept;
   FrontEnd& operator=(FrontEnd&& other) noexcept;
   ~FrontEnd();  // kills it
 
-  // Its standard output and error, to be waited on; -1: closed.
+  // Its standard output and error, for poll(); -1: closed.
   int out() const { return out_; }
   int err() const { return err_; }
-  // Takes in what it has said. True once it has ended and said all.
+  // Reads what it has printed, without waiting. Returns true when it has ended and everything is read.
   bool take();
-  // Until it has said something more, or ended, or for so long.
+  // Waits until it prints something more or ends, at most so long.
   void wait(int milliseconds) const;
   const Progress& progress() const { return progress_; }
   void interrupt();  // SIGTERM
 
-  // Once take() is true. Ok: done, all settled, whether its summary is to be trusted or not. Its reason, or INTERNAL if
-  // a signal ended it; SHUTTING_DOWN after interrupt().
+  // Valid when take() has returned true. Ok: the recording is done and everything is settled, even if the summary
+  // cannot be trusted. Else the front-end's own reason, INTERNAL if a signal ended it, or SHUTTING_DOWN after
+  // interrupt().
   const Status& status() const { return status_; }
   bool ended_by_signal() const { return ended_by_signal_; }
-  // Empty json: it gave none.
+  // Its json is empty if there was no summary.
   const Summary& summary() const { return summary_; }
-  // What it said on standard output beside that, line by line.
+  // The other lines that it printed on standard output.
   const std::vector<std::string>& lines() const { return lines_; }
 
  private:
@@ -80,7 +81,7 @@ class FrontEnd {
 
   pid_t pid_ = -1;
   int out_ = -1, err_ = -1;
-  std::string out_text_, err_text_;  // not yet taken; of err the last lines
+  std::string out_text_, err_text_;  // output that is not yet parsed; of standard error the last part
   Progress progress_;
   Summary summary_;
   std::vector<std::string> lines_;
@@ -88,10 +89,10 @@ class FrontEnd {
   bool interrupted_ = false, ended_by_signal_ = false;
 };
 
-// relmap-frontend beside this program, or the one in $PATH.
+// The path of the relmap-frontend beside this program; else its name, to be found in $PATH.
 std::string front_end_program();
 
-// By relmap-frontend --list.
+// Lists recordings with relmap-frontend --list.
 RecordingLister front_end_lister();
 
 }  // namespace relmap::batch

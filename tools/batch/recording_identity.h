@@ -1,4 +1,4 @@
-// What tells a recording from others, and from itself before it was changed, as relmap-frontend says it.
+// What distinguishes a recording from others, and from its own earlier state, as relmap-frontend reports it.
 #pragma once
 
 #include <cstdint>
@@ -6,18 +6,18 @@
 
 namespace relmap::batch {
 
-// Of pairs, pictures of one camera, or ready-made keyframes. The same for a copy elsewhere.
+// Identity of a recording of pairs, pictures of one camera, or ready-made keyframes. A copy has the same identity.
 struct RecordingIdentity {
-  std::string fingerprint;  // of its beginning
-  std::uint64_t count = 0;
-  std::string contents;     // a checksum of names, sizes and times of all
-  std::string calibration;  // empty: keyframes, which hold their camera
+  std::string fingerprint;  // of the first items
+  std::uint64_t count = 0;  // of pairs, pictures or keyframes
+  std::string contents;     // checksum of the names, sizes and times of all items
+  std::string calibration;  // empty for keyframes, which contain their camera
 
   bool operator==(const RecordingIdentity&) const = default;
 };
 
-// "is made of 1,200 pairs, and there are 1,500 now": of the session that was made of `then`. Empty: they are the same.
-// `photographs`: pictures by themselves, of which none is the beginning.
+// How the recording has changed since a session was made of `then`: "is made of 1,200 pairs, and there are 1,500 now".
+// Empty if it has not changed. `photographs`: single pictures, which have no order.
 std::string change_text(const RecordingIdentity& then, const RecordingIdentity& now, bool photographs);
 
 }  // namespace relmap::batch

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// "sequences/06", "photos/tower 640x480"; what is too long for a name loses its beginning.
+// The name of a session: "sequences/06", "photos/tower 640x480". A name that is too long loses its beginning.
 std::string name_of(const fs::path& path, const std::string& camera = {}) {
   const std::string name =
       path.parent_path().filename().string() + "/" + path.filename().string() + (camera.empty() ? "" : ' ' + camera);
@@ -49,7 +49,7 @@ SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options) {
   SessionUuid uuid;
   const std::uint64_t halves[] = {hash_text(text, 0), hash_text(text, 0x9e3779b97f4a7c15)};
   std::memcpy(uuid.bytes.data(), halves, sizeof halves);
-  uuid.bytes[6] = static_cast<std::uint8_t>((uuid.bytes[6] & 0x0f) | 0x80);  // version 8: of one's own making
+  uuid.bytes[6] = static_cast<std::uint8_t>((uuid.bytes[6] & 0x0f) | 0x80);  // version 8: custom
   uuid.bytes[8] = static_cast<std::uint8_t>((uuid.bytes[8] & 0x3f) | 0x80);
   return uuid;
 }
@@ -85,7 +85,7 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
     }
     if (options.mono) {
       const auto folder = list.photographs(real.string(), options);
-      if (!folder.ok()) {  // the front-end will say what is wrong with it
+      if (!folder.ok()) {  // the front-end will report what is wrong with the folder
         add({}, name_of(real)).unlisted = folder.status();
         continue;
       }

@@ -25,7 +25,7 @@ std::string text_of(const std::string& path) {
 
 Summary SummaryStore::read(const SessionUuid& uuid) const {
   if (folder_.empty()) return {};
-  // Older versions kept those of all maps in one folder.
+  // Older versions kept the summaries of all maps in one folder.
   for (const std::string& path : {path_of(uuid, kSummary), folder_ + '/' + uuid.to_string() + kSummary}) {
     const std::string json = text_of(path);
     if (json.empty()) continue;
@@ -76,7 +76,7 @@ void SummaryStore::forget_doubt(const SessionUuid& uuid) const {
   if (!folder_.empty()) fs::remove(path_of(uuid, kDoubt), ignored);
 }
 
-// Whole or not at all.
+// Replaces the file atomically.
 Status SummaryStore::write(const std::string& path, const std::string& text) const {
   if (folder_.empty()) return {};
   std::error_code error;
@@ -87,7 +87,7 @@ Status SummaryStore::write(const std::string& path, const std::string& text) con
   out.close();
   if (out) fs::rename(draft, path, error);
   if (!out || error)
-    return {Reason::IO_ERROR, "write " + path + ": a later run will not know what the session is made of"};
+    return {Reason::IO_ERROR, "write " + path + ": a later run will not know what the session was made of"};
   return {};
 }
 

@@ -1,5 +1,5 @@
-// What is kept of sessions beside the map: what their recordings were, and the front-ends' summaries. A later run tells
-// by them whether a recording is still the one that a session is made of, and reports what was there already.
+// Files beside the map with what is known of each session: the identity of its recording, and the front-end's summary.
+// By these a later run recognises that a recording has changed since, and reports sessions that were there already.
 #pragma once
 
 #include <optional>
@@ -14,27 +14,27 @@ namespace relmap::batch {
 
 class SummaryStore {
  public:
-  // `folder`: made when something is written; empty: nothing is kept. `map`: which map the sessions are in; empty: not
-  // known.
+  // `folder` is created when something is written; empty: nothing is kept. `map`: uuid of the map that the sessions are
+  // in; empty: not known.
   SummaryStore(std::string folder, std::string map) : folder_(std::move(folder)), map_(std::move(map)) {}
 
-  // Without json: the session did not end, or nothing was kept; without recording: nothing was, or by an older version.
+  // What is kept of a session. `json` is empty if the session did not end; `recording` is nullopt if an older version
+  // made the session; both if nothing is kept.
   Summary read(const SessionUuid& uuid) const;
-  // What the session is going to be made of, before anything of it is sent. IO_ERROR.
+  // Keeps what the session is going to be made of. To be called before anything is sent. IO_ERROR.
   Status begin(const SessionUuid& uuid, const RecordingIdentity& recording) const;
-  // Takes the place of that. IO_ERROR.
+  // Keeps the summary in place of what begin() kept. IO_ERROR.
   Status done(const SessionUuid& uuid, const Summary& summary) const;
-  // The recording whose own session would be `own` became session `other` by --again. IO_ERROR.
+  // Keeps that --again made the session `other` of the recording whose own session is `own`. IO_ERROR.
   Status taken_in_as(const SessionUuid& own, const SessionUuid& other) const;
-  // The newest of these.
+  // The newest session that --again made of the recording.
   std::optional<SessionUuid> other_of(const SessionUuid& own) const;
-  // What the map held against the calibration of the session's camera, and which daemon (its boot) said so: no other
-  // one knows of it. IO_ERROR.
+  // Why the map doubted the calibration of the session's camera. Only the daemon with this boot id knows of the doubt.
   struct Doubt {
     std::string boot, text;
     bool operator==(const Doubt&) const = default;
   };
-  Status doubt(const SessionUuid& uuid, const Doubt& doubt) const;
+  Status doubt(const SessionUuid& uuid, const Doubt& doubt) const;  // IO_ERROR
   std::optional<Doubt> doubt_of(const SessionUuid& uuid) const;
   void forget_doubt(const SessionUuid& uuid) const;
 

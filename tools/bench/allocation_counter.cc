@@ -23,7 +23,7 @@ std::uint64_t allocations() { return count; }
 
 namespace {
 
-// The program's allocator, which this one stands before.
+// The real allocator, which is called by this one.
 template <typename Function>
 Function* next(const char* name) {
   return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));

@@ -1,11 +1,11 @@
-// How often this program has asked for memory: relmap-bench's own malloc() counts and passes on to glibc's.
+// Counts allocations: relmap-bench has a malloc() of its own that counts, and calls glibc's.
 #pragma once
 
 #include <cstdint>
 
 namespace relmap::bench {
 
-// By the calling thread, since it began.
+// The number of allocations by the calling thread since it began.
 std::uint64_t allocations();
 
 }  // namespace relmap::bench

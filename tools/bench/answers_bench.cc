@@ -55,7 +55,7 @@ class Judge {
   }
 
  private:
-  // Of a picture's pose against a frame's, in truth.
+  // The true pose of a picture relative to a frame.
   SE3 true_T_frame_picture(FrameId frame, std::size_t picture) {
     return pose_of(frame).inverse() * truth_.poses[picture];
   }
@@ -109,7 +109,7 @@ class Judge {
     return metres;
   }
 
-  // From a picture of the second lap to a label on the first: the way over the closure, not back round the circuit.
+  // A route from a picture of the second lap to a label on the first: it must take the closure, not the way back round.
   void route(Report& report) {
     const std::size_t n = truth_.poses.size();
     const std::size_t from = n * 97 / 100;

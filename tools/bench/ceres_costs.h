@@ -1,4 +1,4 @@
-// Stereo measurements in one Euclidean frame, as Ceres takes them: what both comparisons with it are made of.
+// Ceres cost functions for stereo measurements in one Euclidean frame, for the comparisons with Ceres.
 #pragma once
 
 #include <ceres/ceres.h>
@@ -16,7 +16,7 @@ struct CeresPose {
   SE3 pose() const;
 };
 
-// Of a problem that owns neither its costs nor its loss and manifold.
+// Options of a problem that owns neither its costs nor its loss and manifold.
 inline ceres::Problem::Options owning_nothing() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -37,7 +37,7 @@ class PoseManifold final : public ceres::Manifold {
   bool MinusJacobian(const double*, double*) const override { return false; }
 };
 
-// A measurement of a point in the world by a frame, whitened; u_right of a mono one counts for nothing.
+// The whitened residual of a point in the world, measured by a frame; u_right of a mono measurement has no weight.
 class StereoCost final : public ceres::SizedCostFunction<3, 7, 3> {
  public:
   StereoCost(const StereoCamera& camera, const StereoPixel& z, bool mono, double sigma)

@@ -1,6 +1,6 @@
-// What a robotics team would take instead of relative bundle adjustment: a sliding window in one Euclidean frame, by
-// Ceres with analytic Jacobians (DENSE_SCHUR, one thread). The newest frames move, older ones that see their landmarks
-// stand still; the problem is built anew for every keyframe, as local bundle adjustments do. It closes no loops.
+// The usual alternative to relative bundle adjustment: a sliding window in one Euclidean frame, by Ceres with analytic
+// Jacobians (DENSE_SCHUR, one thread). The newest frames are adjusted; older ones that see their landmarks are
+// constant. The problem is built anew for every keyframe, as in local bundle adjustment. Loops are not closed.
 #pragma once
 
 #include <cstdint>
@@ -18,18 +18,18 @@ struct CeresWindowOptions {
   std::uint32_t window = 8;
   int max_iterations = 6;
   double huber = 2;                 // sigmas
-  double relative_decrease = 1e-2;  // of the cost; a step that gains less is the last
+  double relative_decrease = 1e-2;  // of the cost; a step that gains less ends the solve
 };
 
 class CeresWindow {
  public:
   CeresWindow(const StereoCamera& camera, CeresWindowOptions options) : camera_(camera), options_(options) {}
 
-  // Keyframes in the order of their sequences, from 0, without gaps. Seconds that the adjustment took, building
-  // included.
+  // Adds a keyframe and adjusts the window. Keyframes must come in the order of their sequences, from 0, without gaps.
+  // Returns the seconds that the adjustment took, including building the problem.
   double add(const Keyframe& keyframe);
 
-  // T_world_frame, the world being the first frame.
+  // T_world_frame of all frames; the world is the first frame.
   std::vector<SE3> poses() const;
 
  private:

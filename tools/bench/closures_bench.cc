@@ -66,7 +66,7 @@ class Replay {
     }
   }
 
-  // Of graph.loops, in their order; nothing where the map took no such proposal.
+  // One entry for each of graph.loops; nullopt if the map refused the proposal.
   std::vector<std::optional<storage::Edge>> closures() const {
     std::vector<std::optional<storage::Edge>> found;
     for (const g2o::PoseGraph::Edge& loop : graph_.loops) {
@@ -126,7 +126,7 @@ class Replay {
 
 enum class Truth { kTrue, kFalse, kBetween, kUnknown };
 
-// By how far apart the ends of a loop truly are, or by where it comes from.
+// Whether a loop is true: by the true distance of its ends, or by its origin.
 std::vector<Truth> truths(const g2o::PoseGraph& graph, const Options& options) {
   const g2o::PoseGraph truth = options.truth.empty() ? g2o::PoseGraph{} : read(options.truth);
   const auto truth_of = [&](std::uint32_t id) -> std::optional<Vector3> {
@@ -204,7 +204,7 @@ struct Variant {
   map::ConsistencyRules rules;
 };
 
-// The shipped rules but for one.
+// The shipped rules without one of them.
 std::vector<Variant> one_by_one() {
   std::vector<Variant> variants{{"all", "all rules", {}}};
   const auto add = [&](const char* name, const char* meaning, auto change) {
@@ -298,22 +298,27 @@ Run declare_closures(CLI::App& app) {
   app.add_option("--truth", options->truth, "g2o file with the true positions");
   app.add_option("--truth-every", options->truth_every, "frames of the graph between two true positions")
       ->capture_default_str();
-  app.add_option("--step-metres", options->step_metres, "standard deviation of a step of the odometry")
+  app.add_option("--step-metres", options->step_metres, "standard deviation of the translation of an odometry step")
       ->capture_default_str();
-  app.add_option("--step-radians", options->step_radians, "likewise")->capture_default_str();
-  app.add_option("--loop-scale", options->loop_scale, "loops' standard deviations are the file's, times this")
+  app.add_option("--step-radians", options->step_radians, "standard deviation of the rotation of an odometry step")
       ->capture_default_str();
-  app.add_flag("--loops-are-true", options->loops_are_true, "the file's loops are all true: no truth is needed");
-  app.add_option("--look-alikes", options->look_alikes,
-                 "stretches of false loops to add, each of places along one stretch that look like those along another")
+  app.add_option("--loop-scale", options->loop_scale, "factor for the file's standard deviations of loops")
       ->capture_default_str();
-  app.add_option("--seed", options->seed, "of the look-alikes")->capture_default_str();
-  app.add_option("--reach", options->rules.reach, "edges within which closures are held against each other")
+  app.add_flag("--loops-are-true", options->loops_are_true,
+               "all loops of the file are true, so that no --truth is needed");
+  app.add_option(
+         "--look-alikes", options->look_alikes,
+         "number of stretches of false loops to add; in each, places along one stretch look like those along another")
       ->capture_default_str();
-  app.add_option("--drift", options->rules.drift_share, "of the odometry: standard deviation over its length")
+  app.add_option("--seed", options->seed, "seed of the look-alikes")->capture_default_str();
+  app.add_option("--reach", options->rules.reach, "compare closures that are at most so many edges apart")
       ->capture_default_str();
-  auto* const rules = app.add_flag("--rules", options->rules_one_by_one, "each rule's worth: all without it");
-  app.add_flag("--folds", options->folds, "thresholds chosen on each half of the drive and judged on the other")
+  app.add_option("--drift", options->rules.drift_share,
+                 "drift of the odometry: standard deviation as a share of the length")
+      ->capture_default_str();
+  auto* const rules =
+      app.add_flag("--rules", options->rules_one_by_one, "measure what each rule contributes: all rules without it");
+  app.add_flag("--folds", options->folds, "choose thresholds on each half of the drive, and judge them on the other")
       ->excludes(rules);
   app.footer(
       "Examples:\n"

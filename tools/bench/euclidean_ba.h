@@ -1,5 +1,5 @@
-// Full bundle adjustment of a map in one Euclidean frame, by Ceres to convergence: what the full relative solution is
-// compared with.
+// Full bundle adjustment of a map in one Euclidean frame, by Ceres to convergence, for comparison with the full
+// relative solution.
 #pragma once
 
 #include <unordered_map>
@@ -13,20 +13,20 @@ namespace relmap::bench {
 
 class EuclideanBa {
  public:
-  // The map as it is now, unrolled breadth-first from the first frame of its first session, with its observations in
-  // force. Frames out of reach and mono landmarks that need a prior are left out.
+  // Starts from the map as it is now, unrolled breadth-first from the first frame of its first session, with the
+  // observations in force. Frames that are not connected, and mono landmarks that need a prior, are left out.
   explicit EuclideanBa(storage::Map& map);
 
-  // Huber-robust costs, sum over measurements. That before is the relative solution's own where no loop is closed, no
-  // edge has a prior and no landmark more observations than enter a solve.
+  // Huber-robust costs, summed over measurements. The cost before equals that of the relative solution if no loop is
+  // closed, no edge has a prior, and no landmark has more observations than enter a solve.
   struct Outcome {
     double cost_before = 0, cost_after = 0;
     int iterations = 0;
     bool converged = false;
     double seconds = 0;
   };
-  // The first frame stands still. `huber` in sigmas. With no iterations the costs alone. Throws StatusError
-  // (NUMERICAL).
+  // Adjusts everything but the first frame. `huber` in sigmas. With max_iterations 0 only computes the costs. Throws
+  // StatusError (NUMERICAL).
   Outcome solve(double huber, int max_iterations = 500);
 
   double rms_px() const;  // of all observations, per coordinate

@@ -73,7 +73,7 @@ double resident_mb() {
   return resident * 4096 / 1e6;
 }
 
-// Of y over x, by least squares; 0 for fewer than two points.
+// Slope of y over x by least squares; 0 for fewer than two points.
 double slope(const std::vector<double>& x, const std::vector<double>& y) {
   const double mx = mean(x), my = mean(y);
   double xx = 0, xy = 0;
@@ -188,7 +188,7 @@ class Drive {
     if (static_cast<std::size_t>(totals_.pairs) % 50 == 0) note_memory();
   }
 
-  // The least of every thousand pairs: the pictures that are rendered meanwhile come and go by some megabytes.
+  // The minimum of every thousand pairs, since the pictures that are rendered meanwhile add some megabytes at times.
   void note_memory() {
     const double own = static_cast<double>(poses_.size() + reference_poses_.size()) * sizeof(tracking::PosePair) +
                        static_cast<double>(totals_.nees.size() + totals_.latency_ms.size()) * sizeof(double);
@@ -363,27 +363,31 @@ Run declare_frontend(CLI::App& app) {
   app.add_option("--source", options->source, "kind of the data set")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "auto"}))
       ->capture_default_str();
-  app.add_option("path", options->path, "its folder, with poses.txt or poses_gt.txt; none: drives rendered on the way");
-  app.add_option("--reference", options->reference, "the same pictures by OpenCV's parts")
+  app.add_option("path", options->path,
+                 "folder of the data set, with poses.txt or poses_gt.txt; default: drives are rendered");
+  app.add_option("--reference", options->reference,
+                 "run also a reference on the same pictures: klt, odometry made of OpenCV's parts")
       ->check(CLI::IsMember({"klt"}));
   app.add_option("--scene", options->scene, "street or motorway")
       ->check(CLI::IsMember({"street", "motorway"}))
       ->capture_default_str();
-  app.add_option("--first", options->first, "pair from which on the truth counts")->capture_default_str();
-  app.add_option("--seed", options->seed, "of the first simulated drive")->capture_default_str();
-  app.add_option("--seeds", options->seeds, "simulated drives")->capture_default_str();
-  app.add_option("--frames", options->world.frames, "of each")->capture_default_str();
-  app.add_option("--circuit", options->circuit_m, "metres, of a street")->capture_default_str();
+  app.add_option("--first", options->first, "first pair that is compared with the truth")->capture_default_str();
+  app.add_option("--seed", options->seed, "seed of the first simulated drive")->capture_default_str();
+  app.add_option("--seeds", options->seeds, "number of simulated drives")->capture_default_str();
+  app.add_option("--frames", options->world.frames, "pairs of each drive")->capture_default_str();
+  app.add_option("--circuit", options->circuit_m, "length of a street's circuit, metres")->capture_default_str();
   app.add_option("--step", options->world.step, "metres between pairs, in a street")->capture_default_str();
-  app.add_option("--scale", options->scale, "of the rendered pictures")
+  app.add_option("--scale", options->scale, "scale of the rendered pictures")
       ->check(CLI::Range(0.2, 4.0))
       ->capture_default_str();
   app.add_option("--rate", options->world.rate, "pairs a second")->capture_default_str();
-  app.add_option("--exposure", options->world.exposure_s, "seconds: motion blur")->capture_default_str();
-  app.add_option("--exposure-jumps", options->world.exposure_jumps, "per 100 frames")->capture_default_str();
+  app.add_option("--exposure", options->world.exposure_s, "exposure time in seconds, for motion blur")
+      ->capture_default_str();
+  app.add_option("--exposure-jumps", options->world.exposure_jumps, "sudden changes of the gain per 100 pairs")
+      ->capture_default_str();
   app.add_option("--faults", options->faults, "none, all, or kind:frame,...")->capture_default_str();
   app.add_flag("--imu", options->imu, "use the inertial unit");
-  app.add_option("--track", options->track, "a file for a line about each pair");
+  app.add_option("--track", options->track, "write a line about each pair to this file");
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -1,4 +1,4 @@
-// The reference for the front-end: stereo odometry put together from OpenCV's parts, as tutorials do it.
+// The reference for the front-end: stereo odometry made of OpenCV's functions, as in tutorials.
 #pragma once
 
 #include <memory>
@@ -9,15 +9,15 @@
 
 namespace relmap::bench {
 
-// goodFeaturesToTrack where features have become few; pyramidal Lucas-Kanade from left to right gives them depth, and
-// from picture to picture tells where they went; solvePnPRansac with refinement gives the motion. One thread.
+// goodFeaturesToTrack finds features when they become few; pyramidal Lucas-Kanade from left to right gives their depth,
+// and from picture to picture their tracks; solvePnPRansac with refinement gives the motion. One thread.
 class KltOdometry {
  public:
   KltOdometry(const StereoCamera& camera, int features);
   ~KltOdometry();
 
-  // Rectified pictures. Returns the pose in the first pair's frame; where the motion cannot be had, the last step is
-  // repeated.
+  // Takes a rectified pair, and returns its pose in the frame of the first pair. If the motion cannot be computed, the
+  // last step is repeated.
   SE3 feed(vision::ImageView left, vision::ImageView right);
   int tracked() const;  // features that agreed with the last motion
 

@@ -1,4 +1,4 @@
-// False loops as look-alikes make them: not one by one, but along whole stretches, in which they agree with each other.
+// False loops as look-alikes cause them: along whole stretches, in which they agree with each other.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,9 @@
 
 namespace relmap::bench {
 
-// So many stretches of false loops: each of up to 12 places along the way that look like as many along another part of
-// it, as far as both go the same way. Each is as exact as a true one would be. In the order of the stretches.
+// Adds `stretches` stretches of false loops. In each, up to 12 places along the drive look like as many along another
+// part of it, as long as both go the same way. Each loop is as exact as a true one. Returned in the order of the
+// stretches.
 std::vector<g2o::PoseGraph::Edge> look_alikes(const g2o::PoseGraph& graph, std::uint32_t stretches, std::uint64_t seed);
 
 }  // namespace relmap::bench

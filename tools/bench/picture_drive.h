@@ -1,4 +1,4 @@
-// Stereo pairs with truth, for the benchmark of the front-end: a data set, or a world rendered on the way.
+// Stereo pairs with truth, for the benchmark of the front-end: from a data set, or rendered as they are needed.
 #pragma once
 
 #include <cstddef>
@@ -22,14 +22,14 @@ class PictureDrive {
  public:
   virtual ~PictureDrive() = default;
   virtual const StereoCamera& camera() const = 0;
-  virtual const vision::Rectifier* rectifier() const = 0;  // that the pictures need; null: none
-  virtual ImuRecording imu() const = 0;                    // without samples if there is no unit
-  virtual std::optional<TruePair> next() = 0;              // nothing at the end; throws what cannot be read
+  virtual const vision::Rectifier* rectifier() const = 0;  // for the pictures; null if they are rectified
+  virtual ImuRecording imu() const = 0;                    // without samples if there is no inertial unit
+  virtual std::optional<TruePair> next() = 0;              // nullopt at the end; throws if a pair cannot be read
 };
 
-// A folder that open_source() reads, of `kind`, with poses.txt or poses_gt.txt.
+// Opens a data set that open_source() reads as `kind`, with poses.txt or poses_gt.txt.
 std::unique_ptr<PictureDrive> open_recorded_drive(const std::string& kind, const std::string& folder);
-// Pairs are rendered ahead by a thread of its own.
+// Renders a simulated drive; a thread of its own renders pairs ahead.
 std::unique_ptr<PictureDrive> open_rendered_drive(const sim::PictureWorldOptions& options);
 
 }  // namespace relmap::bench

@@ -1,4 +1,4 @@
-// The place index on places of Zipf-distributed words: speed, memory, and what it costs beyond its share of memory.
+// The place index on places of Zipf-distributed words: speed, memory, and the cost of exceeding its share of memory.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -125,7 +125,7 @@ class DescribedDrive final : public storage::PartialGraph {
   std::vector<std::shared_ptr<const storage::FrameCold>> pictures_;
 };
 
-// The 300 descriptors of a picture to words of the shipped vocabulary.
+// Quantises the 300 descriptors of a picture with the shipped vocabulary.
 double quantise_us() {
   const auto vocabulary = place::Vocabulary::load(place::default_vocabulary_path()).or_throw();
   std::mt19937_64 random(1);
@@ -152,13 +152,13 @@ void run(const Options& options, Report& report) {
   const std::size_t empty = index.memory_bytes();
 
   std::vector<double> adds;
-  std::size_t most = 0;
+  std::size_t max_bytes = 0;
   for (std::uint32_t i = 0; i < options.places; ++i) {
     const auto words = pictures.place(i);
     const auto start = Clock::now();
     (void)index.add({1, i}, words);
     adds.push_back(microseconds_since(start));
-    most = std::max(most, index.memory_bytes());
+    max_bytes = std::max(max_bytes, index.memory_bytes());
   }
 
   std::vector<double> times, compared;
@@ -200,7 +200,7 @@ void run(const Options& options, Report& report) {
   report.add("bytes_per_place", static_cast<double>(index.memory_bytes() - empty) / places,
              "of memory, with a query under way");
   report.add("disk_bytes_per_place", on_disk / places, "in the file");
-  report.add("most_mb", static_cast<double>(most) / (1 << 20), "of memory, the most while it grew");
+  report.add("most_mb", static_cast<double>(max_bytes) / (1 << 20), "of memory, the most while it grew");
   report.add("add_us", mean(adds), "adding a place, writing it to the file included");
   report.add("add_max_us", quantile(adds, 1), "the longest");
   report.add("save_us", save_us, "what no full block holds");
@@ -214,10 +214,9 @@ void run(const Options& options, Report& report) {
 
 Run declare_places(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--places", options->places, "Places, of 100 to 300 words each")->capture_default_str();
-  app.add_option("--budget-mb", options->budget_mb, "Memory that the index may use; 0: all it wants")
-      ->capture_default_str();
-  app.add_option("--queries", options->queries, "Questions, half of them revisits")->capture_default_str();
+  app.add_option("--places", options->places, "Number of places, of 100 to 300 words each")->capture_default_str();
+  app.add_option("--budget-mb", options->budget_mb, "Memory budget of the index; 0: unlimited")->capture_default_str();
+  app.add_option("--queries", options->queries, "Number of queries, half of them revisits")->capture_default_str();
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -23,7 +23,7 @@ std::string number(double value) {
   return text;
 }
 
-// One axis: where values lie on the page, and the round ones that are marked.
+// One axis: the positions of values on the page, and its tick marks.
 class Axis {
  public:
   Axis(bool logarithmic, double from, double to) : log_(logarithmic), from_(from), to_(to) {}

@@ -1,4 +1,4 @@
-// A picture of what a benchmark found: curves over one axis.
+// Plots of benchmark results: curves over one axis.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@ namespace relmap::bench {
 
 struct Curve {
   std::string name;
-  std::vector<double> x, y;  // as many; only what is finite is drawn
-  bool dots = false;         // else a line
+  std::vector<double> x, y;  // of the same length; only finite values are drawn
+  bool dots = false;         // false: a line
 };
 
 struct Plot {
@@ -18,10 +18,10 @@ struct Plot {
   std::vector<Curve> curves;
 };
 
-// One value for each step, from 0.
+// A curve with one value for each step, from 0.
 Curve curve_by_step(std::string name, std::vector<double> y);
 
-// By the name's end: .png, else scalable vector graphics; an empty name: nothing. Throws StatusError (IO_ERROR).
+// Writes PNG if the path ends in .png, else SVG; nothing if the path is empty. Throws StatusError (IO_ERROR).
 void save_plot(const Plot& plot, const std::string& path);
 
 }  // namespace relmap::bench

@@ -1,4 +1,4 @@
-// Relative bundle adjustment: what a keyframe costs, and how near the adaptive solution comes to the full one.
+// Relative bundle adjustment: the cost of a keyframe, and the accuracy of the adaptive solution against the full one.
 #include <cstdlib>
 #include <memory>
 
@@ -68,22 +68,27 @@ Run declare_rba(CLI::App& app) {
           CLI::IsMember({"figure8", "regions", "edges", "euclidean", "loop", "laps", "exploration", "lift", "real"}))
       ->capture_default_str();
   app.add_option("--frames", options->frames,
-                 "Of the loop (500), of a lap (100), of the exploration (1,000,000); figure8 has 288")
+                 "Frames of the loop (default 500), of a lap (100), or of the exploration (1,000,000); figure8 has 288")
       ->check(CLI::Range(50U, 100'000'000U));
-  app.add_option("--laps", options->laps, "Of laps")->check(CLI::Range(3U, 1'000'000U))->capture_default_str();
-  app.add_option("--memory-budget-mb", options->memory_budget_mb, "Of exploration, MiB")->capture_default_str();
-  app.add_option("--data", options->data,
-                 "Folder of exploration's map (default: a temporary one); of real's data sets ($RELMAP_DATA)");
+  app.add_option("--laps", options->laps, "Number of laps (laps)")
+      ->check(CLI::Range(3U, 1'000'000U))
+      ->capture_default_str();
+  app.add_option("--memory-budget-mb", options->memory_budget_mb, "Memory budget in MiB (exploration)")
+      ->capture_default_str();
+  app.add_option(
+      "--data", options->data,
+      "Folder of the map (exploration; default: a temporary one), or of the data sets (real; default: $RELMAP_DATA)");
   app.add_option("--picture", options->picture,
                  "FILE.svg or .png: time by keyframe (figure8), error by region (regions) or spacing (edges), "
                  "residuals (euclidean), "
                  "active frames (loop), time by lap (laps), error by keyframe (lift)");
   app.add_option("--seeds", options->seeds, "Noise seeds 1..N (figure8: 20; others: 3)")->check(CLI::Range(1, 1000));
   app.add_option("--window", options->window, "Frames that a new one activates")->capture_default_str();
-  app.add_option("--observations", options->observations, "Of a frame, about (figure8, regions, euclidean)")
+  app.add_option("--observations", options->observations,
+                 "Observations of a frame, about (figure8, regions, euclidean)")
       ->check(CLI::Range(20U, 500U))
       ->capture_default_str();
-  app.add_flag("!--no-full", options->full, "Leave out the full solution");
+  app.add_flag("!--no-full", options->full, "Do not compute the full solution");
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -9,10 +9,11 @@ namespace relmap::bench {
 namespace {
 
 constexpr std::uint32_t kLap = 200, kFrames = 300;  // half of the circuit is driven twice
-// More edges than this lie between the ends of a loop edge; 0: every closure is one; the last: where there is no path.
+// A closure becomes a loop edge if more edges than this lie between its ends. 0: every closure; the last value: only
+// where there is no path.
 constexpr std::uint32_t kSpacings[] = {0, 2, 4, 8, 16, 24, 30};
 
-// Edges of the graph that observations alone do not hold.
+// The edges of the graph that need a prior, since they have too few observations.
 std::uint32_t weak_edges(testing::SimulatedDrive& drive) {
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < drive.driven(); ++i)

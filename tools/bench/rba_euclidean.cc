@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint32_t kChain = 20;  // frames
 constexpr int kPrefixes = 12;         // of the drive, for the figure
 
-// T of frame i and the one kChain further on, for all i.
+// The transforms between frames i and i + kChain, for all i.
 using Chains = std::vector<SE3>;
 Chains chains(std::uint32_t frames, const std::function<SE3(std::uint32_t i, std::uint32_t j)>& T) {
   Chains all;

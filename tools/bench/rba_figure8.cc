@@ -82,7 +82,7 @@ double allocations_of_an_update(testing::SimulatedDrive& drive, const rba::RbaOp
   return static_cast<double>(allocations() - before) / kFrames;
 }
 
-// The same keyframes by sliding-window bundle adjustment: its registration error, m, and its times.
+// The same keyframes with sliding-window bundle adjustment: registration error in metres, and times.
 double sliding_window(const testing::SimulatedDrive& drive, const rba::RbaOptions& rba, std::vector<double>* us) {
   CeresWindowOptions how;
   how.window = rba.window;

@@ -1,5 +1,5 @@
-// The figure of eight of docs/method.md, 5: what a keyframe costs, and how near the adaptive solution comes to the full
-// one, beside a sliding window by Ceres.
+// The figure of eight of docs/method.md, 5: the cost of a keyframe, and the accuracy of the adaptive solution compared
+// with the full one and with a sliding window by Ceres.
 #pragma once
 
 #include <cstdint>

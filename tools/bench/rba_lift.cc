@@ -36,7 +36,7 @@ struct Place {
   std::uint32_t frame;
 };
 
-// Stretches of worlds driven one after another: at the seams the robot stands still, as far as it can sense.
+// Stretches of worlds driven one after another; at the seams the robot senses that it stands still.
 class Ride {
  public:
   explicit Ride(const std::vector<Stretch>& stretches) {
@@ -60,7 +60,7 @@ class Ride {
 
   const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   const Place& place(std::uint32_t n) const { return places_[n]; }
-  // Of two frames of one world. Across a seam it is the truth all the same.
+  // The true transform between two frames, also across a seam.
   SE3 truth(std::uint32_t n, std::uint32_t m) const {
     return places_[n].world->T_world_frame(places_[n].frame).inverse() *
            places_[m].world->T_world_frame(places_[m].frame);
@@ -70,7 +70,7 @@ class Ride {
   }
 
  private:
-  // A step of which the robot says that it saw it, and that it was none.
+  // A step at a seam: the robot reports a measured step of zero.
   static void seam(const Stretch& stretch, Keyframe& keyframe) {
     const sim::PointsWorldOptions& world = stretch.world->options();
     keyframe.source = MotionSource::kVision;
@@ -152,7 +152,7 @@ std::vector<double> local_errors(const Ride& ride, const Transform& T) {
   return errors;
 }
 
-// Mean error of the position of frames behind the closing, seen from those one lap before.
+// Mean error of position of the frames after the closure, relative to those one lap before.
 double revisit_error(const Ride& ride, const sim::PointsWorld& world, const Transform& T) {
   double sum = 0;
   std::uint32_t count = 0;

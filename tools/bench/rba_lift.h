@@ -1,5 +1,5 @@
-// Motion that the robot cannot sense: a train, a lift. Its camera sees the cabin stand still while both move, and
-// afterwards it closes a loop, so that no one global frame fits what was measured.
+// Motion that the robot cannot sense, by train or lift: its camera sees the cabin stand still while both move.
+// Afterwards it closes a loop, so that no single global frame fits the measurements.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What a relaxed map is worth: reprojection, consistency, counts.
+// Measures of a relaxed map: reprojection error, consistency, counts.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace relmap::bench {
 
-// The figure of eight with so many landmarks born in a frame.
+// The figure of eight with `births` landmarks born in each frame.
 inline sim::PointsWorldOptions figure8_world(int seed, double births) {
   sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
   world.births = births;
@@ -21,18 +21,18 @@ inline rba::RbaOptions with_window(std::uint32_t frames) {
   return options;
 }
 
-// Of all observations in force, per coordinate, px.
+// Root mean square reprojection error of all observations in force, per coordinate, px.
 double reprojection_rms(storage::Map& map);
 
-// Mean normalised squared error against truth of chains of so many odometry edges, their covariances compounded; 6
-// expected. The first and the newest edges are left out, whose covariances are not yet those of a solve.
+// Mean normalised squared error of chains of `edges` odometry edges against the truth, with compounded covariances; 6
+// is expected. The first and the newest edges are left out, since their covariances are not yet those of a solve.
 double nees_of_chains(testing::SimulatedDrive& drive, std::uint32_t edges);
 
-// Carrying edges with neither the support that moves them nor a prior.
+// Edges of the graph with neither enough support to be adjusted nor a prior.
 std::uint32_t unsupported_edges(testing::SimulatedDrive& drive);
-// In force or not.
+// All landmarks, in force or not.
 std::uint64_t landmarks(testing::SimulatedDrive& drive);
-// Of those, the ones that no closure has found to be another; and the points of the world that they stand for.
+// The landmarks in force, and the number of points of the world that they represent.
 std::uint64_t landmarks_in_force(testing::SimulatedDrive& drive);
 std::uint64_t points_seen(testing::SimulatedDrive& drive);
 

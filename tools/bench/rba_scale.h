@@ -1,5 +1,5 @@
-// What relative bundle adjustment costs as maps grow: at loops of any length, over many laps of one circuit, and over a
-// drive that is far larger than memory.
+// The cost of relative bundle adjustment in growing maps: at loops of any length, over many laps of one circuit, and
+// over a drive that is far larger than memory.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,20 @@
 namespace relmap::bench {
 
 struct ScaleOptions {
-  std::uint32_t frames = 0;  // of the loop; a lap of the laps; of the exploration
+  std::uint32_t frames = 0;  // of the loop, of a lap, or of the exploration
   std::uint32_t laps = 1000;
   std::uint32_t window = 8;
   int seeds = 1;
   std::uint64_t memory_budget_mb = 256;  // of the exploration
   std::string data;                      // its folder; empty: a temporary one
-  std::string picture;                   // file for one of the loop; empty: none
+  std::string picture;                   // file for a plot; empty: none
 };
 
-// One closing of a loop of `frames` frames, driven on for a window.
+// Closes a loop of `frames` frames once, and drives on for a window.
 void run_loop(const ScaleOptions& options, Report& report);
-// One circuit again and again: what the second lap costs, and the last.
+// Drives one circuit again and again: the cost of the second and of the last lap.
 void run_laps(const ScaleOptions& options, Report& report);
-// A drive without loops, through the store: what its first tenth costs, and its last.
+// Drives without loops, through the store: the cost of the first and of the last tenth.
 void run_exploration(const ScaleOptions& options, Report& report);
 
 }  // namespace relmap::bench

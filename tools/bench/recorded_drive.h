@@ -1,4 +1,4 @@
-// Keyframes from anywhere, driven into a map over the memory engine as a worker would.
+// Adds keyframes of any origin to a map over the memory engine, as a worker would.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@ class RecordedDrive {
  public:
   explicit RecordedDrive(const rba::RbaOptions& rba);
 
-  // Of one session. Throws StatusError (CORRUPT) if the map does not take it.
+  // Adds a keyframe; all must be of one session. Throws StatusError (CORRUPT) if the map refuses it.
   void add(const Keyframe& keyframe);
   map::Applied propose(const storage::ClosureProposalRecord& closure) { return builder_->apply(++sequence_, closure); }
   // The full solution: everything active, to convergence.

@@ -12,25 +12,25 @@ namespace {
 using relmap::bench::Subcommand;
 
 const Subcommand kSubcommands[] = {
-    {"answers", "Questions to a running daemon about the drive it has mapped, judged by truth",
+    {"answers", "Ask a running daemon about the drive it has mapped, and compare with the truth",
      relmap::bench::declare_answers},
-    {"closures", "Loop closures of a pose graph, some of them false, proposed to a map",
+    {"closures", "Propose the loop closures of a pose graph, some of them false, to a map",
      relmap::bench::declare_closures},
-    {"drive", "The map of a recording, in the folder of a stopped daemon, against truth", relmap::bench::declare_drive},
-    {"fleet", "Robots over a bad network into a daemon: nothing lost, nothing twice, how soon acknowledged",
+    {"drive", "Compare the map of a recording, in the folder of a stopped daemon, with the truth",
+     relmap::bench::declare_drive},
+    {"fleet", "Send keyframes of many robots over a bad network: losses, doubles, latency",
      relmap::bench::declare_fleet},
-    {"fleet-robots", "Some robots of `fleet`, which starts them", relmap::bench::declare_fleet_robots},
-    {"frontend", "The stereo front-end alone, on pictures with truth: speed, drift, honesty",
+    {"fleet-robots", "Internal: a process with some robots of `fleet`", relmap::bench::declare_fleet_robots},
+    {"frontend", "Run the stereo front-end alone on pictures with truth: speed, drift, covariances",
      relmap::bench::declare_frontend},
-    {"places", "The place index in memory, and with its lists on disk", relmap::bench::declare_places},
-    {"rba", "Adaptive relative bundle adjustment: figure of eight, loops, laps, exploration",
+    {"places", "Measure the place index in memory, and with its lists on disk", relmap::bench::declare_places},
+    {"rba", "Measure adaptive relative bundle adjustment: figure of eight, loops, laps, exploration",
      relmap::bench::declare_rba},
-    {"rides", "Drives on which the robot is carried, through pictures, front-end and map",
-     relmap::bench::declare_rides},
-    {"routes", "A route through a map far larger than memory", relmap::bench::declare_routes},
-    {"storage", "A map taken in and read by storage's own API: speed, memory, bytes written",
+    {"rides", "Run drives on which the robot is carried through front-end and map", relmap::bench::declare_rides},
+    {"routes", "Find routes through a map far larger than memory", relmap::bench::declare_routes},
+    {"storage", "Write and read a map by storage's own API: speed, memory, bytes written",
      relmap::bench::declare_storage},
-    {"unpack", "Raw frames of a stereo camera taken apart, beside a copy of as many bytes",
+    {"unpack", "Unpack raw frames of a stereo camera, in comparison with a copy of as many bytes",
      relmap::bench::declare_unpack},
 };
 
@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
     CLI::App* own = app.add_subcommand(subcommand.name, subcommand.description);
     own->add_flag("--json", json, "Print one JSON object");
     own->footer(std::string("Example:\n  relmap-bench ") + subcommand.name + " --json");
-    runs.emplace_back(own, subcommand.declare(*own));  // where more is needed than that, it says so
+    runs.emplace_back(own, subcommand.declare(*own));  // subcommands with required options set their own footer
   }
   relmap::terminal::add_version(app);
   app.footer(

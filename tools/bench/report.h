@@ -1,5 +1,6 @@
-// What a benchmark found: named numbers, printed as a table or as one JSON object. Keys are a contract: scripts and the
-// README's figures are read from them, so a key is never renamed or given another unit (which is part of it: _us, _m).
+// The results of a benchmark: named numbers, printed as a table or as one JSON object. Keys are a contract, since
+// scripts and README's figures use them: a key is never renamed, and never gets another unit (which is part of it: _us,
+// _m).
 #pragma once
 
 #include <iosfwd>
@@ -16,7 +17,7 @@ class Report {
   // One value for each step of something: an array in JSON, its median in the table.
   void add(std::string key, std::vector<double> values, std::string meaning);
 
-  // Not finite: null.
+  // Values that are not finite are printed as null.
   void print_json(std::ostream& out) const;
   void print_table(std::ostream& out) const;
 
@@ -24,7 +25,7 @@ class Report {
   struct Row {
     std::string key;
     double value;
-    std::vector<double> series;  // not empty: instead of the value
+    std::vector<double> series;  // used instead of `value` if not empty
     std::string meaning;
   };
   std::vector<Row> rows_;

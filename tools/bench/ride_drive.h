@@ -1,4 +1,4 @@
-// A drive with rides through the front-end and into a map, as robot and daemon would, in this process.
+// Runs a drive with rides through the front-end and into a map in this process, as robot and daemon would.
 #pragma once
 
 #include <cstdint>
@@ -12,19 +12,19 @@
 
 namespace relmap::bench {
 
-// What the front-end made of it, and what is true of its keyframes.
+// The keyframes that the front-end made, with their truth.
 struct RideDrive {
   std::vector<Keyframe> keyframes;  // complete
   std::vector<SE3> truth;           // T_world_left of each
-  std::vector<char> riding;         // it stood in what carries it, or would
-  std::vector<char> carried;        // and that moved
+  std::vector<char> riding;         // the robot was in the carrier, or would be
+  std::vector<char> carried;        // the carrier moved
   std::uint32_t pairs = 0, lost = 0;
 };
-// Pictures are rendered, tracked and described. Throws StatusError.
+// Renders the pictures and runs the front-end on them. Throws StatusError.
 RideDrive drive_ride(const sim::PictureWorldOptions& options);
 
-// By a deterministic mapper over the memory engine; with the vocabulary that is shipped, or without closures. Throws
-// StatusError.
+// Maps the drive by a deterministic mapper over the memory engine, with the shipped vocabulary or without closures.
+// Throws StatusError.
 std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures);
 
 }  // namespace relmap::bench

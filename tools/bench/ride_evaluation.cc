@@ -24,7 +24,7 @@ FrameId frame_of(const storage::Graph& graph, std::size_t n) {
   return {graph.sessions().front().number, static_cast<std::uint32_t>(n)};
 }
 
-// A ride lies between two keyframes, or touches one of them.
+// Whether a ride lies between two keyframes, or touches one of them.
 bool rides_to(const RideDrive& drive, std::size_t n) { return drive.riding[n] || drive.riding[n - 1]; }
 
 double local_error(const storage::Graph& graph, const RideDrive& drive, const Transform& T) {

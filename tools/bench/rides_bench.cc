@@ -27,7 +27,7 @@ sim::PictureWorldOptions world_of(const Options& options, std::uint64_t seed) {
   return world;
 }
 
-// Every closure, for those who choose rules.
+// Lists every closure, to help in the choice of rules.
 void list_closures(const storage::Graph& graph, const RideDrive& drive, std::uint64_t seed) {
   const SessionNumber session = graph.sessions().front().number;
   for (std::size_t n = 0; n < drive.keyframes.size(); ++n) {
@@ -115,16 +115,17 @@ void run(const Options& options, Report& report) {
 
 Run declare_rides(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  app.add_option("--ride", options->ride, "as relmap-sim pictures --ride has it")
+  app.add_option("--ride", options->ride, "kind of ride, as in relmap-sim pictures --ride")
       ->check(CLI::IsMember({"lift", "lift-alike", "lift-ramp", "train", "escalator", "alike"}))
       ->capture_default_str();
-  app.add_flag("--on-foot", options->on_foot, "the robot waits where it would be carried, and goes by itself");
-  app.add_option("--seeds", options->seeds, "drives")->check(CLI::Range(1, 1000))->capture_default_str();
-  app.add_option("--first-seed", options->first_seed, "of them")->capture_default_str();
-  app.add_option("--width", options->width, "of the pictures, pixels")
+  app.add_flag("--on-foot", options->on_foot,
+               "the robot is not carried; it waits where it would board, and drives all the way");
+  app.add_option("--seeds", options->seeds, "number of drives")->check(CLI::Range(1, 1000))->capture_default_str();
+  app.add_option("--first-seed", options->first_seed, "seed of the first drive")->capture_default_str();
+  app.add_option("--width", options->width, "width of the pictures, pixels")
       ->check(CLI::Range(160, 2048))
       ->capture_default_str();
-  app.add_flag("--list", options->list, "every closure on standard error");
+  app.add_flag("--list", options->list, "list every closure on standard error");
   return [options](Report& report) { run(*options, report); };
 }
 

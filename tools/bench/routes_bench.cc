@@ -1,4 +1,4 @@
-// Routes through maps far larger than memory: what searches hold, how long they take, and whether they are right.
+// Routes through maps far larger than memory: the memory and time of searches, and whether they are right.
 //
 // `fleet`: robots drive about in a town of square blocks, each street is passed some ten times, and each crossing that
 // any of them has passed is recognised. Cells (server/route/overlay) against Dijkstra on the same snapshot.
@@ -108,9 +108,9 @@ void run_drive(const Options& options, Report& report) {
   drive_on(*stored.map, options.frames);
 
   const auto view = stored.map->view();
-  std::size_t most = 0;
+  std::size_t max_bytes = 0;
   const route::WorkLimit work{.proceed = [&](std::size_t bytes) {
-    most = std::max(most, bytes);
+    max_bytes = std::max(max_bytes, bytes);
     stored.tell_budget();
     return Status();
   }};
@@ -128,7 +128,7 @@ void run_drive(const Options& options, Report& report) {
   report.add("frames", options.frames, "of the map, one behind the other");
   report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "");
   report.add("steps", static_cast<double>(steps), "of the route from end to end");
-  report.add("search_mb", static_cast<double>(most) / (1 << 20), "held by the search, at most");
+  report.add("search_mb", static_cast<double>(max_bytes) / (1 << 20), "held by the search, at most");
   report.add("route_mb", static_cast<double>(route.path.memory_bytes()) / (1 << 20), "held while it is sent");
   report.add("search_s", search_s, "");
   report.add("walk_s", walk_s, "reading all its steps");
@@ -163,7 +163,7 @@ void take_in(const route::StreetGrid& town, const StoredMap& stored) {
   }
 }
 
-// Costs from one frame to all, by the book, over arrays that hold the whole graph.
+// Costs from one frame to all by textbook Dijkstra, on arrays that hold the whole graph.
 class OneToAll {
  public:
   OneToAll(const route::StreetGrid& town, const storage::Graph& graph, const route::RouteWeights& weights)
@@ -333,11 +333,11 @@ void run_fleet(const Options& options, Report& report) {
   route::Overlay overlay(metrics, route::CellStore::open(options.data, stored.budget, 0).or_throw());
   overlay.build(*stored.map->view());
   stored.budget->charge(storage::Share::kRoutes, overlay.memory_bytes());
-  // As a daemon does (RouteIndex).
+  // As the daemon's RouteIndex does.
   stored.budget->add_evictor(&overlay, [&] {
     const std::size_t used = stored.budget->used(storage::Share::kRoutes),
-                      most = stored.budget->allowance(storage::Share::kRoutes);
-    if (used > most) overlay.store()->evict(used - most);
+                      max_bytes = stored.budget->allowance(storage::Share::kRoutes);
+    if (used > max_bytes) overlay.store()->evict(used - max_bytes);
   });
   const double build_s = seconds_since(start);
   const auto bytes = static_cast<double>(overlay.store()->bytes_in_use() + overlay.memory_bytes());
@@ -482,7 +482,7 @@ void run_fleet(const Options& options, Report& report) {
   for (int i = 0; i < 5; ++i) beside_s.push_back(burst_s());
   settle();
 
-  // Asked at intervals, first while nothing arrives, then beside twenty keyframes a second and cells made anew.
+  // Routes are asked for at intervals, first while nothing arrives, then with twenty keyframes a second and new cells.
   const auto ask_now_and_then = [&](Asked& asked, const auto& look_at) {
     for (const auto until = Clock::now() + std::chrono::seconds(options.live_seconds); Clock::now() < until;) {
       map = index.snapshot();
@@ -564,20 +564,20 @@ void run_fleet(const Options& options, Report& report) {
 
 Run declare_routes(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--world", options->world, "fleet: many robots in a town; drive: one, straight on")
+  app.add_option("--world", options->world, "fleet: many robots in a town; drive: one robot, straight on")
       ->check(CLI::IsMember({"fleet", "drive"}))
       ->capture_default_str();
-  app.add_option("--frames", options->frames, "Of the map, which is made if it is not there")
+  app.add_option("--frames", options->frames, "Frames of the map, which is made if it does not exist")
       ->check(CLI::Range(1000u, 100'000'000u))
       ->capture_default_str();
-  app.add_option("--queries", options->queries, "Of the fleet")->capture_default_str();
-  app.add_option("--metrics", options->metrics, "Kinds of cost, of the fleet")
+  app.add_option("--queries", options->queries, "Number of routes (fleet)")->capture_default_str();
+  app.add_option("--metrics", options->metrics, "Number of kinds of cost (fleet)")
       ->check(CLI::Range(1u, static_cast<unsigned>(kMetrics.size())))
       ->capture_default_str();
-  app.add_option("--live-seconds", options->live_seconds, "In which keyframes arrive, of the fleet")
+  app.add_option("--live-seconds", options->live_seconds, "Seconds in which keyframes arrive (fleet)")
       ->check(CLI::Range(1, 3600))
       ->capture_default_str();
-  app.add_option("--memory-budget-mb", options->memory_budget_mb, "Memory")->capture_default_str();
+  app.add_option("--memory-budget-mb", options->memory_budget_mb, "Memory budget")->capture_default_str();
   app.add_option("--data", options->data, "Folder of the map (relmap-bench-routes-WORLD-FRAMES)");
   return [options](Report& report) {
     if (options->data.empty())

@@ -1,4 +1,4 @@
-// Storage by its own API, in process: a long drive taken in as a batch job would, read while it grows, read again cold.
+// Storage by its own API, in process: a long drive is written like a batch, read while it grows, and read again cold.
 #include <fcntl.h>
 #include <unistd.h>
 #include <zstd.h>
@@ -63,7 +63,7 @@ double device_bytes_written() {
   return 0;
 }
 
-// But for the reserve, whose size does not depend on the map's.
+// Without the reserve, whose size does not depend on the map.
 double folder_bytes(const std::string& folder) {
   double bytes = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
@@ -82,7 +82,7 @@ struct AlignedBuffer {
   std::uint8_t* const data;
 };
 
-// What the disk does by itself, for comparison: a file of our own beside the map's.
+// The speed of the bare disk for comparison, with a file beside the map.
 class RawFile {
  public:
   static constexpr std::size_t kBytes = std::size_t{512} << 20;
@@ -144,12 +144,12 @@ class ChunkReader {
     std::mt19937_64 random(2);
     std::size_t bytes = kPage;
     for (std::uint32_t next = 0; !stopping_;) {
-      // None of those written last, which caches may still hold.
+      // Not the chunks written last, which caches may still hold.
       if (frames_ / storage::kFramesPerChunk < next + 100) {
         pause();
         continue;
       }
-      // Each after a pause, in an order by chance: the one finds the disk no busier than the other.
+      // Each after a pause, in random order, so that the disk is equally busy for both.
       const bool raw_first = random() % 2 == 0;
       if (raw_first) read_raw(bytes, random);
       bytes = read_chunk({kSession, next++});
@@ -197,7 +197,7 @@ struct Store {
     store.map = storage::Map::open(store.engine, store.epoch, store.budget).or_throw();
     return store;
   }
-  // As the mapper does: the disk writes beside what is applied meanwhile.
+  // As in the mapper, the disk writes while the next records are applied.
   void begin_commit() {
     if (Status status = map->begin_commit({}); !status.ok()) throw StatusError(status);
     budget->set(storage::Share::kEngine, engine->memory_bytes());
@@ -303,7 +303,7 @@ class JournalThreads {
   std::thread maker_, journal_;
 };
 
-// A long drive on its way into a map.
+// Writes a long drive to a map.
 class Feed {
  public:
   Feed(const Options& options, std::uint32_t frames, std::uint64_t seed, Store& store)
@@ -414,7 +414,7 @@ double time_of_drive(const storage::Graph& graph, FrameId first, std::uint32_t f
   return microseconds_since(start) / frames;
 }
 
-// One keyframe's way to being durable, and a bare append with fdatasync in turn.
+// Times in turn until one keyframe is durable, and a bare append with fdatasync.
 void measure_acknowledgement(const Options& options, Store& store, const std::string& folder, Report& report) {
   KeyframeLoad load(options.light ? kLightLoad : LoadSize{}, options.seed + 1);
   const std::string path = folder + "/raw-append";
@@ -497,7 +497,7 @@ void run(const Options& options, Report& report) {
   }
   report.add("cold_neighbourhood_p50_us", quantile(cold_us, 0.5), "20 frames with landmarks, anywhere");
   report.add("warm_neighbourhood_p50_us", quantile(warm_us, 0.5), "the same again");
-  // What reading ahead of a robot could save at most.
+  // The most that reading ahead of a robot could save.
   std::vector<double> cold_drive_us, warm_drive_us;
   constexpr std::uint32_t kDrive = 640;
   for (int k = 0; k < 20; ++k) {
@@ -525,8 +525,8 @@ Run declare_storage(CLI::App& app) {
       ->check(CLI::Range(16U, 1U << 20))
       ->capture_default_str();
   app.add_flag("--light", options->light, "45 observations, 12 landmarks, no appearance (else 120, 40, 300 features)");
-  app.add_option("--data", options->data, "Folder to make the map in, and keep it (default: a temporary one)");
-  app.add_option("--seed", options->seed, "Of the content")->capture_default_str();
+  app.add_option("--data", options->data, "Folder for the map, which is kept (default: a temporary one)");
+  app.add_option("--seed", options->seed, "Seed of the content")->capture_default_str();
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -1,5 +1,5 @@
-// Keyframes of real size and random content, as a robot driving for ever would send them, and a map made of them by
-// storage's own API: what the worker does to a map, less place recognition and relaxation.
+// Keyframes of realistic size and random content, as of a robot that drives for ever, and a map made of them by
+// storage's own API: the work of the worker without place recognition and relaxation.
 #pragma once
 
 #include <cstdint>
@@ -35,13 +35,14 @@ class KeyframeLoad {
   SessionHeader header_;
   std::uint32_t sequence_ = 0;
   SE3 pose_;
-  std::vector<TrackMeasurement> tracks_;                    // of the last keyframe
-  std::vector<std::array<std::uint8_t, 128>> descriptors_;  // to choose from: drawing one takes longer than storing it
+  std::vector<TrackMeasurement> tracks_;  // of the last keyframe
+  std::vector<std::array<std::uint8_t, 128>>
+      descriptors_;  // reused, since drawing a new one takes longer than storing it
   Bytes thumbnail_;
 };
 
-// Adds a keyframe's frame with its odometry edge, landmarks and observations, and enters it where it is seen: observers
-// of older landmarks, support of the edges between.
+// Adds a keyframe's frame with its odometry edge, landmarks and observations, and updates what depends on it: observers
+// of older landmarks, and the support of the edges in between.
 void add_frame(storage::Map& map, SessionNumber session, std::uint64_t journal_sequence, std::uint32_t crc,
                Keyframe keyframe);
 

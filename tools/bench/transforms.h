@@ -1,4 +1,4 @@
-// How one frame of a map lies to another: as its relative map says, and as one global frame for all would have it.
+// Transforms between frames of a map: by the relative map, and by a pose graph in one global frame.
 #pragma once
 
 #include <functional>
@@ -9,13 +9,13 @@
 
 namespace relmap::bench {
 
-using Transform = std::function<std::optional<SE3>(FrameId from, FrameId to)>;  // nothing: no way leads there
+using Transform = std::function<std::optional<SE3>(FrameId from, FrameId to)>;  // nullopt: not connected
 
 // The graph must outlive it.
 Transform relative_map(const storage::Graph& graph);
 
-// The map's edges between these frames, closures as they were measured, spread over one global frame. `loop_huber`: as
-// in RelaxationOptions. Throws StatusError.
+// A pose graph of the map's edges between these frames, with closures as they were measured, relaxed in one global
+// frame. `loop_huber`: as in RelaxationOptions. Throws StatusError.
 Transform pose_graph(const storage::Graph& graph, const std::vector<FrameId>& frames, double loop_huber);
 
 }  // namespace relmap::bench

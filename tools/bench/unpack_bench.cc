@@ -1,5 +1,5 @@
 // relmap-bench unpack: raw frames of a stereo camera taken apart, beside the plain loop and a copy of as many bytes.
-// One thread; all are measured in turn, so that what disturbs one disturbs the others.
+// One thread; the methods are measured in turn, so that disturbances affect all of them.
 #include <chrono>
 #include <cstring>
 #include <memory>
@@ -70,9 +70,13 @@ void run(const Options& options, Report& report) {
 
 Run declare_unpack(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  app.add_option("--width", options->width, "pixels of an eye")->check(CLI::Range(2, 4096))->capture_default_str();
-  app.add_option("--height", options->height, "pixels of an eye")->check(CLI::Range(2, 4096))->capture_default_str();
-  app.add_option("--rounds", options->rounds, "frames by each way")->check(CLI::Range(1, 1000000));
+  app.add_option("--width", options->width, "width of one eye's picture, pixels")
+      ->check(CLI::Range(2, 4096))
+      ->capture_default_str();
+  app.add_option("--height", options->height, "height of one eye's picture, pixels")
+      ->check(CLI::Range(2, 4096))
+      ->capture_default_str();
+  app.add_option("--rounds", options->rounds, "frames that each method unpacks")->check(CLI::Range(1, 1000000));
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -48,7 +48,7 @@ class LoggedPairs : public PairStream {
 }  // namespace
 
 const std::atomic<bool>& stop_flag() {
-  // Once more ends the program as ever.
+  // A second signal ends the program as usual.
   const auto once = [](int number) {
     g_stop = true;
     std::signal(number, SIG_DFL);

@@ -17,12 +17,12 @@ namespace relmap::camera {
 
 struct GlobalOptions {
   std::string bus = "auto";   // usb, 1394
-  std::string camera_folder;  // empty: the default one
+  std::string camera_folder;  // empty: the default folder
   bool json = false;
   bool quiet = false;
 };
 
-// Exit code or, where something could not be done, why.
+// The work of a command. Returns the exit code, or why the command failed.
 using Action = std::function<Result<ExitCode>(const GlobalOptions&, terminal::Console&)>;
 
 void add_list(CLI::App& app, Action& action);
@@ -35,7 +35,7 @@ void add_replay(CLI::App& app, Action& action);
 
 std::string folder_of(const GlobalOptions& options);
 
-// A camera whose registers are read and written; its stream may be another program's.
+// A camera whose registers can be read and written, even while another program has its stream.
 struct Registers {
   iidc::FoundCamera camera;
   std::unique_ptr<iidc::CameraLink> link;
@@ -44,20 +44,20 @@ struct Registers {
 };
 Result<Registers> open_registers(const GlobalOptions& options, const std::string& serial);
 
-// Raw frames of a camera that streams, or of a log of them, with their layout.
+// The stereo pairs of a live camera, or of a log of raw frames.
 class PairStream {
  public:
   virtual ~PairStream() = default;
   virtual std::string describe() const = 0;
   virtual Result<StereoCalibration> calibration() const = 0;  // NO_CALIBRATION
-  // Nothing: the end, or an interrupt. An error is a gap.
+  // The next pair; nullopt at the end or after an interrupt. An error is a gap: the stream goes on.
   virtual Result<std::optional<capture::StereoFrame>> next() = 0;
 };
-// `camera`: a serial number, a GUID, empty for the only camera, or a raw log's file.
+// `camera`: a serial number, a GUID, the file of a raw log, or empty for the only camera.
 Result<std::unique_ptr<PairStream>> open_pairs(const GlobalOptions& options, const std::string& camera,
                                                const std::string& calibration, double rate_hz);
 
-// Set by Ctrl-C from the first call on.
+// Set by the first SIGINT or SIGTERM after the first call; the second one ends the program.
 const std::atomic<bool>& stop_flag();
 
 }  // namespace relmap::camera

@@ -1,4 +1,4 @@
-// record, replay: raw frames into a log, and a log to the front-end.
+// record and replay: write raw frames to a log, and give a log to the front-end.
 #include <unistd.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ struct RecordOptions {
   std::uint64_t frames = 0;
 };
 
-// "drive.raw 7140058" or "drive.raw": the file first.
+// Records raw frames to wish.file until a limit, an interrupt or a full disk.
 Result<ExitCode> record(const GlobalOptions& options, terminal::Console& console, const RecordOptions& wish) {
   using Clock = std::chrono::steady_clock;
   auto buses = iidc::open_camera_buses(options.bus);
@@ -36,7 +36,8 @@ Result<ExitCode> record(const GlobalOptions& options, terminal::Console& console
   const auto calibration = iidc::calibration_of(*camera, iidc);
   if (!calibration.ok() && calibration.reason() != Reason::NO_CALIBRATION) return calibration.status();
   if (!calibration.ok())
-    console.err() << calibration.status().message() << "; recorded without one, --calibration gives it to who reads\n";
+    console.err() << calibration.status().message()
+                  << "; the recording has none, so give --calibration when it is read\n";
   const iidc::CameraAddress& address = camera->live->address();
   capture::RawLogHeader header;
   header.vendor = address.vendor;
@@ -56,7 +57,7 @@ Result<ExitCode> record(const GlobalOptions& options, terminal::Console& console
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   Status failure;
   std::uint64_t recorded = 0;
-  std::uint64_t lost = 0;  // that the log was told of
+  std::uint64_t lost = 0;  // frames that the log has been told of as lost
   while (!stop && (wish.frames == 0 || recorded < wish.frames) && (wish.seconds == 0 || elapsed() < wish.seconds)) {
     const auto frame = camera->live->next();
     if (!frame.ok()) {
@@ -100,7 +101,7 @@ Result<ExitCode> record(const GlobalOptions& options, terminal::Console& console
         {"frames", std::to_string(counts.frames) + " in " + terminal::duration_text(elapsed()) + ", " +
                        terminal::bytes_text(counts.bytes)},
         {"lost", std::to_string(live.lost) + " by the camera, " + std::to_string(counts.dropped_frames) +
-                     " for want of a faster disk"}};
+                     " since the disk is too slow"}};
     for (const auto& [reason, count] : live.faults)
       facts.push_back({std::string(reason_name(reason)), std::to_string(count)});
     if (live.drift_ppm) facts.push_back({"its clock", terminal::fixed(*live.drift_ppm, 1) + " ppm fast"});
@@ -116,7 +117,7 @@ struct ReplayOptions {
   std::vector<std::string> rest;
 };
 
-// The rate that it was recorded at, whatever gaps there are.
+// The rate of the recording: from the median interval, which gaps do not change.
 double recorded_rate(const capture::RawLogReader& log) {
   std::vector<std::int64_t> intervals;
   for (std::size_t i = 1; i < log.frames(); ++i) intervals.push_back(log.time_us(i) - log.time_us(i - 1));
@@ -165,16 +166,21 @@ Result<ExitCode> replay(const GlobalOptions& options, terminal::Console& console
 }  // namespace
 
 void add_record(CLI::App& app, Action& action) {
-  auto* const command = app.add_subcommand("record", "raw frames into a file, whatever happens to it or the camera");
+  auto* const command = app.add_subcommand(
+      "record", "record raw frames to a file; it stays readable whatever happens to the program or the camera");
   command->footer("Example:\n  relmap-camera record drive.raw --seconds 600");
   auto wish = std::make_shared<RecordOptions>();
-  command->add_option("FILE", wish->file, "the recording; what is there is not written over")->required();
+  command->add_option("FILE", wish->file, "the recording; an existing file is not overwritten")->required();
   command->add_option("CAMERA", wish->camera, "serial number or GUID");
-  command->add_option("--seconds", wish->seconds, "how long; else until Ctrl-C")->check(CLI::NonNegativeNumber);
-  command->add_option("--frames", wish->frames, "how many");
-  command->add_option("--rate", wish->rate_hz, "frames a second (default: its settings', else the fastest)")
+  command->add_option("--seconds", wish->seconds, "record for so many seconds (default: until Ctrl-C)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--frames", wish->frames, "record so many frames");
+  command
+      ->add_option("--rate", wish->rate_hz,
+                   "frames a second (default: that of the camera's settings, else the highest)")
       ->check(CLI::PositiveNumber);
-  command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
+  command->add_option("--calibration", wish->calibration,
+                      "calibration file or folder, instead of the one kept by serial number");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) {
       return record(options, console, *wish);
@@ -184,13 +190,15 @@ void add_record(CLI::App& app, Action& action) {
 
 void add_replay(CLI::App& app, Action& action) {
   auto* const command =
-      app.add_subcommand("replay", "a recording to relmap-frontend (with --json: what it holds, and no more)");
+      app.add_subcommand("replay", "give a recording to relmap-frontend; with --json only print what it holds");
   command->footer("Example:\n  relmap-camera replay drive.raw -- --robot cart --server /srv/map");
   auto wish = std::make_shared<ReplayOptions>();
   command->add_option("FILE", wish->file, "the recording")->required();
-  command->add_option("--rate", wish->rate, "recorded, max, a number of pairs a second, or so many times: 2x")
+  command
+      ->add_option("--rate", wish->rate,
+                   "recorded, max, a number of pairs a second, or a factor of the recorded rate, as 2x")
       ->capture_default_str();
-  command->add_option("OPTIONS", wish->rest, "of relmap-frontend, behind --");
+  command->add_option("OPTIONS", wish->rest, "options for relmap-frontend, after --");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) {
       return replay(options, console, *wish);

@@ -1,4 +1,4 @@
-// show, check: looking through a camera, or at a recording of one.
+// show and check: pictures of a camera or a recording.
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,11 +21,11 @@ namespace {
 
 constexpr int kRowsBetweenLines = 32;
 
-// Of a stream that gives no pair: why, after a while.
+// Gives up a stream that has delivered no pair for kPatience, with the reason.
 class Patience {
  public:
   void had_one() { until_ = Clock::now() + kPatience; }
-  // Nothing: there is some left.
+  // There was no pair. Ok while patience is left, else why the stream is given up.
   Status without(const Status& why) {
     if (!why.ok()) why_ = why;
     if (Clock::now() < until_) return {};
@@ -40,7 +40,7 @@ class Patience {
   Status why_;
 };
 
-// In place, where there is a rectifier.
+// Rectifies the frame in place, if there is a rectifier.
 Status rectify(const std::optional<vision::Rectifier>& rectifier, capture::StereoFrame& frame) {
   if (!rectifier) return {};
   auto rectified = relmap::capture::rectify(*rectifier, std::move(frame));
@@ -60,7 +60,7 @@ cv::Mat view_of(const vision::Image& picture) {
   return cv::Mat(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
 }
 
-// Both eyes side by side; with lines along rows, which both are to see the same things on, where they are rectified.
+// Both eyes side by side. `lines` draws lines along rows: on one row, rectified eyes show the same things.
 cv::Mat side_by_side(const capture::StereoFrame& frame, bool lines) {
   cv::Mat both, coloured;
   cv::hconcat(view_of(frame.left), view_of(frame.right), both);
@@ -84,7 +84,7 @@ Result<ExitCode> show(const GlobalOptions& options, terminal::Console& console, 
       if (!made.ok()) return made.status();
       rectifier = std::move(*made);
     } else if (calibration.reason() == Reason::NO_CALIBRATION) {
-      console.err() << calibration.status().message() << "; the pictures are shown as they are\n";
+      console.err() << calibration.status().message() << "; the pictures are not rectified\n";
     } else {
       return calibration.status();
     }
@@ -92,7 +92,7 @@ Result<ExitCode> show(const GlobalOptions& options, terminal::Console& console, 
   std::error_code error;
   std::filesystem::create_directories(wish.out, error);
   if (!std::filesystem::is_directory(wish.out, error))
-    return {Reason::IO_ERROR, wish.out + " is no folder, and cannot be made"};
+    return {Reason::IO_ERROR, wish.out + " is no folder and cannot be created"};
   Patience patience;
   for (int shown = 0, seen = 0; shown < wish.count;) {
     auto next = (*stream)->next();
@@ -177,7 +177,7 @@ Result<ExitCode> check(const GlobalOptions& options, terminal::Console& console,
     const auto calibration = (*stream)->calibration();
     if (calibration.reason() == Reason::NO_CALIBRATION)
       return {Reason::NO_CALIBRATION,
-              calibration.status().message() + "; --raw looks at focus, exposure and the eyes without one"};
+              calibration.status().message() + "; --raw checks focus, exposure and the eyes without one"};
     if (!calibration.ok()) return calibration.status();
     auto made = vision::Rectifier::make(*calibration, calibration->width, calibration->height);
     if (!made.ok()) return made.status();
@@ -210,7 +210,7 @@ Result<ExitCode> check(const GlobalOptions& options, terminal::Console& console,
   }
   bar.end();
   vision::RigReport report = rig.report();
-  // Without a calibration rows need not agree.
+  // Pictures that are not rectified need not agree in their rows.
   if (wish.raw)
     std::erase_if(report.findings, [](const Status& finding) { return finding.reason() == Reason::ROWS_APART; });
   if (options.json) {
@@ -244,17 +244,21 @@ Result<ExitCode> check(const GlobalOptions& options, terminal::Console& console,
 }  // namespace
 
 void add_show(CLI::App& app, Action& action) {
-  auto* const command = app.add_subcommand("show", "pictures of both eyes, side by side, as PNG files");
+  auto* const command = app.add_subcommand("show", "write pictures of both eyes, side by side, as PNG files");
   command->footer("Example:\n  relmap-camera show 7140058 --out pictures/ --count 5");
   auto wish = std::make_shared<ShowOptions>();
   command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
-  command->add_option("--out", wish->out, "folder, made if it is not there")->capture_default_str();
-  command->add_option("--count", wish->count, "pairs")->check(CLI::Range(1, 1'000'000))->capture_default_str();
-  command->add_option("--skip", wish->skip, "pairs before the first that is shown")
+  command->add_option("--out", wish->out, "folder for the pictures; created if it does not exist")
+      ->capture_default_str();
+  command->add_option("--count", wish->count, "number of pairs")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  command->add_option("--skip", wish->skip, "skip so many pairs before the first")
       ->check(CLI::Range(0, 100'000'000))
       ->capture_default_str();
-  command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
-  command->add_flag("--raw", wish->raw, "as they are, not rectified");
+  command->add_option("--calibration", wish->calibration,
+                      "calibration file or folder, instead of the one kept by serial number");
+  command->add_flag("--raw", wish->raw, "do not rectify the pictures");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) { return show(options, console, *wish); };
   });
@@ -262,13 +266,16 @@ void add_show(CLI::App& app, Action& action) {
 
 void add_check(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand(
-      "check", "row error, order of the eyes, focus and exposure, measured on what it sees: something with texture");
+      "check", "check row error, order of the eyes, focus and exposure; point the camera at something with texture");
   command->footer("Examples:\n  relmap-camera check 7140058\n  relmap-camera check drive.raw");
   auto wish = std::make_shared<CheckOptions>();
   command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
-  command->add_option("--pairs", wish->pairs, "looked at")->check(CLI::Range(1, 10'000))->capture_default_str();
-  command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
-  command->add_flag("--raw", wish->raw, "without a calibration: not the rows");
+  command->add_option("--pairs", wish->pairs, "number of pairs to check")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str();
+  command->add_option("--calibration", wish->calibration,
+                      "calibration file or folder, instead of the one kept by serial number");
+  command->add_flag("--raw", wish->raw, "check without a calibration; row errors are not measured");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) {
       return check(options, console, *wish);

@@ -1,4 +1,4 @@
-// list, info, set: what needs no pictures.
+// list, info and set: the commands that need no pictures.
 #include <algorithm>
 #include <cstdio>
 
@@ -125,7 +125,7 @@ Result<ExitCode> list(const GlobalOptions& options, terminal::Console& console) 
   }
   if (!options.json && !rows.empty())
     console.table({"camera", "model", "vendor", "bus", "place", "calibration", "state"}, rows);
-  if (rows.empty()) console.err() << "no IIDC camera is there\n";
+  if (rows.empty()) console.err() << "there is no IIDC camera\n";
   for (const Status& trouble : troubles)
     if (rows.empty() || trouble.reason() != Reason::UNSUPPORTED) console.err() << trouble.message() << '\n';
   return kOk;
@@ -203,7 +203,7 @@ Result<ExitCode> set(const GlobalOptions& options, terminal::Console& console, s
     serial = words.front();
     words.erase(words.begin());
   }
-  // Everything is understood before anything is written.
+  // All words are parsed before any register is written.
   std::vector<Assignment> assignments;
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
@@ -241,13 +241,13 @@ Result<ExitCode> set(const GlobalOptions& options, terminal::Console& console, s
 }  // namespace
 
 void add_list(CLI::App& app, Action& action) {
-  auto* const command = app.add_subcommand("list", "the cameras that are there");
+  auto* const command = app.add_subcommand("list", "list the cameras that are connected");
   command->footer("Examples:\n  relmap-camera list\n  relmap-camera --json list");
   command->callback([&action] { action = list; });
 }
 
 void add_info(CLI::App& app, Action& action) {
-  auto* const command = app.add_subcommand("info", "what a camera is and can: modes, features and their values");
+  auto* const command = app.add_subcommand("info", "show a camera's identity, modes, features and their values");
   command->footer("Examples:\n  relmap-camera info\n  relmap-camera info 7140058");
   auto serial = std::make_shared<std::string>();
   command->add_option("CAMERA", *serial, "serial number or GUID");
@@ -259,7 +259,7 @@ void add_info(CLI::App& app, Action& action) {
 }
 
 void add_set(CLI::App& app, Action& action) {
-  auto* const command = app.add_subcommand("set", "set features, and read them back");
+  auto* const command = app.add_subcommand("set", "set features of a camera, and read them back");
   command->footer(
       "Examples:\n"
       "  relmap-camera set 7140058 shutter=auto gain=64 \"frame_rate=abs 15\"\n"
@@ -269,8 +269,8 @@ void add_set(CLI::App& app, Action& action) {
       ->add_option(
           "WORDS", *words,
           "[CAMERA] FEATURE=VALUE...: off, on, auto, once, a raw number, or 'abs NUMBER' in the feature's unit;\n"
-          "trigger=MODE,SOURCE[,high|low]; strobe=PIN,high|low,DELAY,DURATION. A camera forgets it when its\n"
-          "power goes; what it is to have always stands in its settings.yaml")
+          "trigger=MODE,SOURCE[,high|low]; strobe=PIN,high|low,DELAY,DURATION. A camera loses these values when it\n"
+          "is switched off; permanent ones are kept in its settings.yaml")
       ->required();
   command->callback([&action, words] {
     action = [words](const GlobalOptions& options, terminal::Console& console) {

@@ -5,9 +5,10 @@
 //   VERTEX_SE3:QUAT id x y z q        EDGE_SE3:QUAT a b dx dy dz q, upper triangle; q is (x, y, z, w), and the
 //                                     information is of dx, dy, dz and of the vector part of q
 //
-// A pose in the plane is that of a robot which looks along its x, y to its left, seen from above: its plane becomes x-z
-// of the camera, its x is the camera's z, its y is -x, its angle turns about -y. Lines of other kinds (FIX, PARAMS_...,
-// points) are counted and left out. A file of edges only has the vertices that they name, chained by the odometry.
+// A pose in the plane is that of a robot that looks along its x axis, with y to its left, seen from above. The plane
+// becomes x-z of the camera: the robot's x is the camera's z, its y is -x, and its angle turns about -y. Lines of other
+// kinds (FIX, PARAMS_..., points) are counted and left out. If a file has only edges, the poses of the vertices that
+// these name are chained from the odometry.
 #pragma once
 
 #include <cstdint>
@@ -31,28 +32,28 @@ struct PoseGraph {
   struct Edge {
     std::uint32_t a = 0, b = 0;  // numbers of frames
     SE3 T_ab;
-    Matrix6 covariance;  // of T_ab Exp(xi); 1e-8 where the plane knows nothing of a coordinate
+    Matrix6 covariance;  // of xi in T_ab Exp(xi); 1e-8 for coordinates that a plane does not have
   };
-  // By number; frames are numbered from 0 in the order of their ids.
+  // By frame number; frames are numbered from 0 in the order of their ids in the file.
   std::vector<std::uint32_t> ids;
   std::vector<SE3> poses;
-  std::vector<Edge> odometry;  // b == a + 1, ascending; of several between the same two, the first of the file
-  std::vector<Edge> loops;     // a > b: a, the later one, recognised b; in the order of the file, of several the first
-  bool planar = false;         // of SE2
-  // Edges from a frame to itself say nothing and are refused: the lines on which they stand.
+  std::vector<Edge> odometry;  // b == a + 1, ascending; the first in the file of each pair
+  std::vector<Edge> loops;     // a > b (a recognised b); in the order of the file, the first of each pair
+  bool planar = false;         // whether the poses are SE2
+  // Line numbers of edges from a frame to itself. They say nothing and are left out.
   std::vector<std::size_t> self_edges;
-  // Further loops between two frames, of which the map keeps one: their lines.
+  // Line numbers of further loops between two frames; the map keeps one loop for each pair.
   std::vector<std::size_t> parallel_loops;
-  std::map<std::string, std::size_t> left_out;  // lines, by their first word
+  std::map<std::string, std::size_t> left_out;  // number of lines left out, by their first word
 
-  const Edge* step_to(std::uint32_t frame) const;  // odometry to it from the one before; null: there is none
+  const Edge* step_to(std::uint32_t frame) const;  // the odometry from the previous frame; null if there is none
 };
 
-// CORRUPT, with the line: too few numbers, not finite, a rotation or an information matrix that is none, an edge to a
-// vertex that is not there, neither vertices nor odometry to a frame, a vertex twice, poses in the plane and in space.
-// `name` stands in messages.
+// Parses a pose graph; messages call it `name`. CORRUPT, with the line number, for: too few numbers, or numbers that
+// are not finite; an invalid rotation or information matrix; an edge to a vertex that does not exist; a frame with
+// neither a vertex nor odometry; a vertex given twice; poses in the plane and in space in one file.
 Result<PoseGraph> parse_pose_graph(std::string_view text, const std::string& name, PoseAxes axes = PoseAxes::kCamera);
-// Also NO_SUCH_FILE, IO_ERROR.
+// The same for a file. Also NO_SUCH_FILE, IO_ERROR.
 Result<PoseGraph> read_pose_graph(const std::string& path, PoseAxes axes = PoseAxes::kCamera);
 
 }  // namespace relmap::g2o

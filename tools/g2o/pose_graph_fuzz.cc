@@ -1,4 +1,4 @@
-// Any text as a pose graph: what is accepted is whole.
+// Parses any text as a pose graph, and checks that an accepted graph is consistent.
 #include "proto/geometry/covariance.h"
 #include "tools/g2o/pose_graph.h"
 

@@ -22,7 +22,7 @@ EDGE_SE2 20 20 0 0 0 1 0 0 1 0 1
 FIX 10
 )";
 
-TEST(PoseGraph, OfThePlaneIsWhatACameraSees) {
+TEST(PoseGraph, OfThePlaneIsConvertedToTheCamerasFrame) {
   const PoseGraph graph = parse_pose_graph(kPlane, "test").or_throw();
   EXPECT_TRUE(graph.planar);
   EXPECT_EQ(graph.ids, (std::vector<std::uint32_t>{10, 20, 30}));
@@ -92,7 +92,7 @@ TEST(PoseGraph, TheInformationOfAQuaternionIsOfHalfAngles) {
   EXPECT_NEAR(std::sqrt(robot.odometry[0].covariance(2, 2)), 0.1, 0.002) << "the robot's x is ahead";
 }
 
-TEST(PoseGraph, OfEdgesOnlyHasTheVerticesThatTheyName) {
+TEST(PoseGraph, OfEdgesOnlyHasTheVerticesOfTheEdges) {
   const PoseGraph graph =
       parse_pose_graph("EDGE_SE2 5 6 1 0 0 1 0 0 1 0 1\nEDGE_SE2 6 7 1 0 0 1 0 0 1 0 1", "f").or_throw();
   EXPECT_EQ(graph.ids, (std::vector<std::uint32_t>{5, 6, 7}));

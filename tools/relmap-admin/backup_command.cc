@@ -36,8 +36,8 @@ Answer back_up_map(const Asked& asked, Context& context) {
   const auto backup = target->daemon ? target->daemon->backup(folder, daemon_progress(context))
                                      : back_up(context, *target->engine, folder);
   if (!backup.ok()) return {backup.status(), false, {}};
-  context.say(backup->folder + ": " + terminal::bytes_text(backup->bytes) +
-              ", all that was durable through journal record " + std::to_string(backup->durable_sequence));
+  context.say(backup->folder + ": " + terminal::bytes_text(backup->bytes) + ", everything up to journal record " +
+              std::to_string(backup->durable_sequence));
   Answer answer;
   answer.json.add("folder", backup->folder)
       .add("bytes", backup->bytes)
@@ -48,14 +48,15 @@ Answer back_up_map(const Asked& asked, Context& context) {
 }  // namespace
 
 void add_backup(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("backup", "copy a map into a new data folder, also beside a running daemon");
+  auto* command = app.add_subcommand("backup", "copy a map into a new data folder; the daemon may keep running");
   auto asked = std::make_shared<Asked>();
-  command->add_option("DIR", asked->first, "data folder; left out with --server")->required();
-  command->add_option("BACKUP", asked->second, "folder to make; with --server absolute, on the daemon's machine");
+  command->add_option("DIR", asked->first, "data folder of the map; leave it out with --server")->required();
+  command->add_option("BACKUP", asked->second,
+                      "folder to create; with --server an absolute path on the daemon's machine");
   command->footer(R"(
-All that was acknowledged before the command began is in the backup, which is a data folder that relmapd can open. It gets
-its name when it is complete. On the map's own file system it shares files with the map, where one bad sector damages
-both: put it on another disk, or copy it there.
+The backup has everything that was acknowledged before the command began. It is a data folder that relmapd can open, and
+gets its name only when it is complete. On the file system of the map it shares files with the map, so that one bad
+sector damages both: put it on another disk, or copy it there.
 
   relmap-admin backup /var/lib/relmap /backup/map-monday
   relmap-admin --server map.example:50070 backup /backup/map-monday)");

@@ -10,13 +10,13 @@ namespace relmap::admin {
 namespace {
 
 constexpr char kFooter[] = R"(
-DIR is the data folder of a map. If a running relmapd owns it, verify, backup, compact and stats are done by that daemon;
-repair, restore, migrate and reindex ask you to stop it first. --server names a daemon instead of a folder, also on another
-machine; paths given to it are paths there.
+DIR is the data folder of a map. If a running relmapd owns it, that daemon does verify, backup, compact and stats;
+repair, restore, migrate and reindex need it to be stopped first. --server names a daemon instead of a folder, which may
+be on another machine; paths are then paths on that machine.
 
-Data goes to stdout, everything else to stderr. With --json: for each finding a document, and one at the end that says
-how it went, in the case of failure too (keys reason and message).
-Exit codes: 0 fine; 1 failed; 2 wrong usage; 3 damage was found, or something was lost by it; 4 a process works on the
+Data goes to stdout, everything else to stderr. With --json each finding is a document, and the last document gives the
+outcome in the keys reason and message, also after a failure.
+Exit codes: 0 fine; 1 failed; 2 wrong usage; 3 damage was found, or data were lost to it; 4 another process owns the
 folder and must be stopped first; 5 no daemon answers; 130 interrupted.
 
 Examples:
@@ -33,10 +33,11 @@ void declare(CLI::App& app, Context& context, Action& action) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  app.add_option("--server", context.server, "a running daemon instead of a folder: HOST:PORT")->type_name("HOST:PORT");
-  app.add_flag("--json", context.console.json, "print answers as JSON, a document a line");
-  app.add_flag("-q,--quiet", context.quiet, "say nothing of progress");
-  app.add_option("--deadline", context.deadline_s, "seconds that a daemon's work may take")
+  app.add_option("--server", context.server, "address of a running daemon, instead of a folder")
+      ->type_name("HOST:PORT");
+  app.add_flag("--json", context.console.json, "print answers as JSON, one document a line");
+  app.add_flag("-q,--quiet", context.quiet, "show no progress");
+  app.add_option("--deadline", context.deadline_s, "time limit of work that a daemon does, in seconds")
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
   terminal::add_version(app);

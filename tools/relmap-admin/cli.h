@@ -7,19 +7,19 @@
 
 namespace relmap::admin {
 
-// What a run ends with.
+// Exit codes of the program.
 enum ExitCode : int {
   kFine = 0,
-  kFailed = 1,       // the reason is the first word on stderr
-  kUsage = 2,        // of the command line
-  kDamage = 3,       // there is damage, or something was lost by it
-  kOwned = 4,        // another process works on the folder, and this cannot be done beside it
+  kFailed = 1,       // the first word on stderr is the reason
+  kUsage = 2,        // wrong usage of the command line
+  kDamage = 3,       // damage was found, or data were lost to it
+  kOwned = 4,        // another process owns the folder and must be stopped first
   kUnreachable = 5,  // no daemon answers
   kInterrupted = 130,
 };
 ExitCode exit_code(const Answer& answer);
 
-// `terminal`: of `err`. Returns an ExitCode.
+// Runs one command line and returns an ExitCode. `terminal`: whether `err` is a terminal.
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal);
 
 }  // namespace relmap::admin

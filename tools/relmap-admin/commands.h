@@ -1,4 +1,4 @@
-// The commands. Each add_... declares its own on `app` and sets `action` when it is chosen.
+// The commands. Each add_...() declares its command on `app`; when the user chooses it, it sets `action`.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -17,19 +17,20 @@ namespace relmap::admin {
 struct Context {
   terminal::Console& console;
   terminal::ProgressBar& bar;
-  std::string server;     // --server; empty: none given
-  double deadline_s = 0;  // of work that a daemon does
+  std::string server;     // --server; empty if it is not given
+  double deadline_s = 0;  // time limit of work that a daemon does
   bool quiet = false;
 
+  // Shows progress on the bar, unless --quiet is given.
   void show(const std::string& step, std::uint64_t done, std::uint64_t total, const std::string& unit) const;
-  // The bar makes room; nothing is printed if the answer is JSON.
+  // Prints a line in place of the bar; nothing with --json.
   void say(const std::string& line) const;
 };
 
 struct Answer {
   Status status;
   bool damage = false;
-  Json json;  // beside reason and message
+  Json json;  // the answer's keys other than reason and message
 };
 using Action = std::function<Answer(Context&)>;
 

@@ -32,11 +32,11 @@ Answer compact_map(const std::string& directory, Context& context) {
 
 void add_compact(CLI::App& app, Action& action) {
   auto* command =
-      app.add_subcommand("compact", "give back the space of what was replaced; needs room for a copy meanwhile");
+      app.add_subcommand("compact", "give back disk space of replaced data; needs room for a copy meanwhile");
   auto directory = std::make_shared<std::string>();
   command->add_option("DIR", *directory, "data folder");
   command->footer(R"(
-RocksDB gives space back by itself, but late. This does it at once, beside a running daemon too.
+RocksDB gives space back by itself, but late. This command does it at once; a daemon may keep running.
 
   relmap-admin compact /var/lib/relmap)");
   command->callback(

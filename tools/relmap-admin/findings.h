@@ -1,4 +1,4 @@
-// Findings as the user sees them.
+// Prints findings and progress of verify and repair.
 #pragma once
 
 #include "storage/maintenance/finding.h"
@@ -6,10 +6,10 @@
 
 namespace relmap::admin {
 
-// A line, or with --json a document.
+// Prints a finding as a line, or with --json as a document.
 void print_finding(const Context& context, const storage::Finding& finding);
 
-// Of long work of storage/maintenance; false once interrupted.
+// Shows the progress of storage/maintenance on the bar. Returns false after an interrupt.
 storage::OnProgress maintenance_progress(const Context& context);
 
 }  // namespace relmap::admin

@@ -31,11 +31,11 @@ Answer migrate_map(const std::string& directory, Context& context) {
 }  // namespace
 
 void add_migrate(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("migrate", "bring a map of an older release's format up to this one's");
+  auto* command = app.add_subcommand("migrate", "convert a map of an older format to the current one");
   auto directory = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder that no daemon works on")->required();
+  command->add_option("DIR", *directory, "data folder; no daemon may own it")->required();
   command->footer(R"(
-The former map is kept beside the new one; delete it when the new one serves. Needs room for both.
+The former map is kept beside the new one, so there must be room for both. Delete it when the new one works.
 
   relmap-admin migrate /var/lib/relmap)");
   command->callback(

@@ -13,7 +13,7 @@ namespace {
 
 void print(const storage::ReindexSummary& s, const Context& context) {
   if (s.frames == 0) return context.say("the map has no frames yet: it takes any vocabulary");
-  if (!s.changed) return context.say("the words are this vocabulary's already, and as they were");
+  if (!s.changed) return context.say("the words are of this vocabulary already; nothing is changed");
   const auto n = [](std::uint64_t value) { return count_text(value); };
   context.bar.end();
   if (context.console.json) return;
@@ -25,7 +25,7 @@ void print(const storage::ReindexSummary& s, const Context& context) {
 Answer reindex_map(const std::string& directory, const std::string& vocabulary_path, Context& context) {
   if (!context.server.empty())
     return {Status(Reason::FOLDER_LOCKED,
-                   "a map is reindexed while no daemon works on it: stop the daemon, and run "
+                   "a map can be reindexed only while no daemon owns it: stop the daemon, and run "
                    "`relmap-admin reindex DIR` on its machine"),
             false,
             {}};
@@ -41,11 +41,10 @@ Answer reindex_map(const std::string& directory, const std::string& vocabulary_p
       *engine, words, (*vocabulary)->crc(), [&](const storage::Finding& finding) { print_finding(context, finding); },
       maintenance_progress(context));
   if (Status stopped = check_interrupt(); done.reason() == Reason::SHUTTING_DOWN && !stopped.ok())
-    return {{stopped.reason(), stopped.message() + ": no daemon serves the map until a reindex has come to its end"},
-            false,
-            {}};
+    return {
+        {stopped.reason(), stopped.message() + ": no daemon opens the map until a reindex has completed"}, false, {}};
   if (!done.ok()) return {done.status(), done.reason() == Reason::DATA_LOSS, {}};
-  // The places of the former words; the daemon would see that itself, and say so.
+  // The place index is of the former words. The daemon would notice that itself, with a warning.
   std::error_code ignored;
   if (done->changed) std::filesystem::remove_all(directory + "/places", ignored);
   print(*done, context);
@@ -62,7 +61,7 @@ Answer reindex_map(const std::string& directory, const std::string& vocabulary_p
     answer.status = Status(Reason::DATA_LOSS,
                            "the appearance of some frames is damaged; they are not recognised until "
                            "`relmap-admin repair " +
-                               directory + "` has seen to them");
+                               directory + "` has repaired them");
   return answer;
 }
 
@@ -70,19 +69,19 @@ Answer reindex_map(const std::string& directory, const std::string& vocabulary_p
 
 void add_reindex(CLI::App& app, Action& action) {
   auto* command =
-      app.add_subcommand("reindex", "make the words of a map anew, with another vocabulary; nothing else changes");
+      app.add_subcommand("reindex", "recompute the words of a map with another vocabulary; nothing else changes");
   auto directory = std::make_shared<std::string>();
   auto vocabulary = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder that no daemon works on");
+  command->add_option("DIR", *directory, "data folder; no daemon may own it");
   command->add_option("--vocabulary", *vocabulary, "visual vocabulary (default: the one shipped)")->type_name("FILE");
   command->footer(R"(
-A map keeps the features of its frames, and a word for each. A daemon with another vocabulary than the words were made
-with refuses the map (WRONG_VOCABULARY). This makes them anew: some hundred frames a second on each processor.
+A map keeps the features of its frames, and a word of the vocabulary for each. A daemon that has another vocabulary than
+the words are of refuses the map (WRONG_VOCABULARY). This command recomputes the words, some hundred frames a second on
+each processor. If they are of the given vocabulary already, it does nothing.
 
-Interrupted, it leaves a map that every daemon refuses until a reindex, with any vocabulary, has come to its end. If the
-words are this vocabulary's already, nothing is done.
-Exit code 0: done, or nothing to do. 1: NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION (the vocabulary, or the map),
-DISK_FULL, IO_ERROR. 3: DATA_LOSS, some of the map is damaged. 4: FOLDER_LOCKED, a daemon works on it. 130: interrupted.
+If it is interrupted, every daemon refuses the map until a reindex, with any vocabulary, has completed.
+Exit code 0: done, or nothing to do. 1: NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION (of the vocabulary or the map),
+DISK_FULL, IO_ERROR. 3: DATA_LOSS, some of the map is damaged. 4: FOLDER_LOCKED, a daemon owns it. 130: interrupted.
 
   relmap-admin reindex /var/lib/relmap
   relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab)");

@@ -41,7 +41,7 @@ bool lost(const storage::RepairSummary& s) {
 void print(const storage::RepairSummary& s, const Context& context) {
   context.bar.end();
   if (context.console.json) return;
-  if (!s.changed) return context.say("the map is sound, and as it was");
+  if (!s.changed) return context.say("the map is sound; nothing is changed");
   const auto n = [](std::uint64_t value) { return count_text(value); };
   context.console.facts({
       {"lost sessions", list(s.lost_sessions)},
@@ -49,7 +49,7 @@ void print(const storage::RepairSummary& s, const Context& context) {
       {"lost journal records", list(s.lost_records)},
       {"frames that lost", n(s.frames_without_observations) + " observations, " + n(s.frames_without_appearance) +
                                " appearance, " + n(s.frames_without_words) +
-                               " words (made anew at the daemon's start)"},
+                               " words (recomputed when the daemon starts)"},
       {"dropped",
        n(s.dropped_observations) + " observations and " + n(s.dropped_claims) + " claims of landmarks that are gone"},
       {"closures quarantined", n(s.quarantined_edges)},
@@ -63,7 +63,7 @@ void print(const storage::RepairSummary& s, const Context& context) {
 Answer repair_map(const std::string& directory, Context& context) {
   if (!context.server.empty())
     return {Status(Reason::FOLDER_LOCKED,
-                   "a map is mended while no daemon works on it: stop the "
+                   "a map can be repaired only while no daemon owns it: stop the "
                    "daemon, and run "
                    "`relmap-admin repair DIR` on its machine"),
             false,
@@ -93,7 +93,7 @@ Answer repair_map(const std::string& directory, Context& context) {
       .add("bridges", done->bridges)
       .add("rebuilt", done->rebuilt)
       .add("remaining", done->remaining);
-  if (answer.damage) answer.status = Status(Reason::DATA_LOSS, "the map is whole again, but not all could be saved");
+  if (answer.damage) answer.status = Status(Reason::DATA_LOSS, "the map is consistent again, but some data are lost");
   return answer;
 }
 
@@ -101,13 +101,13 @@ Answer repair_map(const std::string& directory, Context& context) {
 
 void add_repair(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("repair",
-                                     "mend a damaged map: broken things are "
-                                     "moved aside, derived ones rebuilt");
+                                     "repair a damaged map: move damaged data "
+                                     "aside, and rebuild derived data");
   auto directory = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder that no daemon works on");
+  command->add_option("DIR", *directory, "data folder; no daemon may own it");
   command->footer(R"(
-Exit code 0: nothing was lost. 3: not all could be saved, and the summary says what. Broken things are kept in
-DIR/quarantine. Interrupted, it can be run again.
+Damaged data are kept in DIR/quarantine. If the command is interrupted, run it again.
+Exit code 0: nothing was lost. 3: some data are lost; the summary lists them.
 
   relmap-admin repair /var/lib/relmap)");
   command->callback(

@@ -16,7 +16,7 @@ struct Asked {
   bool no_verify = false;
 };
 
-// Not ok: DATA_LOSS for damage.
+// Verifies the backup. DATA_LOSS if it is damaged.
 Status check_backup(const std::string& backup, const Context& context) {
   storage::RocksDbOptions options;
   options.read_only = true;
@@ -26,7 +26,7 @@ Status check_backup(const std::string& backup, const Context& context) {
   if (!summary.ok()) return summary.status();
   if (summary->findings == 0) return {};
   return Status(Reason::DATA_LOSS, backup + " is damaged (" + std::to_string(summary->findings) +
-                                       " findings) and was not restored; `relmap-admin repair` may mend it, and "
+                                       " findings) and was not restored; `relmap-admin repair` may repair it, and "
                                        "--no-verify restores it as it is");
 }
 
@@ -45,9 +45,9 @@ Answer restore(const Asked& asked, Context& context) {
   const auto restored = storage::restore_folder(asked.backup, asked.directory, static_cast<std::uint64_t>(now_us()),
                                                 engine_progress(context, "restoring"));
   if (!restored.ok()) return {restored.status(), false, {}};
-  context.say(asked.directory + ": restored" + (asked.no_verify ? ", not verified" : ", verified before"));
+  context.say(asked.directory + ": restored, " + (asked.no_verify ? "without verification" : "after verification"));
   if (!restored->unmarked.ok())
-    context.say("robots do not learn that it was restored: " + restored->unmarked.to_string());
+    context.say("robots will not learn that the map was restored: " + restored->unmarked.to_string());
   Answer answer;
   answer.json.add("folder", asked.directory).add("verified", !asked.no_verify);
   add_map(answer.json, restored->map);
@@ -58,15 +58,15 @@ Answer restore(const Asked& asked, Context& context) {
 
 void add_restore(CLI::App& app, Action& action) {
   auto* command =
-      app.add_subcommand("restore", "a data folder from a backup, which is verified first and stays as it is");
+      app.add_subcommand("restore", "make a data folder from a backup, which is verified first and not changed");
   auto asked = std::make_shared<Asked>();
-  command->add_option("BACKUP", asked->backup, "folder that backup made")->required();
-  command->add_option("DIR", asked->directory, "data folder to make; nothing may be there")->required();
-  command->add_flag("--no-verify", asked->no_verify, "copy the backup as it is, sound or not");
+  command->add_option("BACKUP", asked->backup, "folder made by `relmap-admin backup`")->required();
+  command->add_option("DIR", asked->directory, "data folder to create; it must be empty or not exist")->required();
+  command->add_flag("--no-verify", asked->no_verify, "copy the backup without verifying it");
   command->footer(R"(
-A damaged backup is refused with exit code 3. Nothing is linked: the restored folder shares nothing with the backup.
-Robots learn from its daemon that the map was restored: they bring again what they still have of what came after the
-backup, and say which keyframes are lost to it. (A folder that was copied by hand passes for the map itself.)
+A damaged backup is refused with exit code 3. The restored folder shares no files with the backup. Robots learn from its
+daemon that the map was restored. They send again what they still have of the keyframes after the backup, and declare
+the others as gaps. A folder that was copied by hand is taken for the map itself, and robots do neither.
 
   relmap-admin restore /backup/map-monday /var/lib/relmap)");
   command->callback([&action, asked] { action = [asked](Context& context) { return restore(*asked, context); }; });

@@ -7,7 +7,7 @@ namespace relmap::admin {
 
 namespace {
 
-// What the folder holds, and what of it is applied; without a daemon that is what the last commit says.
+// The statistics of a folder that no daemon owns, as of the last commit.
 Result<client::StoreStats> stats_of(std::shared_ptr<storage::Engine> engine) {
   const auto engine_stats = engine->stats();
   if (!engine_stats.ok()) return engine_stats.status();
@@ -88,7 +88,7 @@ Answer show_stats(const std::string& directory, Context& context) {
 }  // namespace
 
 void add_stats(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("stats", "sizes and counts of map and journal");
+  auto* command = app.add_subcommand("stats", "show sizes and counts of map and journal");
   auto directory = std::make_shared<std::string>();
   command->add_option("DIR", *directory, "data folder");
   command->footer(R"(

@@ -12,7 +12,7 @@ namespace relmap::admin {
 
 namespace {
 
-// "relmapd (process 4711) at 127.0.0.1:50070", as far as it is known.
+// Who owns the folder, as far as it is known: "relmapd (process 4711) at 127.0.0.1:50070".
 std::string owner_of(const std::string& directory) {
   const auto where = client::resolve_server(directory);
   if (!where.ok()) return storage::lock_owner(directory) + ", which serves no clients";
@@ -57,7 +57,8 @@ Result<Target> open_target(const Context& context, const std::string& directory,
   if (!daemon.ok())
     return Status(Reason::FOLDER_LOCKED,
                   directory + " is owned by " + owner_of(directory) + ": " + daemon.status().to_string());
-  if (!context.quiet) context.console.err() << directory << " is owned by " << owner_of(directory) << ": asking it\n";
+  if (!context.quiet)
+    context.console.err() << directory << " is owned by " << owner_of(directory) << ", which does the work\n";
   target.daemon = std::move(*daemon);
   return target;
 }

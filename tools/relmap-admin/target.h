@@ -1,4 +1,4 @@
-// What a command works on: a data folder that is ours while we do, or the daemon that owns it.
+// What a command works on: a data folder that this process owns meanwhile, or the daemon that owns it.
 #pragma once
 
 #include <memory>
@@ -12,26 +12,28 @@
 namespace relmap::admin {
 
 struct Target {
-  std::shared_ptr<storage::Engine> engine;  // or
+  // One of the two is set.
+  std::shared_ptr<storage::Engine> engine;
   std::unique_ptr<client::Client> daemon;
 };
 
 enum class Access { kRead, kWrite };
 
-// `directory` or --server: one of them must be given, else CLI::ValidationError. NO_SUCH_FILE: there is no map.
-// FOLDER_LOCKED: a process owns it that cannot be asked. UNREACHABLE.
+// Opens the map in `directory`, or connects to the daemon that owns it or that --server names. Throws
+// CLI::ValidationError unless exactly one of `directory` and --server is given. NO_SUCH_FILE if there is no map;
+// FOLDER_LOCKED if a process owns it that does not answer; UNREACHABLE.
 Result<Target> open_target(const Context& context, const std::string& directory, Access access);
 
-// The folder is nobody else's, and holds a map. FOLDER_LOCKED naming the daemon to stop, NO_SUCH_FILE.
+// Checks that the folder holds a map that no process owns. FOLDER_LOCKED with the daemon to stop; NO_SUCH_FILE.
 Status check_free(const std::string& directory);
 
-// Which map it is, as keys of an answer: "map_uuid" and "map_epoch", if it is known.
+// Adds the identity of the map, if it is known, as the keys "map_uuid" and "map_epoch".
 void add_map(Json& json, const MapIdentity& map);
 
-// The engine's progress on the bar; DEADLINE once interrupted.
+// Show the progress of an engine or of a daemon on the bar, and stop the work after an interrupt.
 storage::EngineProgress engine_progress(const Context& context, const std::string& step);
 client::OnProgress daemon_progress(const Context& context);
-// DEADLINE once interrupted.
+// DEADLINE after an interrupt.
 Status check_interrupt();
 
 }  // namespace relmap::admin

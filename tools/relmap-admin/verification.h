@@ -1,4 +1,4 @@
-// Verification of an engine that is ours, map and journal.
+// Verifies map and journal of an engine that this process has opened.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace relmap::admin {
 
-// Findings are printed as they come. Of a whole map that is sound also whether it is the one whose hash was recorded in
-// its folder. DEADLINE if interrupted.
+// Verifies the given sessions (empty: all) and prints each finding at once. If a whole map is sound, also compares it
+// with the hash that is recorded in its folder, if there is one. DEADLINE after an interrupt.
 Result<client::VerifySummary> verify_engine(const Context& context, const std::string& directory,
                                             const storage::Engine& engine, const std::vector<SessionNumber>& sessions);
 

@@ -59,7 +59,7 @@ Answer verify_map(const Asked& asked, Context& context) {
       .add("findings", summary->findings);
   if (answer.damage)
     answer.status = Status(Reason::DATA_LOSS, std::to_string(summary->findings) +
-                                                  " findings; `relmap-admin repair` mends what can be mended");
+                                                  " findings; `relmap-admin repair` repairs what can be repaired");
   return answer;
 }
 
@@ -99,12 +99,12 @@ Result<client::VerifySummary> verify_engine(const Context& context, const std::s
 }
 
 void add_verify(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("verify", "check every checksum, reference and count; changes nothing");
+  auto* command = app.add_subcommand("verify", "check every checksum, reference and count of a map; changes nothing");
   auto asked = std::make_shared<Asked>();
   command->add_option("DIR", asked->directory, "data folder");
-  command->add_option("--session", asked->sessions, "only frames of these sessions (numbers)");
+  command->add_option("--session", asked->sessions, "check only frames of these sessions (numbers)");
   command->footer(R"(
-Exit code 0: sound. 3: something was found; each finding is a line, or with --json a document.
+Prints each finding as a line, or with --json as a document. Exit code 0: the map is sound. 3: something was found.
 
   relmap-admin verify /var/lib/relmap
   relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')");

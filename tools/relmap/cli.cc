@@ -12,17 +12,18 @@ namespace relmap::cli {
 namespace {
 
 constexpr char kFooter[] = R"(
-SERVER is the data folder of a relmapd on this machine, or HOST:PORT; $RELMAP_SERVER if it is not given.
+--server names the daemon: the data folder of a relmapd on this machine, or HOST:PORT. Its default is $RELMAP_SERVER.
+A frame is written session:index, as 3:120; an edge session:index/ordinal, as 3:120/1.
 Data goes to stdout, everything else to stderr.
-Exit codes: 0 done; 1 the answer is no (its reason is the first word on stderr); 2 wrong usage; 3 no daemon answers, or
-ingest: keyframes were refused; 5 ingest: all is in the map, and some of it is not to be trusted.
+Exit codes: 0 done; 1 refused or failed (the first word on stderr is the reason); 2 wrong usage; 3 no daemon answers,
+or ingest: keyframes were refused; 5 ingest: everything is in the map, but some of it cannot be trusted.
 
 Examples:
   relmap --server /var/lib/relmap status
   relmap --server map.example:50070 sessions
   relmap top                             # robots, sessions, worker, memory, once a second
-  relmap session freeze survey-2026      # nothing in it moves any more
-  relmap session delete test-drive       # its frames leave the map, for good
+  relmap session freeze survey-2026      # takes no more keyframes, and is not adjusted any more
+  relmap session delete test-drive       # takes its frames out of the map, for good
   relmap localise left.png right.png --calibration calib.txt
   relmap match photo.jpg --thumbnails places/
   relmap match 2:17                      # which other places look like this frame?
@@ -31,8 +32,8 @@ Examples:
   relmap route --from left.png --to kitchen --by time
   relmap --json edges --state candidate | jq .edges[].id
   relmap edges --explain 1:340/1         # why a closure is in force, or not
-  relmap edge remove 1:340/1 --dry-run   # what would change without it?
-  relmap edge propose 2:17 5:77          # is that not the same place?
+  relmap edge remove 1:340/1 --dry-run   # what would its removal change?
+  relmap edge propose 2:17 5:77          # do these two frames show one place?
   relmap import g2o graph.g2o --loop-scale 2
   relmap ingest --source kitti ~/kitti/sequences/* --jobs 4
   relmap ingest lcmlog-2026-11-21.00     # what robots sent, as lcm-logger recorded it
@@ -50,11 +51,11 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.require_subcommand(1);
   app.fallthrough();
   terminal::add_version(app);
-  app.add_option("--server", options.server, "data folder of a daemon, or HOST:PORT")
+  app.add_option("--server", options.server, "the daemon: its data folder, or HOST:PORT")
       ->envname("RELMAP_SERVER")
       ->required();
-  app.add_flag("--json", options.json, "print each reply as canonical proto3 JSON, a document a line");
-  app.add_option("--deadline", options.deadline_s, "seconds that a question may take")
+  app.add_flag("--json", options.json, "print each reply as canonical proto3 JSON, one document a line");
+  app.add_option("--deadline", options.deadline_s, "time limit of each request, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
   for (const auto add :
@@ -71,7 +72,8 @@ ExitCode exit_code(const Status& status) {
 }
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
-  CLI::App app("Asks a relmap daemon: what is in the map, where am I, how do I get there.", "relmap");
+  CLI::App app("Asks a relmap daemon about its map (what is in it, where am I, how do I get there), and edits it.",
+               "relmap");
   GlobalOptions options;
   Action action;
   declare(app, options, action);

@@ -76,7 +76,7 @@ TEST(Cli, TheHelpOfEachCommandHasExamplesOfIt) {
   }
 }
 
-TEST(Cli, AMistypedCommandIsNamedWithWhatWasMeantAndTheVersionIsSaid) {
+TEST(Cli, AMistypedCommandGetsASuggestionAndTheVersionIsPrinted) {
   const Ran slip = run_with({"--server", "/tmp", "edge", "remov", "1:2/3"});
   EXPECT_EQ(slip.code, kUsage);
   EXPECT_TRUE(slip.err.starts_with("relmap edge has no command 'remov'. Did you mean remove?")) << slip.err;
@@ -105,7 +105,7 @@ TEST(Cli, WrongUsageIsToldApart) {
   }
 }
 
-TEST(Cli, WhatIsNoNumberIsSaidToBeNone) {
+TEST(Cli, AWordInPlaceOfANumberIsReported) {
   const Ran word = run_with({"--server", "/tmp", "edge", "remove", "1:2/3", "--shown", "x"});
   EXPECT_EQ(word.code, kUsage);
   EXPECT_TRUE(word.err.starts_with("--shown: 'x' is not a number\n")) << word.err;
@@ -126,7 +126,7 @@ TEST(ExitCode, FollowsTheReason) {
   EXPECT_EQ(exit_code({Reason::UNREACHABLE, "x"}), kUnreachable);
 }
 
-TEST(EyeNames, FoldersOfDataSetsGoBeforeWordsInAPicturesName) {
+TEST(EyeNames, FoldersOfDataSetsTakePrecedenceOverAPicturesName) {
   for (const char* right : {"mav0/cam1/data/1403715.png", "image_1/000001.png", "image_1/door_left.png",
                             "2011_09_26/image_03/data/0000000001.png", "drive/right/7.jpg", "Right.png",
                             "photos/front_right.png", "cam1.png"})
@@ -139,7 +139,7 @@ TEST(EyeNames, FoldersOfDataSetsGoBeforeWordsInAPicturesName) {
     EXPECT_EQ(eye_of_picture(neither), Eye::kNotSaid) << neither;
 }
 
-TEST(EyeNames, ACalibrationHasItsOwnNameAndThatOfItsFolder) {
+TEST(EyeNames, ACalibrationIsJudgedByItsNameAndItsFolder) {
   const storage::TemporaryFolder folder;
   const std::string in_folder = folder / "right";
   std::filesystem::create_directories(in_folder + "/robot");
@@ -168,7 +168,7 @@ TEST(PictureFile, SizeIsReadFromTheHeader) {
   EXPECT_EQ(jpeg_size->height, 375);
 }
 
-TEST(PictureFile, ThumbnailsAreWrittenOrSaidNotToBe) {
+TEST(PictureFile, ThumbnailsAreWrittenOrTheErrorIsReported) {
   const storage::TemporaryFolder folder;
   client::PlaceMatch place;
   place.frame = {3, 120};

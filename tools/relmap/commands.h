@@ -1,4 +1,4 @@
-// The commands. Each add_... declares its own on `app` and sets `action` when it is chosen.
+// The commands. Each add_...() declares its command on `app`; when the user chooses it, it sets `action`.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,7 +9,7 @@
 
 namespace relmap::cli {
 
-// What a command does once a daemon answers.
+// The work of a command, called with a connected client.
 using Action = std::function<Status(client::Client&, terminal::Console&)>;
 
 void add_status(CLI::App& app, Action& action);

@@ -1,4 +1,4 @@
-// What an operator does to loop closures.
+// relmap edge: an operator's edits of loop closures.
 #include <algorithm>
 #include <memory>
 #include <ostream>
@@ -14,14 +14,14 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr std::size_t kMaxShown = 20;  // closures, before a question that has to be seen beneath them
-constexpr std::size_t kMaxNamed = 8;   // in one line
+constexpr std::size_t kMaxShown = 20;  // closures in the table above a question, which must stay on the screen
+constexpr std::size_t kMaxNamed = 8;   // closures in one line
 
 struct EditOptions {
   std::string id;    // of a closure
   std::string a, b;  // frames
   bool accept = false;
-  bool yes = false, only_this = false;  // of a removal
+  bool yes = false, only_this = false;  // for a removal
   client::EditOptions how;
 };
 
@@ -34,8 +34,8 @@ const char* in_graph(const client::ClosureChange& change) {
   return change.edge_after ? "edge comes" : "edge goes";
 }
 
-// Which closures in force are edges of the graph, and which bind landmarks only, is decided anew with every edit: what
-// is put back may come as others than before.
+// Every edit decides anew which closures in force are edges of the graph and which only bind landmarks, so a restored
+// set may have other edges than before.
 void print_in_force(const client::EdgeEdit& edit, std::ostream& out) {
   std::vector<EdgeId> in_force, edges;
   for (const client::ClosureChange& change : edit.effect.closures) {
@@ -52,14 +52,14 @@ void print_in_force(const client::EdgeEdit& edit, std::ostream& out) {
         << ": they bind landmarks\n";
 }
 
-// At most `most` of the closures, if it is not 0.
-void print_effect(const client::EdgeEdit& edit, std::size_t most, terminal::Console& console) {
+// Prints at most `max_closures` of the closures; 0: all.
+void print_effect(const client::EdgeEdit& edit, std::size_t max_closures, terminal::Console& console) {
   std::ostream& out = console.out();
   out << edit.edge.id.to_string() << (edit.done ? ": " : " would be: ") << name_of(edit.edge.state) << ", "
       << reason_name(edit.edge.reason) << " (" << explanation(edit.edge.reason) << ")\n";
   std::vector<std::vector<std::string>> rows;
   for (const client::ClosureChange& change : edit.effect.closures) {
-    if (most > 0 && rows.size() == most) break;
+    if (max_closures > 0 && rows.size() == max_closures) break;
     rows.push_back({change.id.to_string(), change.a.to_string(), change.b.to_string(),
                     standing(change.before, change.reason_before), standing(change.after, change.reason_after),
                     in_graph(change), std::to_string(change.bound), std::to_string(change.bound_frames)});
@@ -89,20 +89,20 @@ struct Verb {
   const char* undone_by;
 };
 constexpr Verb kVerbs[] = {
-    {"restore", "put back what was taken out, with what went with it, as it was", client::EdgeAction::kRestore,
-     "remove"},
-    {"accept", "put it into force, whatever it is: it is never outvoted, and what cannot stand beside it goes",
+    {"restore", "undo a removal: the closure, and those removed with it, return to their former states",
+     client::EdgeAction::kRestore, "remove"},
+    {"accept", "put a closure into force for good: no vote takes it out, and closures that contradict it go",
      client::EdgeAction::kAccept, "withdraw"},
-    {"withdraw", "take an acceptance back: it, and what it put out, are what they were", client::EdgeAction::kWithdraw,
-     "accept"},
+    {"withdraw", "undo an accept: the closure, and those that it put out of force, return to their former states",
+     client::EdgeAction::kWithdraw, "accept"},
 };
 
 void add_how(CLI::App& command, client::EditOptions& how) {
-  command.add_option("--note", how.note, "why, for the journal");
-  command.add_flag("--dry-run", how.dry_run, "say what would change, and change nothing");
+  command.add_option("--note", how.note, "the reason for the edit, kept in the journal");
+  command.add_flag("--dry-run", how.dry_run, "print what would change, and change nothing");
 }
 
-// Closures beside the named one that an edit takes out.
+// The closures other than the named one that an edit takes out.
 std::vector<EdgeId> others_out(const client::EdgeEdit& edit) {
   std::vector<EdgeId> others;
   for (const client::ClosureChange& change : edit.effect.closures)
@@ -111,8 +111,8 @@ std::vector<EdgeId> others_out(const client::EdgeEdit& edit) {
   return others;
 }
 
-// What agrees with a closure goes with it. Whoever named one of them sees first which they are, and what he saw is what
-// may go (EditOptions::shown).
+// A removal takes out all closures that agree with the named one. Shows them to the operator and asks; only what was
+// shown may then be removed: returns its number for EditOptions::shown.
 Result<std::uint64_t> confirm_removal(EdgeId id, const client::EditOptions& how, client::Client& client,
                                       terminal::Console& console) {
   client::EditOptions dry = how;
@@ -153,33 +153,32 @@ Status remove(const EditOptions& options, client::Client& client, terminal::Cons
   if (console.json) return {};
   print(*edit, "relmap edge restore " + id->to_string(), console);
   if (edit->shown != 0)
-    console.err() << "to do this and nothing else: relmap edge remove " << id->to_string() << " --shown " << edit->shown
+    console.err() << "to remove exactly this: relmap edge remove " << id->to_string() << " --shown " << edit->shown
                   << '\n';
   return {};
 }
 
 void add_remove(CLI::App& edge, Action& action) {
-  auto* command = edge.add_subcommand("remove", "take it out, with those that agree with it and all that they bound");
+  auto* command = edge.add_subcommand("remove", "take a closure out of the map, with the closures that agree with it");
   auto options = std::make_shared<EditOptions>();
   command->add_option("ID", options->id, "session:index/ordinal")->required();
-  auto* const only_this =
-      command->add_flag("--only-this", options->only_this, "those that agree with it stay in force");
-  auto* const yes = command->add_flag("--yes", options->yes, "do not ask before others go with it: whatever goes now")
+  auto* const only_this = command->add_flag("--only-this", options->only_this,
+                                            "remove this one alone: those that agree with it stay in force");
+  auto* const yes = command->add_flag("--yes", options->yes, "do not ask: remove whatever agrees with it by now")
                         ->excludes(only_this);
   command
       ->add_option("--shown", options->how.shown,
-                   "do not ask: what goes is what a --dry-run showed, which gave this number")
+                   "do not ask: remove exactly what the --dry-run with this number showed")
       ->check(CLI::PositiveNumber)
       ->excludes(only_this)
       ->excludes(yes);
   add_how(*command, options->how);
   command->footer(
-      "What vouched for a wrong closure is as wrong, so all that agree with it go with it. Which they are is shown and "
-      "asked for on a terminal; elsewhere it is refused without --yes, --shown or --only-this (NOT_CONFIRMED, exit "
-      "code "
-      "1). A closure with which nothing goes is taken out at once. Where others would go by then than were shown, "
-      "nothing "
-      "is changed (WRONG_STATE): look again.\n"
+      "Closures that agree with a wrong one are as wrong, so they are removed with it, and so is all that they bound.\n"
+      "On a terminal the command shows them and asks. Elsewhere it is refused (NOT_CONFIRMED, exit code 1) unless\n"
+      "--yes, --shown or --only-this is given. If no other closure goes, nothing is asked. If the set has changed "
+      "since\n"
+      "it was shown, nothing is changed (WRONG_STATE): run the command again.\n"
       "Examples:\n"
       "  relmap edge remove 3:120/1 --dry-run   # what would change, and its number for --shown\n"
       "  relmap edge remove 3:120/1 --yes --note 'that is the other hall'\n"
@@ -191,7 +190,7 @@ void add_remove(CLI::App& edge, Action& action) {
   });
 }
 
-// The command that undoes an edit: what went alone goes alone again.
+// The command that undoes an edit. A closure that was removed alone is removed alone again.
 std::string undo_of(const Verb& verb, const client::EdgeEdit& edit) {
   const bool went_alone =
       std::any_of(edit.effect.closures.begin(), edit.effect.closures.end(), [&](const client::ClosureChange& change) {
@@ -222,15 +221,16 @@ void add_verb(CLI::App& edge, const Verb& verb, Action& action) {
 }
 
 void add_propose(CLI::App& edge, Action& action) {
-  auto* command = edge.add_subcommand("propose", "try geometry between two frames, and enter what it finds");
+  auto* command =
+      edge.add_subcommand("propose", "try to match two frames by geometry, and enter the closure that is found");
   auto options = std::make_shared<EditOptions>();
   command->add_option("A", options->a, "frame, session:index")->required();
-  command->add_option("B", options->b, "another, at the same place")->required();
-  command->add_flag("--accept", options->accept, "put it into force at once");
+  command->add_option("B", options->b, "another frame, at the same place")->required();
+  command->add_flag("--accept", options->accept, "put the closure into force at once");
   add_how(*command, options->how);
   command->footer(
-      "It is judged like any other: a candidate until another one agrees, unless --accept. The note goes with "
-      "--accept.\n"
+      "The closure is judged like any other: it stays a candidate until another one agrees, unless --accept is given.\n"
+      "--note is kept with an --accept only.\n"
       "Examples:\n"
       "  relmap edge propose 2:17 5:77 --dry-run\n"
       "  relmap edge propose 2:17 5:77 --accept --note 'I was there'");
@@ -253,7 +253,7 @@ void add_propose(CLI::App& edge, Action& action) {
 }  // namespace
 
 void add_edge(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("edge", "changes loop closures: out of the map, back in, into force, new ones");
+  auto* command = app.add_subcommand("edge", "edit loop closures: remove, restore, accept, withdraw, propose");
   command->require_subcommand(1);
   add_remove(*command, action);
   for (const Verb& verb : kVerbs) add_verb(*command, verb, action);
@@ -262,11 +262,11 @@ void add_edge(CLI::App& app, Action& action) {
       "Examples:\n"
       "  relmap edge remove 3:120/1 --dry-run\n"
       "  relmap edge remove 3:120/1 --note 'that is the other hall'\n"
-      "  relmap edge remove 3:120/1 --only-this   # what agrees with it stays\n"
+      "  relmap edge remove 3:120/1 --only-this   # those that agree with it stay\n"
       "  relmap edge restore 3:120/1\n"
       "  relmap edge accept 5:77/2 --note 'I was there'\n"
       "  relmap edge propose 2:17 5:77 --accept\n"
-      "Each edit says what it changed, and the command that undoes it.");
+      "Each edit prints what it changed, and the command that undoes it.");
 }
 
 }  // namespace relmap::cli

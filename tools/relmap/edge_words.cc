@@ -7,38 +7,39 @@ namespace relmap::cli {
 Result<EdgeId> edge_id(const std::string& text) {
   if (const auto id = EdgeId::parse(text)) return *id;
   return Status(Reason::INVALID_ARGUMENT,
-                "'" + text + "' is no edge; one is written session:index/ordinal, as 3:120/1");
+                "'" + text + "' is no edge; an edge is written session:index/ordinal, as 3:120/1");
 }
 
 const char* explanation(Reason reason) {
   switch (reason) {
     case Reason::CONSISTENT:
-      return "others of neighbouring frames say the same";
+      return "closures of neighbouring frames agree with it";
     case Reason::LONE:
-      return "nothing agrees with it yet";
+      return "no other closure agrees with it yet";
     case Reason::INCONSISTENT:
-      return "a larger set of closures says otherwise";
+      return "a larger set of closures contradicts it";
     case Reason::CONTRADICTS_MOTION:
-      return "the robot's own motion between its ends says otherwise";
+      return "the robot's own motion between its ends contradicts it";
     case Reason::ACCEPTED_BY_OPERATOR:
       return "an operator put it into force";
     case Reason::CARRIED:
-      return "others say the same: the robot was carried between its ends";
+      return "other closures agree: the robot was carried between its ends";
     case Reason::BEYOND_DOUBT:
       return "its geometry is strong, and no other place comes near it";
     case Reason::LOOKS_ALIKE:
-      return "the robot stood still in between, and pictures tell of another place that looks alike: it may have been "
-             "carried there";
+      return "the robot stood still in between, and pictures point to another place that looks alike: the robot may "
+             "have "
+             "been carried there";
     case Reason::AMBIGUOUS_PLACE:
       return "another place explains the picture about as well";
     case Reason::REMOVED_BY_OPERATOR:
       return "an operator took it out";
     case Reason::REMOVED_ALONE:
-      return "an operator took it out, and none of those that agree with it";
+      return "an operator took out this one alone, without those that agree with it";
     case Reason::REMOVED_WITH_SET:
       return "it agrees with one that an operator took out";
     case Reason::SESSION_DELETED:
-      return "it stands for the way through a session that was deleted";
+      return "it replaces the path through a session that was deleted";
     case Reason::MOTION:
       return "the robot's own motion";
     case Reason::DECLARED_GAP:
@@ -48,12 +49,12 @@ const char* explanation(Reason reason) {
   }
 }
 
-std::string ids_text(const std::vector<EdgeId>& ids, std::size_t most) {
+std::string ids_text(const std::vector<EdgeId>& ids, std::size_t max_ids) {
   std::string text;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (ids.size() > most && i == most / 2) {
+    if (ids.size() > max_ids && i == max_ids / 2) {
       text += " ...";
-      i = ids.size() - most / 2;
+      i = ids.size() - max_ids / 2;
     }
     text += ' ' + ids[i].to_string();
   }
@@ -92,10 +93,10 @@ std::string unmeasured_text(const client::Unmeasured& unmeasured, double distanc
 
 std::string uniqueness_text(const client::Uniqueness& found) {
   std::string text = !found.runner_up ? "geometry confirms no other place"
-                                      : "of other places " + found.runner_up->to_string() +
-                                            " fits best: " + std::to_string(found.runner_up_inliers) +
-                                            " inliers, probability " + fixed(found.runner_up_probability, 3) +
-                                            "; geometry confirms " + std::to_string(found.alike) + " elsewhere";
+                                      : "the best of the other places is " + found.runner_up->to_string() + ": " +
+                                            std::to_string(found.runner_up_inliers) + " inliers, probability " +
+                                            fixed(found.runner_up_probability, 3) + "; geometry confirms " +
+                                            std::to_string(found.alike) + " other places";
   if (found.differs) text += "; " + fixed(100 * *found.differs, 0) + " % of what both should show differs";
   if (found.compared > 0)
     text += "; of " + std::to_string(found.compared) + " parts of the picture " + std::to_string(found.changed) +

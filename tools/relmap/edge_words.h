@@ -1,4 +1,4 @@
-// Edges in words.
+// Texts about edges, for tables and messages.
 #pragma once
 
 #include <string>
@@ -8,24 +8,26 @@
 
 namespace relmap::cli {
 
-// "3:120/1". INVALID_ARGUMENT.
+// Parses "3:120/1". INVALID_ARGUMENT if `text` is not of that form.
 Result<EdgeId> edge_id(const std::string& text);
 
-// Why an edge is in its state; empty where its name says all.
+// Why an edge is in its state, as a clause; empty if the name of the reason says it all.
 const char* explanation(Reason reason);
 
-// " 3:120/1 3:121/1 ... 3:140/1": at most so many of them, the first and the last.
-std::string ids_text(const std::vector<EdgeId>& ids, std::size_t most);
+// " 3:120/1 3:121/1 ... 3:140/1": all, or the first and the last ones if there are more than `max_ids`.
+std::string ids_text(const std::vector<EdgeId>& ids, std::size_t max_ids);
 
 // "frames 3:50..3:70"
 std::string stretch_text(FrameId first, FrameId last);
-// "through a stretch in which the robot was carried: frames 3:50..3:70, frames ..."; empty: through none.
+// "through a stretch in which the robot was carried: frames 3:50..3:70, frames ..."; empty if there are no
+// stretches.
 std::string carried_text(const std::vector<client::CarriedStretch>& stretches);
 
-// "a guess along 3 steps that nothing measured, 9.12 of 9.86 m: frames 3:50..3:53"; empty: there are none.
+// "a guess along 3 steps that nothing measured, 9.12 of 9.86 m: frames 3:50..3:53"; empty if all steps were
+// measured.
 std::string unmeasured_text(const client::Unmeasured& unmeasured, double distance_m);
 
-// How far the recognised place stands out.
+// How clearly the recognised place stands out from other places.
 std::string uniqueness_text(const client::Uniqueness& uniqueness);
 
 }  // namespace relmap::cli

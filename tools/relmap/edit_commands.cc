@@ -1,4 +1,4 @@
-// Labels and loop closures: looked at and changed.
+// relmap label, labels and edges: labels are listed and edited, edges listed and explained.
 #include <cmath>
 #include <map>
 #include <memory>
@@ -46,8 +46,8 @@ struct Shown {
   client::Verification verification = client::Verification::kNone;
 };
 
-// The frame that a picture shows, if geometry confirms it. No route leads to photographs (mono sessions): they are
-// taken where nothing else shows the place, however well they fit.
+// The frame that a picture shows, if geometry confirms it. No route leads to photographs (mono sessions), so one of
+// them is returned only if no other frame shows the place, however well it fits.
 Result<Shown> find_shown(const client::View& view, client::Client& client, terminal::Console& console) {
   const auto matches = client.match_image(view, {});
   if (!matches.ok()) return matches.status();
@@ -63,12 +63,12 @@ Result<Shown> find_shown(const client::View& view, client::Client& client, termi
       if (place.unverified.ok() && !mono.contains(place.frame.session))
         return Shown{place.frame, place.inliers, place.verification};
   if (mono.empty()) return nothing;
-  // Photographs may have taken the others' place among the likeliest, or made the best doubtful.
+  // Photographs may have displaced other frames from the likeliest places, or made the best one ambiguous.
   if (const auto found = client.localise(view); found.ok())
     return Shown{found->frame, found->inliers, found->verification};
   if (!nothing.ok()) return nothing;
   const client::PlaceMatch& best = matches->places.front();
-  console.err() << "only photographs show this place: no route leads to session " << best.frame.session << '\n';
+  console.err() << "only photographs show this place; no route leads to them: session " << best.frame.session << '\n';
   return Shown{best.frame, best.inliers, best.verification};
 }
 
@@ -113,7 +113,7 @@ void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::
   out << '\n';
 }
 
-// Why an edge is what it is: its evidence, who agrees, and what became of it in the course of time.
+// Prints why an edge is in its state: its evidence, the closures that agree, and its history.
 Status explain(const std::string& text, client::Client& client, terminal::Console& console) {
   const auto id = edge_id(text);
   if (!id.ok()) return id.status();
@@ -129,7 +129,7 @@ Status explain(const std::string& text, client::Client& client, terminal::Consol
       << " degrees; sigma " << fixed(sigma(0), 3) << " m, " << fixed(kDegrees * sigma(3), 2) << " degrees\n";
   if (edge->state == client::EdgeState::kAccepted && edge->carries)
     out << "  carries   it is an edge of the graph, " << edge->support << " observations use it"
-        << (edge->prior_active ? ", too few: its prior holds it" : "") << '\n';
+        << (edge->prior_active ? ", too few: the prior of its measurement holds it" : "") << '\n';
   else
     out << "  carries   nothing: it "
         << (edge->state == client::EdgeState::kAccepted ? "binds landmarks only" : "is not in force") << '\n';
@@ -137,7 +137,7 @@ Status explain(const std::string& text, client::Client& client, terminal::Consol
     out << "  says      that the robot was carried: " << stretch_text(edge->carried->first, edge->carried->last)
         << '\n';
   if (!edge->carried_by.empty())
-    out << "  carried   the robot was carried along it, say" << ids_text(edge->carried_by, kMaxListed) << '\n';
+    out << "  carried   the robot was carried along it, according to" << ids_text(edge->carried_by, kMaxListed) << '\n';
   if (edge->kind != client::EdgeKind::kLoop) return {};
   out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
       << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
@@ -188,17 +188,19 @@ Status list_edges(const EdgesOptions& options, client::Client& client, terminal:
 }  // namespace
 
 void add_label(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("label", "gives a frame a name, or takes it off");
+  auto* command = app.add_subcommand("label", "give a frame a label, or remove the label");
   auto options = std::make_shared<LabelOptions>();
-  command->add_option("PLACE", options->place, "frame (session:index), or a picture: what it shows, if confirmed")
+  command
+      ->add_option("PLACE", options->place,
+                   "a frame (session:index), or a picture: the frame that it shows, if geometry confirms it")
       ->required();
-  command->add_option("NAME", options->name, "1..64 bytes, not only white space")->required();
-  command->add_flag("--remove", options->remove, "take it off");
+  command->add_option("NAME", options->name, "the label: 1 to 64 bytes, not only white space")->required();
+  command->add_flag("--remove", options->remove, "remove the label");
   add_view_options(*command, options->camera);
   command->footer(
-      "What a picture shows is a frame that routes lead to; one of a mono session, of photographs, only where no other "
-      "shows it,\n"
-      "which is told.\n"
+      "A picture labels the frame that it shows, one that routes lead to. If only photographs (a mono session) show "
+      "the\n"
+      "place, one of these is labelled, and a message says so.\n"
       "Examples:\n"
       "  relmap label 3:120 kitchen\n"
       "  relmap label photo.jpg 'Trafalgar Square'");
@@ -208,15 +210,15 @@ void add_label(CLI::App& app, Action& action) {
 }
 
 void add_labels(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("labels", "the names in the map, and their frames");
+  auto* command = app.add_subcommand("labels", "list labels and their frames");
   struct Asked {
     std::string prefix, words;
   };
   auto asked = std::make_shared<Asked>();
-  command->add_option("PREFIX", asked->prefix, "only those that begin with it, in upper or lower case");
-  command->add_option("--words", asked->words, "only those with words that begin so, as 'traf sq'");
+  command->add_option("PREFIX", asked->prefix, "only labels that begin with this, in upper or lower case");
+  command->add_option("--words", asked->words, "only labels with words that begin like these, as 'traf sq'");
   command->footer(
-      "Upper and lower case of a to z are the same.\n"
+      "Upper and lower case (a to z) are not distinguished.\n"
       "Examples:\n"
       "  relmap labels\n"
       "  relmap labels traf             # \"Traffic light\", and \"Trafalgar Square\"\n"
@@ -235,14 +237,15 @@ void add_labels(CLI::App& app, Action& action) {
 }
 
 void add_edges(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("edges", "edges of the map, loop closures among them");
+  auto* command = app.add_subcommand("edges", "list edges, loop closures among them");
   auto options = std::make_shared<EdgesOptions>();
-  auto* const state = command->add_option("--state", options->states, "only these states");
+  auto* const state = command->add_option("--state", options->states, "only edges in these states");
   state->check(CLI::IsMember({"candidate", "accepted", "quarantined", "removed"}))->delimiter(',');
   auto* const loops = command->add_flag("--loops", options->loops, "only loop closures");
-  auto* const session = command->add_option("--session", options->session, "with an end in this session");
-  auto* const frame = command->add_option("--frame", options->frame, "with this frame as an end");
-  command->add_option("--explain", options->explain, "one edge, session:index/ordinal: its evidence and history")
+  auto* const session = command->add_option("--session", options->session, "only edges with an end in this session");
+  auto* const frame = command->add_option("--frame", options->frame, "only edges with this frame as an end");
+  command
+      ->add_option("--explain", options->explain, "show the evidence and history of one edge (session:index/ordinal)")
       ->excludes(state, loops, session, frame);
   command->footer(
       "Examples:\n"

@@ -1,4 +1,4 @@
-// The map as files for other programs: its relaxed graph, or the chain of each session's odometry edges.
+// relmap export: writes the relaxed graph, or the chain of each session's odometry edges, as files for other programs.
 #include <algorithm>
 #include <memory>
 #include <ostream>
@@ -14,8 +14,8 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr std::size_t kMaxTold = 10;  // tears and doubtful steps of a part, on stderr
-// Pixels. A landmark that had less in its frame may be anywhere behind that distance.
+constexpr std::size_t kMaxTold = 10;  // tears and doubtful steps of a part that stderr lists
+// In pixels. A landmark with less disparity in its base frame may be anywhere beyond that distance.
 constexpr double kMinDisparity = 1;
 
 struct ExportOptions {
@@ -27,7 +27,7 @@ struct ExportOptions {
   bool placed = false;
 };
 
-// What was written, for stderr, or as JSON where stdout is free for it.
+// Reports what was written: as text on stderr, or as JSON on stdout (on stderr if stdout has the export itself).
 class Report {
  public:
   Report(const ExportOptions& options, const OutputFiles& files, terminal::Console& console)
@@ -37,7 +37,7 @@ class Report {
 
   struct Part {
     std::string file, root, title;   // "part 1 of 3: 195 frames in the frame of 1:0"
-    std::vector<std::string> notes;  // that no file has
+    std::vector<std::string> notes;  // what the file itself does not say
     std::vector<Tear> tears;
     std::vector<DoubtfulStep> doubtful;
     std::size_t frames = 0;
@@ -65,7 +65,8 @@ class Report {
   }
   void finish(const OutputFiles& files) {
     const std::vector<std::string> stale = files.left_behind();
-    for (const std::string& file : stale) advise(file + " is of an earlier export, and no part of this one.");
+    for (const std::string& file : stale)
+      advise(file + " was written by an earlier export and is no part of this one.");
     if (!stale.empty()) whole_.add("stale", stale);
     if (json_) out_ << whole_.add("files", files_).add("leftOut", left_out_).text() << '\n';
   }
@@ -123,7 +124,7 @@ std::string title_of(const RelaxedMap& map, std::size_t number) {
          part.root.to_string() + " (" + map.name(part.root.session) + ")";
 }
 
-// Landmarks of every part that is written, as lines of a PLY file, placed as they come.
+// The landmarks of every part that is written, as lines of a PLY file.
 struct Landmarks {
   std::vector<Spool> lines;
   std::vector<std::uint64_t> counts, too_far;
@@ -139,7 +140,7 @@ Result<Landmarks> place_landmarks(const RelaxedMap& map, std::size_t parts, cons
     for (const PlacedFrame& placed : map.parts[i].frames) part_of.emplace(placed.frame, i);
   }
   const auto take = [&](const client::ExportedFrame& frame) -> Status {
-    const auto part = part_of.find(frame.id);  // frames that came since the graph was read have no place
+    const auto part = part_of.find(frame.id);  // absent: the frame came after the graph was read
     if (part == part_of.end() || frame.landmarks.empty()) return {};
     const SE3& T_root_frame = *map.parts[part->second].find(frame.id);
     const StereoCamera& camera = map.graph.cameras.at(frame.id.session);
@@ -176,7 +177,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
     if (!frame.ok()) return frame.status();
     root = *frame;
   }
-  auto begun = files.begin("");  // what cannot be written is known before the work
+  auto begun = files.begin("");  // so that a file that cannot be written fails early
   if (!begun.ok()) return begun.status();
   auto graph = read_map_graph(
       {options.sessions, options.max_frames,
@@ -219,7 +220,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
                       part.tears,         part.doubtful,         part.frames.size()};
     if (options.format == "tum") {
       if (const std::size_t gone = write_tum(*map, i, times, out); gone > 0)
-        told.notes.push_back(counted_text(gone, "frame") + " went out of the map meanwhile: left out");
+        told.notes.push_back(counted_text(gone, "frame") + " left out: deleted from the map meanwhile");
     } else if (options.format == "kitti") {
       write_kitti(part, out);
       for (const std::string& run : numbering(part, 1)) told.notes.push_back("lines " + run);
@@ -230,17 +231,18 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
       told.landmarks = with_landmarks ? landmarks.counts[i] : 0;
       if (with_landmarks && landmarks.too_far[i] > 0)
         told.notes.push_back(count_text(landmarks.too_far[i]) +
-                             " landmarks are left out: with less than a pixel of disparity they may be anywhere");
+                             " landmarks left out, since less than a pixel of disparity does not tell where they are");
       write_ply_head(*map, i, told.landmarks, out);
       if (with_landmarks)
         if (Status status = landmarks.lines[i].copy_to(out); !status.ok()) return status;
       write_ply_tail(*map, i, out);
     } else {
-      // Only the part that the place was said of lies there.
+      // The geodetic place is that of the first part's root.
       const bool located = options.placed && i == 0;
       write_geojson(*map, i, located ? std::optional(options.place) : std::nullopt, out);
       if (!located)
-        told.notes.push_back("no coordinates on the Earth are known: features have no geometry, but metresInRoot");
+        told.notes.push_back(
+            "no coordinates on the Earth are known, so features have metresInRoot instead of a geometry");
     }
     report.add(told);
   }
@@ -277,8 +279,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, termin
         sessions.push_back(std::move(session));
   }
   std::stable_sort(sessions.begin(), sessions.end(), [](const auto& x, const auto& y) { return x.frames > y.frames; });
-  const bool replies =
-      console.json && files.is_standard_output();  // they carry the bytes, and name the session of each
+  const bool replies = console.json && files.is_standard_output();  // the replies carry the bytes and their sessions
   if (files.takes_one() && !replies && sessions.size() > 1) chosen = {sessions[0].number};
   const auto format = options.format == "kitti" ? client::ExportFormat::kKitti : client::ExportFormat::kTum;
   std::map<SessionNumber, Report::Part> parts;
@@ -287,7 +288,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, termin
   Status status = client.export_trajectories(format, chosen, [&](const client::TrajectoryPiece& piece) -> Status {
     const auto found = std::find_if(sessions.begin(), sessions.end(),
                                     [&](const client::Session& session) { return session.number == piece.session; });
-    if (found == sessions.end()) return {};  // it came since the sessions were listed
+    if (found == sessions.end()) return {};  // the session began after the sessions were listed
     Report::Part& part = parts[piece.session];
     if (begun != piece.session) {
       begun = piece.session;
@@ -329,29 +330,34 @@ Status write_chains(const ExportOptions& options, client::Client& client, termin
 
 void add_export(CLI::App& app, Action& action) {
   auto* command =
-      app.add_subcommand("export", "the map's relaxed graph, or each session's odometry edges chained, as files");
+      app.add_subcommand("export", "write the map's relaxed graph, or each session's chained odometry edges, to files");
   auto options = std::make_shared<ExportOptions>();
-  command->add_option("--format", options->format, "tum, kitti, g2o, ply or geojson")
+  command->add_option("--format", options->format, "format of the files: tum, kitti, g2o, ply or geojson")
       ->check(CLI::IsMember({"tum", "kitti", "g2o", "ply", "geojson"}))
       ->capture_default_str();
-  command->add_option("--session", options->sessions, "only these (number or name)");
-  command->add_option("--out", options->out, "a file; stdout if it is not given, or -");
+  command->add_option("--session", options->sessions, "export only these sessions (number or name)");
+  command->add_option("--out", options->out,
+                      "file to write (default, and -: stdout); further parts get names of their own beside it");
   auto* root = command->add_option("--root", options->root,
-                                   "a frame, as 3:120: its part comes first, and is in its coordinates");
-  auto* chain = command->add_flag("--chain", options->chain,
-                                  "tum, kitti: each session's odometry edges as the map has refined them, chained from "
-                                  "its first frame; no loop closure holds across the chain");
+                                   "a frame, as 3:120: its part comes first, in the coordinates of this frame");
+  auto* chain =
+      command->add_flag("--chain", options->chain,
+                        "tum, kitti: write each session's odometry edges, as the map has refined them, chained "
+                        "from its first frame; the chain does not close loops");
   chain->excludes(root);
-  command->add_flag("!--no-landmarks", options->landmarks, "ply: frames and edges only");
-  command->add_option("--max-frames", options->max_frames, "refuse to relax more; 200,000 take minutes")
+  command->add_flag("!--no-landmarks", options->landmarks, "ply: write frames and edges only");
+  command
+      ->add_option("--max-frames", options->max_frames, "refuse to relax more frames than this; 200,000 take minutes")
       ->capture_default_str();
-  auto* latitude = command->add_option("--latitude", options->place.latitude, "geojson: of the root, degrees")
+  auto* latitude = command->add_option("--latitude", options->place.latitude, "geojson: latitude of the root, degrees")
                        ->check(CLI::Range(-85.0, 85.0));
-  auto* longitude = command->add_option("--longitude", options->place.longitude, "geojson: likewise")
-                        ->check(CLI::Range(-180.0, 180.0));
+  auto* longitude =
+      command->add_option("--longitude", options->place.longitude, "geojson: longitude of the root, degrees")
+          ->check(CLI::Range(-180.0, 180.0));
   auto* heading = command->add_option("--heading", options->place.heading,
-                                      "geojson: where the root looks, degrees from north to east");
-  command->add_option("--altitude", options->place.altitude, "geojson: of the root, metres above the ellipsoid")
+                                      "geojson: direction in which the root looks, degrees from north towards east");
+  command
+      ->add_option("--altitude", options->place.altitude, "geojson: altitude of the root, metres above the ellipsoid")
       ->needs(latitude);
   latitude->needs(longitude, heading);
   longitude->needs(latitude, heading);
@@ -363,18 +369,23 @@ void add_export(CLI::App& app, Action& action) {
       "  relmap export --format kitti --chain --session 1 > chain.txt\n"
       "  relmap export --format ply --out map.ply                  # frames and landmarks\n"
       "  relmap export --format geojson --latitude 51.508 --longitude -0.128 --heading 90 --out map.geojson\n"
-      "The graph is relaxed: one frame for each part that hangs together, that of its root. Parts that are not\n"
-      "connected go into files of their own, named by their roots; stdout takes one part. Files and stderr list tears\n"
-      "(edges that the relaxed poses are more than 6 sigmas off), steps that nothing measured, and stretches in which\n"
-      "the robot was carried. kitti has no comments: they are on stderr only. A map knows no place on the Earth:\n"
-      "geojson has coordinates only if it is told the root's, and else local metres as properties.\n"
-      "Neither is the robot's own odometry, which stays in the map as the robot told it: relmap frame shows it.");
+      "The graph is relaxed: all poses of a connected part are given in the frame of its root. Parts that are not\n"
+      "connected go into files of their own, named by their roots; stdout takes one part only. Files and stderr list\n"
+      "tears (edges that the relaxed poses contradict by more than 6 sigmas), steps that nothing measured, and "
+      "stretches\n"
+      "in which the robot was carried. A kitti file has no room for comments, so these are on stderr only. The map "
+      "does\n"
+      "not know where it lies on the Earth: geojson has coordinates only if --latitude, --longitude and --heading of "
+      "the\n"
+      "root are given, else metres in the root's frame as properties.\n"
+      "The robot's own odometry, as it was sent, is not exported; relmap frame shows it.");
   command->callback([&action, options, latitude] {
     const bool trajectory = options->format == "tum" || options->format == "kitti";
     if (options->chain && !trajectory)
-      throw CLI::ValidationError("--chain", "is of tum and kitti; " + options->format + " is the relaxed graph");
+      throw CLI::ValidationError("--chain",
+                                 "is for tum and kitti; " + options->format + " is always the relaxed graph");
     if (latitude->count() > 0 && options->format != "geojson")
-      throw CLI::ValidationError("--latitude", "is of geojson; " + options->format + " is in the frame of its root");
+      throw CLI::ValidationError("--latitude", "is for geojson; " + options->format + " is in the frame of its root");
     options->placed = latitude->count() > 0;
     action = [options](client::Client& client, terminal::Console& console) {
       OutputFiles files(options->out, console.out());

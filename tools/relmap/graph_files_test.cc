@@ -129,7 +129,7 @@ TEST(GraphFiles, TumIsTheRelaxedGraphInTheFrameOfItsRoot) {
   EXPECT_EQ(rows_of(out.str()).size(), 5u);
 }
 
-TEST(GraphFiles, KittiHasTheSamePosesAndNoWords) {
+TEST(GraphFiles, KittiHasTheSamePosesAndNoComments) {
   const RelaxedMap map = relaxed(0);
   const std::string text = text_of([&](std::ostream& out) { write_kitti(map.parts[0], out); });
   EXPECT_THAT(text, Not(HasSubstr("#")));
@@ -168,7 +168,7 @@ TEST(GraphFiles, G2oCanBeReadBack) {
   EXPECT_THAT(g2o(relaxed(0, FrameId{1, 3}), 0), HasSubstr("FIX 3\n"));
 }
 
-TEST(GraphFiles, TearsAndGuessesAreListedInEachFormatThatHasRoomForWords) {
+TEST(GraphFiles, TearsAndGuessesAreListedInEachFormatWithComments) {
   const RelaxedMap map = relaxed(3);
   ASSERT_GE(map.parts[0].tears.size(), 1u);
   EXPECT_GT(map.parts[0].tears[0].sigmas, kTearSigmas);
@@ -232,7 +232,7 @@ TEST(GraphFiles, GeojsonWithoutAPlaceOnTheEarthHasNoCoordinates) {
   EXPECT_THAT(geojson(map, 1), HasSubstr("\"metresInRoot\":[[0.0000,0.0000,0.0000]]"));
 }
 
-TEST(GraphFiles, GeojsonLiesWhereItsRootWasPut) {
+TEST(GraphFiles, GeojsonIsLocatedByItsRoot) {
   const RelaxedMap map = relaxed(0);
   // The root looks east: the second frame, 2 m before it, is 2 m to the east.
   const std::string text = geojson(map, 0, Geodetic{51.5, -0.12, 90, {}});

@@ -1,4 +1,4 @@
-// Graphs that others made, into the map.
+// relmap import: pose graphs of other programs become sessions of the map.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kMaxListed = 8;
 constexpr double kMaxStepUs = 3.6e9;
-constexpr std::int64_t kBeginUs = 946'684'800'000'000;  // 2000-01-01: the file says nothing of time
+constexpr std::int64_t kBeginUs = 946'684'800'000'000;  // 2000-01-01, since the file has no times
 
 struct G2oOptions {
   std::string file, robot = "imported", name;
@@ -28,7 +28,7 @@ struct G2oOptions {
   double step_metres = 0, step_radians = 0, step_scale = 1, loop_scale = 1, speed = 1;
 };
 
-// The same file with the same numbers is the same session, so that a broken import goes on where it stopped.
+// The same file with the same numbers gives the same session, so that an interrupted import can be continued.
 SessionUuid session_of(const g2o::PoseGraph& graph, const G2oOptions& options) {
   std::uint32_t crc[4] = {crc32c(as_bytes(options.name)), crc32c(as_bytes(options.robot)), 0, 0};
   const double numbers[] = {options.step_metres, options.step_radians, options.step_scale, options.loop_scale,
@@ -68,7 +68,7 @@ Matrix6 step_covariance(const g2o::PoseGraph::Edge& step, const G2oOptions& opti
   return covariance;
 }
 
-// All frames, each where the odometry alone puts it; its time is what the way takes.
+// All frames, each posed by the odometry alone; times follow from the distance and options.speed.
 std::vector<client::GraphPiece::Frame> frames_of(const g2o::PoseGraph& graph, const G2oOptions& options) {
   std::vector<client::GraphPiece::Frame> frames;
   for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
@@ -129,7 +129,7 @@ std::string listed(const std::vector<std::size_t>& lines) {
   return text + (lines.size() > kMaxListed ? ", ..." : "");
 }
 
-// What of the file does not become a part of the map, and why.
+// Tells which lines of the file are left out of the map, and why.
 void tell_left_out(const g2o::PoseGraph& graph, std::ostream& err) {
   if (!graph.self_edges.empty())
     err << graph.self_edges.size() << " edges from a frame to itself are refused (INVALID_ARGUMENT): line"
@@ -144,7 +144,7 @@ void tell_left_out(const g2o::PoseGraph& graph, std::ostream& err) {
   }
   const std::size_t gaps = graph.poses.size() - 1 - graph.odometry.size();
   if (gaps > 0)
-    err << gaps << " steps without odometry: the vertices say where they lead, and the map trusts them little\n";
+    err << gaps << " steps have no odometry: they are taken from the vertices, and the map trusts them little\n";
 }
 
 Status import_g2o(const G2oOptions& asked, client::Client& client, terminal::Console& console) {
@@ -194,8 +194,9 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, terminal::Con
        {"loops", n(graph->loops.size()) + " proposed, " + n(graph->parallel_loops.size()) +
                      " more between the same frames left out"},
        {"accepted", n(states[client::EdgeState::kAccepted])},
-       {"candidates", n(states[client::EdgeState::kCandidate]) + ": " + n(contradicted) +
-                          " are contradicted by the odometry between their ends, with the others nothing agrees yet"},
+       {"candidates",
+        n(states[client::EdgeState::kCandidate]) + ": " + n(contradicted) +
+            " are contradicted by the odometry between their ends; no other loop agrees with the rest yet"},
        {"quarantined", n(states[client::EdgeState::kQuarantined]) + ": outvoted"}});
   return {};
 }
@@ -203,39 +204,45 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, terminal::Con
 }  // namespace
 
 void add_import(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("import", "brings a graph that others made into the map");
+  auto* command = app.add_subcommand("import", "import a pose graph of another program as a session");
   command->require_subcommand(1);
   command->footer("Example:\n  relmap import g2o graph.g2o --loop-scale 2");
-  auto* g2o = command->add_subcommand("g2o", "a pose graph in g2o's text format: frames and edges, no pictures");
+  auto* g2o =
+      command->add_subcommand("g2o", "import a pose graph in g2o's text format: frames and edges, without pictures");
   auto options = std::make_shared<G2oOptions>();
-  g2o->add_option("FILE", options->file,
-                  "VERTEX_SE2 and EDGE_SE2, of a robot that looks along x of the plane, y to its left; or "
-                  "VERTEX_SE3:QUAT and EDGE_SE3:QUAT")
+  g2o->add_option(
+         "FILE", options->file,
+         "file of VERTEX_SE2 and EDGE_SE2 (a robot that looks along x, with y to its left), or of VERTEX_SE3:QUAT "
+         "and EDGE_SE3:QUAT")
       ->required();
-  g2o->add_option("--name", options->name, "of the session; else the file's");
-  g2o->add_option("--robot", options->robot, "whose it is")->capture_default_str();
+  g2o->add_option("--name", options->name, "name of the session (default: the name of the file)");
+  g2o->add_option("--robot", options->robot, "robot that the session belongs to")->capture_default_str();
   g2o->add_flag("--robot-axes", options->robot_axes,
-                "poses in space are x ahead, y left, z up; else x right, y down, z ahead");
+                "SE3 poses have x ahead, y left, z up (default: x right, y down, z ahead)");
   const CLI::Range positive(1e-3, 1e3), sigma(1e-9, 1e3);
-  g2o->add_option("--step-metres", options->step_metres, "standard deviation of the odometry, instead of the file's")
+  g2o->add_option("--step-metres", options->step_metres,
+                  "standard deviation of an odometry step's translation, instead of the file's")
       ->check(sigma);
-  g2o->add_option("--step-radians", options->step_radians, "likewise")->check(sigma);
-  g2o->add_option("--step-scale", options->step_scale, "times the file's standard deviations")
+  g2o->add_option("--step-radians", options->step_radians,
+                  "standard deviation of an odometry step's rotation, instead of the file's")
+      ->check(sigma);
+  g2o->add_option("--step-scale", options->step_scale, "factor for the file's standard deviations of odometry steps")
       ->check(positive)
       ->capture_default_str();
-  g2o->add_option("--loop-scale", options->loop_scale, "likewise, of the loops")
+  g2o->add_option("--loop-scale", options->loop_scale, "factor for the file's standard deviations of loops")
       ->check(positive)
       ->capture_default_str();
-  g2o->add_option("--speed", options->speed, "metres a second, for the times that the file does not have")
+  g2o->add_option("--speed", options->speed,
+                  "speed in metres a second from which times are computed, since the file has none")
       ->check(positive)
       ->capture_default_str();
   g2o->footer(
-      "Consecutive vertices become a session, in the order of their numbers; other edges are proposed as loop "
-      "closures:\n"
-      "accepted where others say the same, refused where the odometry or more of them say otherwise. Of several "
-      "between\n"
-      "the same two frames the first counts. With --json: {\"graph\": {...}}, what the file says, and the edges.\n"
-      "The same import again continues one that was broken off.\n\n"
+      "The vertices become a session, in the order of their numbers. Edges between consecutive vertices are its "
+      "odometry;\n"
+      "all others are proposed as loop closures, and the map accepts those that agree with each other and with the\n"
+      "odometry. Of several loops between the same two frames only the first is proposed.\n"
+      "--json prints {\"graph\": {...}} with the counts of the file, then the loop closures.\n"
+      "The same command again continues an import that was interrupted.\n\n"
       "Examples:\n"
       "  relmap import g2o parking-garage.g2o --robot-axes\n"
       "  relmap import g2o Bovisa04.g2o --step-metres 0.04 --step-radians 0.003 --loop-scale 2");

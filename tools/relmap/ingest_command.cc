@@ -1,4 +1,4 @@
-// relmap ingest: recordings into the map, many at a time.
+// relmap ingest: takes recordings into the map, several at a time.
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -42,18 +42,19 @@ std::string default_summaries() {
   return base + "/relmap/ingest";
 }
 
-// Places are looked up, and loops closed, after keyframes are in the map. Robots that drive meanwhile keep the daemon
-// busy: after a minute without getting nearer to the end the map is told as it is. `answered`: when it last said how
-// far it is.
+// Waits until places are looked up and loops closed, which happens after keyframes are in the map. Robots that drive
+// meanwhile may keep the daemon busy for ever, so the wait ends after a minute without progress. `answered` becomes the
+// time of the daemon's last answer.
 Status wait_for_loops(client::Client& client, terminal::Console& console, Clock::time_point& answered) {
-  constexpr std::chrono::minutes kNoNearer{1};
+  constexpr std::chrono::minutes kMaxStandstill{1};
   terminal::ProgressBar bar(console.err(), terminal::is_terminal());
-  std::uint64_t most = 0, least = UINT64_MAX;
-  auto nearer = Clock::now();
+  std::uint64_t max_left = 0, min_left = UINT64_MAX;
+  auto progressed = Clock::now();
   while (!terminal::interrupted()) {
-    if (Clock::now() - nearer >= kNoNearer) {
-      console.err() << "places of " << counted_text(least, "frame")
-                    << " wait to be recognised, and for a minute that came no nearer; the map is told as it is now\n";
+    if (Clock::now() - progressed >= kMaxStandstill) {
+      console.err()
+          << "the places of " << counted_text(min_left, "frame")
+          << " still wait to be recognised, without progress for a minute; the report is of the map as it is\n";
       break;
     }
     const auto status = client.status();
@@ -61,12 +62,12 @@ Status wait_for_loops(client::Client& client, terminal::Console& console, Clock:
     answered = Clock::now();
     const std::uint64_t left = status->queued + status->lookup_lag + status->pending_frames;
     if (left == 0 && status->applied_sequence == status->durable_sequence) break;
-    most = std::max(most, left);
-    if (left < least) {
-      least = left;
-      nearer = Clock::now();
+    max_left = std::max(max_left, left);
+    if (left < min_left) {
+      min_left = left;
+      progressed = Clock::now();
     }
-    bar.show("recognising places and relaxing what they close", most - left, most, "frames");
+    bar.show("recognising places and relaxing what they close", max_left - left, max_left, "frames");
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
   return {};
@@ -76,8 +77,8 @@ struct MapNow {
   std::vector<client::Session> sessions = {};
   std::vector<client::Edge> loops = {};
   std::vector<client::DoubtfulCamera> doubts = {};
-  std::string boot = {};  // whose doubts these are; empty: they are not known
-  Status status = {};     // why some of it is not known
+  std::string boot = {};  // boot id of the daemon that reported `doubts`; empty: they are not known
+  Status status = {};     // why some of this is not known
 };
 
 MapNow map_now(client::Client& client) {
@@ -101,11 +102,11 @@ bool is_away(const Status& status) {
   return status.reason() == Reason::UNREACHABLE || status.reason() == Reason::SHUTTING_DOWN;
 }
 
-// One that answered when the command began is waited for, as front-ends wait for it.
+// The sessions of the map. Waits up to `patience` for a daemon that is away, as front-ends do.
 Result<std::vector<client::Session>> known_sessions(client::Client& client, Clock::duration patience,
                                                     terminal::Console& console) {
   auto sessions = client.sessions();
-  if (is_away(sessions.status())) console.err() << sessions.status().to_string() << "; it is waited for\n";
+  if (is_away(sessions.status())) console.err() << sessions.status().to_string() << "; waiting for it\n";
   for (const auto begun = Clock::now();
        is_away(sessions.status()) && !terminal::interrupted() && Clock::now() - begun < patience;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
@@ -114,8 +115,8 @@ Result<std::vector<client::Session>> known_sessions(client::Client& client, Cloc
   return sessions;
 }
 
-// Once all is in the map. The daemon may have been started anew meanwhile, at another port: front-ends look for it
-// there, and so is it done here. While none answers, or one that ends, it is waited for, but not for ever.
+// The map after the last recording. The daemon may have been restarted meanwhile, at another port, so it is looked up
+// again, as front-ends do. If it does not answer, or is shutting down, waits for it up to `patience`.
 MapNow map_at_rest(const client::Client& client, Clock::duration patience, terminal::Console& console) {
   bool told = false;
   for (auto answered = Clock::now();;) {
@@ -128,7 +129,7 @@ MapNow map_at_rest(const client::Client& client, Clock::duration patience, termi
       now.status = found.status();
     }
     if (!is_away(now.status) || terminal::interrupted() || Clock::now() - answered >= patience) return now;
-    if (!std::exchange(told, true)) console.err() << now.status.to_string() << "; it is waited for\n";
+    if (!std::exchange(told, true)) console.err() << now.status.to_string() << "; waiting for it\n";
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
 }
@@ -140,17 +141,17 @@ void print(const std::vector<batch::ReportRow>& rows, double wall_s, terminal::C
     batch::print_report(rows, console);
 }
 
-// What a front-end by itself would say first: nobody reads all that those of a batch say.
+// Tells what a front-end by itself would say first; the output of those in a batch is not shown.
 void tell_supposed(const std::vector<batch::Sequence>& sequences, std::ostream& err) {
   for (const batch::Sequence& sequence : sequences)
     if (sequence.supposed_rate_hz > 0)
       err << sequence.path << ": nothing tells the times of its pairs (no times.txt); "
           << number_text(sequence.supposed_rate_hz)
-          << " pairs a second are supposed, and speeds and travel times are of "
-          << "that\n";
+          << " pairs a second are assumed, and speeds and travel times follow "
+          << "from that\n";
 }
 
-// What lies in a folder of photographs and is not taken in.
+// Tells which folders and files in a folder of photographs are not taken in.
 void tell_passed_over(const std::vector<batch::Sequence>& sequences, std::ostream& err) {
   std::string told;
   for (const batch::Sequence& sequence : sequences) {
@@ -170,7 +171,7 @@ void tell_passed_over(const std::vector<batch::Sequence>& sequences, std::ostrea
   }
 }
 
-// The identities of an interrupted --again, but for recordings that have changed since: these become other sessions.
+// Continues the sessions of an interrupted --again. A recording that has changed since becomes another new session.
 Status take_up(const batch::AgainRecord& again, const batch::BatchOptions& options,
                const std::vector<client::Session>& known, std::vector<batch::Sequence>& sequences, std::ostream& err) {
   const batch::SummaryStore store(options.summaries, options.map);
@@ -181,12 +182,12 @@ Status take_up(const batch::AgainRecord& again, const batch::BatchOptions& optio
     const std::string change = batch::change_since(*session, sequence, options.recordings.mono, store.read(uuid));
     if (change.empty()) return false;
     err << sequence.session << ": of the interrupted --again " << change << ": it becomes another new session; relmap "
-        << "session delete " << session->number << " takes out what was made then\n";
+        << "session delete " << session->number << " removes the unfinished one\n";
     return true;
   });
 }
 
-// Why some recordings are not in the map, and which command takes them in; ok: all are. `again`: so were they taken in.
+// Why some recordings are not in the map, and which command takes them in; ok if all are. `again`: --again was given.
 Status failure_of(const std::vector<batch::Task>& tasks, bool again) {
   std::size_t failed = 0, changed = 0, deleted = 0;
   Reason first = Reason::OK;
@@ -214,7 +215,7 @@ Status failure_of(const std::vector<batch::Task>& tasks, bool again) {
   return {first, what};
 }
 
-// With one that does not answer in the end. A front-end may have lost patience with it already.
+// How long to wait at the end for a daemon that does not answer: not at all if a front-end has given it up already.
 Clock::duration patience_with_daemon(const std::vector<batch::Task>& tasks, const batch::BatchOptions& how) {
   const bool lost = std::any_of(tasks.begin(), tasks.end(),
                                 [](const batch::Task& task) { return task.failure.reason() == Reason::UNREACHABLE; });
@@ -234,7 +235,7 @@ Status ingest(const IngestOptions& options, client::Client& client, terminal::Co
   if (!sequences.ok()) return sequences.status();
   tell_passed_over(*sequences, console.err());
   tell_supposed(*sequences, console.err());
-  terminal::watch_interrupts();  // what came before is ended by the signal itself
+  terminal::watch_interrupts();  // until here, a signal simply ends the program
   const auto known = known_sessions(client, as_duration(how.patience_s), console);
   if (!known.ok()) return known.status();
   std::optional<batch::AgainRecord> again;
@@ -273,59 +274,66 @@ Status ingest(const IngestOptions& options, client::Client& client, terminal::Co
 
 void add_ingest(CLI::App& app, Action& action) {
   auto* command =
-      app.add_subcommand("ingest", "take recordings into the map, many at a time; goes on where it was interrupted");
+      app.add_subcommand("ingest", "take recordings into the map, several at a time; resumes where it was interrupted");
   auto options = std::make_shared<IngestOptions>();
   batch::BatchOptions& how = options->batch;
   how.jobs = usual_jobs();
   how.summaries = default_summaries();
   command->add_option("PATH", options->paths, "recordings: folders of pictures, files of keyframes, logs of lcm-logger")
       ->required();
-  command->add_option("--source", how.recordings.source, "what they are; auto: what they look like")
+  command->add_option("--source", how.recordings.source, "kind of the recordings; auto recognises it")
       ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "raw", "lcmlog"}))
       ->capture_default_str();
-  auto* const jobs = command->add_option("--jobs", how.jobs, "recordings at a time")
+  auto* const jobs = command->add_option("--jobs", how.jobs, "recordings taken in at a time")
                          ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))
                          ->capture_default_str();
   command
       ->add_flag(
           "--deterministic", options->deterministic,
-          "one after the other, in the order given, by a daemon that was started with it: the same map every time, "
-          "however often it is interrupted")
+          "take them in one after the other, in the order given, so that the map is the same every time, even after "
+          "interruptions; needs relmapd --deterministic")
       ->excludes(jobs);
-  command->add_option("--robot", how.recordings.robot,
-                      "whose they are (default: as recorded in logs and files of keyframes, else batch)");
-  command->add_option("--calibration", how.recordings.calibration, "for folders that hold none");
-  command->add_flag("--mono", how.recordings.mono,
-                    "photographs, a session for each camera that took them: places without metres, that relmap match "
-                    "finds and relmap "
-                    "localise does not");
+  command->add_option(
+      "--robot", how.recordings.robot,
+      "robot that the sessions belong to (default: as recorded in logs and files of keyframes, else batch)");
+  command->add_option("--calibration", how.recordings.calibration,
+                      "calibration for folders of pictures that hold none");
+  command->add_flag(
+      "--mono", how.recordings.mono,
+      "the folders hold photographs of single cameras: a session for each camera, without scale; relmap match "
+      "finds places in it, relmap localise does not");
   command->add_flag("--again", how.recordings.again,
-                    "as new sessions, though the map may have them; interrupted, it goes on");
+                    "make new sessions, even of recordings that the map has; resumes if interrupted");
   command->add_flag("--despite-check", how.despite_check,
-                    "take recordings in though their first pairs show that the eyes are wrong; ends with 5");
-  command->add_option("--patience", how.patience_s, "seconds without progress before a recording is given up")
+                    "take recordings in even if their first pairs show that the stereo pair is wrong; exit code 5");
+  command
+      ->add_option("--patience", how.patience_s,
+                   "give a recording up if the daemon makes no progress for so many seconds")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   command->footer(
-      "The same command goes on where it was interrupted. It ends when places are recognised and loops closed, or "
-      "after a\n"
-      "minute in which that came no nearer. What recordings were, and what became of them, is kept in\n"
-      "$XDG_STATE_HOME/relmap/ingest (~/.local/state/relmap/ingest), a file for each session.\n\n"
-      "A recording that is not what its session is made of any more (other pictures, more of them, another\n"
-      "calibration) fails with SEQUENCE_CONFLICT: --again takes it in as a new session.\n\n"
+      "Each recording becomes a session; a recording that is in the map already is left out. After an interruption, "
+      "give\n"
+      "the same command again: it resumes. The command ends when places are recognised and loops closed, or after a\n"
+      "minute without progress in that. A summary of each recording is kept in $XDG_STATE_HOME/relmap/ingest\n"
+      "(~/.local/state/relmap/ingest), one file for each session.\n\n"
+      "A recording that has changed since its session was made (other pictures, more of them, another calibration) "
+      "fails\n"
+      "with SEQUENCE_CONFLICT; --again takes it in as a new session.\n\n"
       "Examples:\n"
       "  relmap ingest --source kitti ~/kitti/sequences/* --jobs 4\n"
-      "  relmap ingest lcmlog-2026-11-21.00             # sessions as lcm-logger recorded them\n"
-      "  relmap ingest keyframes.bin                    # robot and session as it records them\n"
-      "  relmap ingest --mono photos/ --robot phone     # a session for each camera; folders in it are named apart\n"
+      "  relmap ingest lcmlog-2026-11-21.00             # the sessions that lcm-logger recorded\n"
+      "  relmap ingest keyframes.bin                    # robot and session as recorded in the file\n"
+      "  relmap ingest --mono photos/ --robot phone     # a session for each camera; subfolders are passed over\n"
       "  relmap ingest --deterministic drive-1 drive-2  # the same map every time; needs relmapd --deterministic\n"
       "  relmap --json ingest drive/ | jq '.sequences[] | select(.error)'\n"
-      "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers,\n"
-      "or keyframes were refused (the report begins with it; what a recording itself lacks does not count);\n"
-      "5 all are in the map, and some are not to be trusted: fewer than 80 % of the pairs that there should be were\n"
-      "measured, or the eyes are not as the calibration says, or the map contradicts it (WRONG_CALIBRATION). A\n"
-      "recording whose eyes are plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD) fails before any of it is in the "
-      "map.");
+      "Exit codes: 0 all recordings are in the map; 1 some failed, or the command was interrupted; 2 wrong usage;\n"
+      "3 no daemon answers, or the daemon refused keyframes (the report begins with these; keyframes that a recording\n"
+      "itself lacks do not count); 5 all are in the map, but some cannot be trusted: fewer than 80 % of the expected "
+      "pairs\n"
+      "were measured, or the cameras or the map contradict the calibration (WRONG_CALIBRATION). A recording whose "
+      "stereo\n"
+      "pair is plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD) fails before any of it is in the map.");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
     if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";

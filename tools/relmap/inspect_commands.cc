@@ -1,4 +1,4 @@
-// What is stored: frames, and the transform between two of them.
+// relmap frame and transform: one frame, and the transform between two frames.
 #include <cmath>
 #include <memory>
 
@@ -37,14 +37,14 @@ void print(const client::Frame& f, terminal::Console& console) {
 }  // namespace
 
 void add_frame(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("frame", "one frame");
+  auto* command = app.add_subcommand("frame", "show one frame: its edges, labels and counts");
   auto id = std::make_shared<std::string>();
   command->add_option("ID", *id, "session:index")->required();
   command->footer(
       "Example:\n  relmap frame 3:120\n"
-      "robot's odometry: where the robot took itself to be, in its own frame; the map never changes it, and relmap "
-      "export\n"
-      "(--chain, or relaxed) gives what the map has made of it.");
+      "\"robot's odometry\" is the pose that the robot sent, in its own odometry frame. The map never changes it; "
+      "relmap\n"
+      "export gives the poses as the map has refined them.");
   command->callback([&action, id] {
     action = [id](client::Client& client, terminal::Console& console) -> Status {
       const auto frame_id = parse_frame(*id);
@@ -58,7 +58,7 @@ void add_frame(CLI::App& app, Action& action) {
 }
 
 void add_transform(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("transform", "the pose of frame B in frame A");
+  auto* command = app.add_subcommand("transform", "compute the pose of frame B in frame A");
   auto ids = std::make_shared<std::pair<std::string, std::string>>();
   command->add_option("A", ids->first, "session:index")->required();
   command->add_option("B", ids->second, "session:index")->required();

@@ -1,4 +1,4 @@
-// A picture of the map: its graph relaxed, each part in a frame of its own, for the eye.
+// relmap map: draws the relaxed graph, each connected part by itself.
 #include <memory>
 #include <ostream>
 
@@ -116,24 +116,26 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
 }  // namespace
 
 void add_map(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("map", "draws the map, relaxed for the eye");
+  auto* command = app.add_subcommand("map", "draw the map as an SVG or PNG picture");
   auto options = std::make_shared<MapOptions>();
-  command->add_option("--out", options->out, "FILE.svg or FILE.png")->required();
-  command->add_option("--title", options->title, "above the picture")->capture_default_str();
-  command->add_option("--width", options->width, "of a PNG, pixels")
+  command->add_option("--out", options->out, "picture to write: FILE.svg or FILE.png")->required();
+  command->add_option("--title", options->title, "title above the picture")->capture_default_str();
+  command->add_option("--width", options->width, "width of a PNG, pixels")
       ->check(CLI::Range(600, 4800))
       ->capture_default_str();
-  command->add_option("--only", options->sessions, "only these sessions (number or name)");
-  command->add_flag("--removed", options->removed, "draw removed loop closures, too");
-  auto* query = command->add_option("--query", options->query, "a picture to localise and draw");
-  command->add_option("--query-right", options->query_right, "its right eye")->needs(query);
+  command->add_option("--only", options->sessions, "draw only these sessions (number or name)");
+  command->add_flag("--removed", options->removed, "draw also loop closures that were removed");
+  auto* query = command->add_option("--query", options->query, "localise this picture, and draw where it was taken");
+  command->add_option("--query-right", options->query_right, "the right picture of a pair whose left one is --query")
+      ->needs(query);
   add_route_options(*command, options->route, false);
   add_view_options(*command, options->camera);
   command->footer(
       "Examples:\n"
       "  relmap map --out map.png\n"
       "  relmap map --out map.svg --from 1:0 --to kitchen --only morning\n"
-      "Mono sessions (photographs) have no scale of their own and are not drawn: the legend counts them.");
+      "--from and --to draw a route.\n"
+      "Mono sessions (photographs) have no scale of their own and are not drawn; the legend counts them.");
   command->callback([&action, options] {
     action = [options](client::Client& client, terminal::Console& console) { return draw(*options, client, console); };
   });

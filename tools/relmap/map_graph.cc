@@ -43,7 +43,8 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
         if (session.frames > 0) ++graph.mono_sessions;
         continue;
       }
-      return {Reason::NOT_STEREO, "session " + std::to_string(session.number) + " is of one camera: nothing joins it"};
+      return {Reason::NOT_STEREO,
+              "session " + std::to_string(session.number) + " is a mono session: nothing connects its frames"};
     }
     graph.names[session.number] = session.name;
     graph.cameras[session.number] = session.camera;
@@ -54,7 +55,7 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
   if (frames > choice.max_frames)
     return {Reason::BUDGET_EXCEEDED, count_text(frames) + " frames are too many to be relaxed (" +
                                          count_text(choice.max_frames) + " at most); " + choice.advice};
-  // Of a few sessions of a large map only what concerns them.
+  // Of a large map, only the edges of the chosen sessions are read.
   std::set<SessionNumber> listed;
   std::vector<client::EdgeFilter> questions(chosen.empty() ? 1 : 0);
   for (const SessionNumber number : chosen) questions.emplace_back().session = number;
@@ -63,7 +64,8 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
     if (!edges.ok()) return edges.status();
     for (client::Edge& edge : *edges) {
       if (!graph.names.contains(edge.a.session) || !graph.names.contains(edge.b.session)) continue;
-      if (listed.contains(edge.a.session) || listed.contains(edge.b.session)) continue;  // it was among that one's
+      if (listed.contains(edge.a.session) || listed.contains(edge.b.session))
+        continue;  // listed with that session already
       graph.frames.insert({edge.a, edge.b});
       graph.edges.push_back(std::move(edge));
     }

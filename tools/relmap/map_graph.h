@@ -16,7 +16,7 @@ struct MapGraph {
   std::map<SessionNumber, StereoCamera> cameras;
   std::set<FrameId> frames;
   std::vector<client::Edge> edges;  // between those frames, of every state
-  std::size_t mono_sessions = 0;    // left out, for none was chosen: nothing joins their frames, which know no metres
+  std::size_t mono_sessions = 0;    // left out: nothing connects their frames, which have no scale
 
   std::vector<SessionNumber> sessions() const;
 };
@@ -24,19 +24,21 @@ struct MapGraph {
 inline bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }
 
 struct GraphChoice {
-  std::vector<std::string> sessions;  // numbers or names; none: all but mono sessions, whose frames nothing joins
-  std::size_t max_frames = 0;         // that can be relaxed in a reasonable time
+  std::vector<std::string> sessions;  // numbers or names; empty: all except mono sessions
+  std::size_t max_frames = 0;         // more are refused, since relaxation would take too long
   std::string advice;                 // what to do if there are more: "choose sessions with --only"
 };
-// Beyond it nobody sees anything, and relaxation takes minutes.
+// With more frames a picture shows nothing useful, and relaxation takes minutes.
 inline constexpr std::size_t kMaxRelaxedFrames = 200000;
 
-// "3 mono sessions (photographs) have no scale of their own and are not drawn"
+// "3 mono sessions (photographs) have no scale of their own and are not drawn"; `done` is "drawn".
 std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
-// EMPTY_MAP, of a graph without frames: "there is nothing to draw", and what is not drawn.
+// The refusal of a graph without frames (EMPTY_MAP): "there is nothing to draw", and how many mono sessions there are.
+// `verb` is "draw", `done` is "drawn".
 Status nothing_to_place(const MapGraph& graph, const std::string& verb, const std::string& done);
 
-// NO_SUCH_SESSION; NOT_STEREO: a mono session was chosen; BUDGET_EXCEEDED: more frames than `max_frames`.
+// Reads the graph of the chosen sessions. NO_SUCH_SESSION; NOT_STEREO if a mono session was chosen; BUDGET_EXCEEDED if
+// there are more than `max_frames` frames.
 Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, terminal::Console& console);
 
 }  // namespace relmap::cli

@@ -1,4 +1,4 @@
-// Where the parts of an export go: one file for each, or standard output for one of them.
+// The output of an export: one file for each part, or standard output for one part.
 #pragma once
 
 #include <fstream>
@@ -12,31 +12,31 @@
 
 namespace relmap::cli {
 
-// Of the file for the part in the frame of `root`: "2-0".
+// The suffix of the file whose part has the root `root`: "2-0".
 std::string part_suffix(FrameId root);
 
-// Files are written beside their names, and what was there stays until finish(). A device or a pipe is written as it
-// comes.
+// Files are written under temporary names and replace what was there in finish(). A device or a pipe is written
+// directly.
 class OutputFiles {
  public:
-  // `path` empty or "-": standard output.
+  // An empty `path`, or "-", is standard output.
   OutputFiles(std::string path, std::ostream& standard_output);
-  ~OutputFiles();  // without finish() nothing has changed
+  ~OutputFiles();  // without finish(), discards what was written
   OutputFiles(const OutputFiles&) = delete;
   OutputFiles& operator=(const OutputFiles&) = delete;
 
-  // It takes one part only: standard output, a device, a pipe.
+  // Whether there is room for one part only: on standard output, a device or a pipe.
   bool takes_one() const { return in_place_; }
   bool is_standard_output() const { return path_.empty(); }
-  // The path itself for no suffix; else with the suffix before its ending: "map.tum", and "map.2-0.tum" for "2-0".
-  // Standard output: "-".
+  // The name of the file of a part: the path itself for an empty suffix, else with the suffix before the extension, as
+  // "map.2-0.tum" for "map.tum" and "2-0". "-" for standard output.
   std::string name(const std::string& suffix) const;
-  // The stream of the part with this suffix, until the next begins. IO_ERROR.
+  // Begins the part with this suffix. Its stream is valid until the next begin() or finish(). IO_ERROR.
   Result<std::ostream*> begin(const std::string& suffix);
-  // All files get their names. IO_ERROR.
+  // Gives all files their final names. IO_ERROR.
   Status finish();
-  // Files that are called as parts of this export and were not written by it: an earlier one had more parts. Sorted;
-  // after finish().
+  // After finish(): the files that are named like parts of this export but were left by an earlier one, which had more
+  // parts. Sorted.
   std::vector<std::string> left_behind() const;
 
  private:
@@ -46,15 +46,15 @@ class OutputFiles {
   std::ostream& standard_output_;
   bool in_place_ = true;
   std::ofstream file_;
-  std::vector<std::string> names_;  // of files that lie beside them
+  std::vector<std::string> names_;  // final names of the files that still have temporary ones
   std::vector<std::string> written_;
 };
 
-// What belongs into a file and cannot be written there yet: bytes on disk, which go with it. No file is held open, so
-// that there may be any number of them.
+// Bytes that cannot be written to their file yet, kept on disk until the object is destroyed. No file is held open, so
+// there may be any number of spools.
 class Spool {
  public:
-  // `beside`: a file in whose folder it is to be; empty: in the folder for temporary files.
+  // The spool lies in the folder of the file `beside`; if that is empty, in the folder for temporary files.
   explicit Spool(const std::string& beside);
   ~Spool();
   Spool(Spool&& other) noexcept;

@@ -54,7 +54,7 @@ TEST(OutputFiles, PartsOfAnEarlierExportAreKnown) {
   EXPECT_EQ(files.left_behind(), (std::vector<std::string>{folder / "map.1-0.tum"}));
 }
 
-TEST(OutputFiles, WhatIsGivenUpLeavesEverythingAsItWas) {
+TEST(OutputFiles, AnAbandonedExportChangesNothing) {
   const storage::TemporaryFolder folder;
   write(folder / "map.tum", "old");
   std::ostringstream standard_output;
@@ -67,7 +67,7 @@ TEST(OutputFiles, WhatIsGivenUpLeavesEverythingAsItWas) {
   EXPECT_EQ(files_in(folder / ""), 1u);
 }
 
-TEST(OutputFiles, StandardOutputAndDevicesTakeOne) {
+TEST(OutputFiles, StandardOutputAndDevicesTakeOnePart) {
   std::ostringstream standard_output;
   for (const char* name : {"", "-"}) {
     OutputFiles files(name, standard_output);
@@ -94,7 +94,7 @@ TEST(OutputFiles, WhatCannotBeWrittenIsNamed) {
   EXPECT_EQ(full.finish().reason(), Reason::IO_ERROR);
 }
 
-TEST(Spool, KeepsBytesUntilTheyAreWantedAndNothingBehind) {
+TEST(Spool, KeepsBytesAndLeavesNoFileBehind) {
   const storage::TemporaryFolder folder;
   {
     Spool spool(folder / "map.ply"), empty(folder / "map.ply");

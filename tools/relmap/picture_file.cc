@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uintmax_t kMaxBytes = 16u << 20;
 
-// Big-endian; 0 beyond the end.
+// A big-endian number at `at`; 0 beyond the end.
 std::uint32_t number(std::string_view file, std::size_t at, std::size_t bytes) {
   if (at + bytes > file.size()) return 0;
   std::uint32_t value = 0;
@@ -19,7 +19,7 @@ std::uint32_t number(std::string_view file, std::size_t at, std::size_t bytes) {
   return value;
 }
 
-// Start of frame: C0..CF but the tables DHT (C4), JPG (C8) and DAC (CC).
+// Whether the marker is a start of frame: C0..CF, except DHT (C4), JPG (C8) and DAC (CC).
 bool is_frame(std::uint32_t marker) {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
@@ -38,7 +38,7 @@ Result<std::string> read_picture_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (error || !in) return {Reason::NO_SUCH_FILE, path + " cannot be read"};
   if (size > kMaxBytes)
-    return {Reason::PICTURE_TOO_LARGE, path + " has " + std::to_string(size) + " bytes; at most 16 MB"};
+    return {Reason::PICTURE_TOO_LARGE, path + " has " + std::to_string(size) + " bytes; at most 16 MB are taken"};
   return std::string(std::istreambuf_iterator<char>(in), {});
 }
 
@@ -60,7 +60,7 @@ Status write_thumbnails(std::span<const client::PlaceMatch> places, const std::s
 
 Result<PixelSize> pixel_size(std::string_view file) {
   if (file.starts_with("\x89PNG\r\n\x1a\n")) return checked(number(file, 16, 4), number(file, 20, 4));
-  if (!file.starts_with("\xff\xd8")) return {Reason::NOT_A_PICTURE, "neither JPEG nor PNG"};
+  if (!file.starts_with("\xff\xd8")) return {Reason::NOT_A_PICTURE, "the file is neither JPEG nor PNG"};
   for (std::size_t at = 2; at + 4 <= file.size();) {
     const std::uint32_t marker = number(file, at, 2);
     if (marker == 0xffff) {  // a fill byte

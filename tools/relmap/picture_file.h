@@ -1,4 +1,4 @@
-// Pictures as files: their bytes, and how large they say they are.
+// Picture files: their bytes, and the size that their header tells.
 #pragma once
 
 #include <span>
@@ -10,16 +10,16 @@
 
 namespace relmap::cli {
 
-// NO_SUCH_FILE; PICTURE_TOO_LARGE: more than the 16 MB that a daemon takes.
+// The bytes of the file. NO_SUCH_FILE; PICTURE_TOO_LARGE if it has more than the 16 MB that a daemon takes.
 Result<std::string> read_picture_file(const std::string& path);
 
-// DIR/3-120.jpg for frame 3:120; makes the folder. IO_ERROR, with the path and why.
+// Writes a thumbnail for each place, FOLDER/3-120.jpg for frame 3:120, and creates the folder. IO_ERROR.
 Status write_thumbnails(std::span<const client::PlaceMatch> places, const std::string& folder);
 
 struct PixelSize {
   int width = 0, height = 0;
 };
-// From the header of a JPEG or PNG. NOT_A_PICTURE, PICTURE_DAMAGED.
+// The size of a JPEG or PNG, read from its header. NOT_A_PICTURE, PICTURE_DAMAGED.
 Result<PixelSize> pixel_size(std::string_view file);
 
 }  // namespace relmap::cli

@@ -1,4 +1,4 @@
-// Where was this seen, and which places could it be?
+// relmap localise and match: where a picture was taken, and which places it could show.
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -33,17 +33,18 @@ std::string focal_length_text(const std::optional<double>& estimated) {
 
 void print(const client::Localisation& found, terminal::Console& console) {
   const Vector6 sigma = found.covariance.diagonal().cwiseSqrt();
-  console.facts({{"frame", found.frame.to_string()},
-                 {"position in it",
-                  terminal::vector_text(found.T_frame_view.t) + " m, sigmas " + terminal::vector_text(sigma.head<3>())},
-                 {"rotation in it", terminal::vector_text(so3_log(found.T_frame_view.R)) + " rad, sigmas " +
-                                        terminal::vector_text(sigma.tail<3>())},
-                 {"inliers", std::to_string(found.inliers) + " (" + name_of(found.verification) + "), over " +
-                                 fixed(100 * found.spread, 0) + " % of the picture" +
-                                 focal_length_text(found.estimated_focal_length)},
-                 {"probability", found.near_prior ? std::string("not asked for: it is near the frame that was named")
-                                                  : fixed(found.probability, 4) + " by appearance; a new place " +
-                                                        fixed(found.new_place, 4)}});
+  console.facts(
+      {{"frame", found.frame.to_string()},
+       {"position in it",
+        terminal::vector_text(found.T_frame_view.t) + " m, sigmas " + terminal::vector_text(sigma.head<3>())},
+       {"rotation in it", terminal::vector_text(so3_log(found.T_frame_view.R)) + " rad, sigmas " +
+                              terminal::vector_text(sigma.tail<3>())},
+       {"inliers", std::to_string(found.inliers) + " (" + name_of(found.verification) + "), over " +
+                       fixed(100 * found.spread, 0) + " % of the picture" +
+                       focal_length_text(found.estimated_focal_length)},
+       {"probability",
+        found.near_prior ? std::string("not computed: the view was found near the frame given by --near")
+                         : fixed(found.probability, 4) + " by appearance; a new place " + fixed(found.new_place, 4)}});
 }
 
 void print(const client::PlaceMatches& matches, terminal::Console& console) {
@@ -71,7 +72,7 @@ Status localise(const Seen& seen, client::Client& client, terminal::Console& con
   return {};
 }
 
-// That a picture shows no place of the map is an answer, too.
+// A refusal as JSON: that a picture shows no place of the map is an answer, too.
 std::string refusal_json(const Status& status) {
   return Json()
       .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
@@ -81,30 +82,34 @@ std::string refusal_json(const Status& status) {
 }  // namespace
 
 void add_localise(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("localise", "where a picture, or a stereo pair, was taken");
+  auto* command = app.add_subcommand("localise", "find where a picture or a stereo pair was taken");
   auto seen = std::make_shared<Seen>();
-  command->add_option("LEFT", seen->left, "JPEG or PNG of any camera; or a frame of the map, as 3:120")->required();
-  command->add_option("RIGHT", seen->right, "the right eye's picture");
-  command->add_option("--near", seen->near, "a frame somewhere near: tried first, and the map only if it is not there");
+  command->add_option("LEFT", seen->left, "picture (JPEG or PNG, of any camera), or a frame of the map, as 3:120")
+      ->required();
+  command->add_option("RIGHT", seen->right, "the right picture of a stereo pair");
+  command->add_option("--near", seen->near,
+                      "search around this frame first, and in the whole map only if nothing is found there");
   add_view_options(*command, seen->camera);
   command->footer(
-      "Of a picture whose camera is known more have an answer than of a photograph of an unknown one, which needs 40 "
-      "points\n"
-      "that agree on its lens, too. In a mono session nothing is localised (relmap match). docs/figures.md, "
-      "Photographs, has\n"
-      "what was measured.\n"
-      "A picture by itself is taken for the left eye's, unless its folder (cam1, image_1, image_03, right) or else "
-      "its\n"
-      "name (right, door_right), or where they say nothing the calibration's, says that it is the right one's: then "
-      "the\n"
-      "answer is where that eye stood.\n"
-      "With --json a refusal is an object, too: {\"error\": {\"reason\": \"NEW_PLACE\", \"message\": \"...\"}}; the "
-      "exit\n"
-      "code is as without --json.\n"
+      "Prints the frame of the map that the picture shows, and the camera's pose in that frame.\n"
+      "Name the camera by --calibration or --session if you can: then more pictures are localised. Without them the\n"
+      "calibration beside the picture is used, else the camera of sessions whose pictures have the same size. A "
+      "picture\n"
+      "of an unknown camera needs 40 points that agree, since its lens is estimated, too. How often pictures are "
+      "found\n"
+      "and how exactly: docs/figures.md, Photographs. Sessions of photographs (mono) have no scale, so nothing is\n"
+      "localised in them; relmap match finds their places.\n"
+      "A single picture counts as the left eye's unless its folder (cam1, image_1, image_03, right), else its own "
+      "name\n"
+      "(right, door_right), else the name of the calibration says that it is the right eye's. The answer is then the\n"
+      "pose of the right eye.\n"
+      "With --json a refusal is printed as {\"error\": {\"reason\": \"NEW_PLACE\", \"message\": \"...\"}}; the exit "
+      "code\n"
+      "is the same as without --json.\n"
       "Examples:\n"
       "  relmap localise left.png right.png --calibration calib.txt\n"
       "  relmap localise photo.jpg --near 1:120\n"
-      "  relmap localise 3:120   # where else was this frame seen?");
+      "  relmap localise 3:120   # where else was the place of this frame seen?");
   command->callback([&action, seen] {
     action = [seen](client::Client& client, terminal::Console& console) {
       Status status = localise(*seen, client, console);
@@ -115,26 +120,32 @@ void add_localise(CLI::App& app, Action& action) {
 }
 
 void add_match(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("match", "which places of the map a picture could show");
+  auto* command = app.add_subcommand("match", "list the places of the map that a picture could show");
   auto seen = std::make_shared<Seen>();
-  command->add_option("PICTURE", seen->left, "JPEG or PNG of any camera; or a frame of the map, as 3:120")->required();
+  command->add_option("PICTURE", seen->left, "picture (JPEG or PNG, of any camera), or a frame of the map, as 3:120")
+      ->required();
   command->footer(
-      "Places that geometry confirms come first, those with most inliers before others; then the rest, likeliest "
-      "first. What is\n"
-      "not confirmed is a guess. Somebody else's photograph of the same front is often the first place and seldom "
+      "Places that geometry confirms are listed first, most inliers first; then the others, most probable first. A "
+      "place\n"
+      "that is not confirmed is a guess. Another person's photograph of a building finds its place often as the first "
+      "one,\n"
+      "but confirmed more rarely (docs/figures.md, Photographs: 10 and 4 of 10). Rooms that look alike are not "
       "confirmed\n"
-      "(docs/figures.md, Photographs: 10 and 4 of 10); rooms that look alike are not confirmed (AMBIGUOUS_PLACE).\n"
-      "Of a frame of the map: other sessions' places, and its own session's that it had seen before.\n"
+      "(AMBIGUOUS_PLACE). For a frame of the map, the places are those of other sessions, and those that its own "
+      "session\n"
+      "had seen before.\n"
       "Examples:\n"
       "  relmap match photo.jpg --thumbnails places/\n"
       "  relmap match 2:17   # which other places look like this frame?");
-  command->add_option("--max", seen->match.max_places, "places, at most (20)");
+  command->add_option("--max", seen->match.max_places, "list at most so many places (default 20)");
   command
       ->add_option("--verify", seen->match.max_verified,
-                   "of the likeliest places so many at most are compared with the picture point by point (10)")
+                   "verify at most so many of the most probable places by geometry (default 10)")
       ->check(CLI::Range(1, 20));
-  command->add_option("--near", seen->near, "a frame somewhere near: places around it are likelier");
-  command->add_option("--thumbnails", seen->thumbnails, "folder for a small picture of each place, SESSION-INDEX.jpg");
+  command->add_option("--near", seen->near,
+                      "a frame near which the picture was taken: places around it become more probable");
+  command->add_option("--thumbnails", seen->thumbnails,
+                      "write a small picture of each place to this folder, as SESSION-INDEX.jpg");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
     action = [seen](client::Client& client, terminal::Console& console) -> Status {

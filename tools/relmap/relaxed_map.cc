@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-// Of a step along which the robot was carried: by a lift or a train, so far that it does not matter beside what
-// closures measured, and not so little that the solution is not unique.
+// The covariance of a step along which a lift or a train carried the robot: so large that the step does not matter
+// beside what closures measured, but finite, so that the solution is unique.
 const Matrix6 kCarriedCovariance = Vector6(1e4, 1e4, 1e4, 1, 1, 1).asDiagonal();
 
 client::RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
@@ -46,7 +46,7 @@ std::vector<RelaxedMap::Spring> springs_of(const MapGraph& graph) {
   return springs;
 }
 
-// What measured edges join: a number for each such set of frames.
+// The sets of frames that measured edges connect (union-find).
 class Measured {
  public:
   Measured(const std::set<FrameId>& frames, const std::vector<RelaxedMap::Spring>& springs) {
@@ -73,7 +73,7 @@ std::optional<Tear> tear_of(const RelaxedMap::Spring& spring, const MapPart& par
   return Tear{spring.edge, edge.a, edge.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
 }
 
-// Parts by the components of a relaxation: frames and roots only.
+// One part for each component of the relaxation, with frames and root only.
 std::vector<MapPart> parts_of(const client::Relaxation& relaxation, std::optional<FrameId> root) {
   std::vector<MapPart> parts(static_cast<std::size_t>(relaxation.components));
   for (const client::RelaxedPose& pose : relaxation.poses) {
@@ -120,17 +120,17 @@ std::string DoubtfulStep::words() const {
   if (carried_by.empty()) {
     text += guess + ", sigma " + fixed(sigma_m, 2) + " m";
   } else {
-    text += "says closure " + carried_by.front().to_string();
+    text += "according to closure " + carried_by.front().to_string();
     if (carried_by.size() > 1) text += " and " + std::to_string(carried_by.size() - 1) + " more";
   }
   switch (beside) {
     case Beside::kUnknown:
       break;
     case Beside::kNothing:
-      text += "; nothing measured joins its ends";
+      text += "; no measured edges connect its ends";
       break;
     case Beside::kMeasured:
-      text += "; measured edges join its ends, too";
+      text += "; measured edges also connect its ends";
       break;
     case Beside::kNotJoined:
       text += "; its ends are in different parts";
@@ -154,9 +154,9 @@ std::vector<SessionNumber> MapPart::sessions() const {
 
 Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledFrames>& labels,
                              std::optional<FrameId> root) {
-  if (graph.frames.empty()) return {Reason::EMPTY_MAP, "there is no frame"};
+  if (graph.frames.empty()) return {Reason::EMPTY_MAP, "the graph has no frames"};
   if (root && !graph.frames.contains(*root))
-    return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the graph of what was chosen"};
+    return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the chosen sessions"};
   RelaxedMap map{std::move(graph), {}, {}};
   map.springs = springs_of(map.graph);
   std::vector<client::RelaxationEdge> edges;

@@ -1,11 +1,16 @@
-// The graph of the map, relaxed into one frame for each part of it that hangs together. A picture of the map, not the
-// map: a relative map has no such frame, and its cycles need not close.
+// The graph of the map, relaxed into one frame for each connected part. This is a picture of the map, not the map
+// itself: a relative map has no such frame, and its cycles need not close.
 //
-// What holds poses together is what was measured, each edge by its covariance. A guess of where a robot went while it
-// could not see (dead reckoning, a gap) counts, as little as it says of itself, only where no measured edges join its
-// ends. A step of which nothing at all is known (the robot may have been carried) holds nothing: frames that only such
-// steps would join are different parts, and how they lie to each other is not known. A step along which closures say
-// that the robot was carried, whatever its odometry says, holds next to nothing: the closures place what is behind it.
+// Edges count in the relaxation as follows:
+//   - A measured edge counts with its covariance.
+//   - A guess of where a robot went while it could not see (dead reckoning, a gap) counts with its own large
+//   covariance,
+//     and only if no measured edges connect its ends.
+//   - A step of which nothing is known (the robot may have been carried) does not count. Frames that only such steps
+//     connect are in different parts, between which no transform is known.
+//   - A step along which closures say that the robot was carried counts next to nothing, whatever its odometry says:
+//   the
+//     closures place what follows it.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +28,7 @@ struct PlacedFrame {
   SE3 T_root_frame;
 };
 
-// An edge whose ends the relaxed poses put elsewhere: more than kTearSigmas standard deviations.
+// An edge that the relaxed poses contradict by more than kTearSigmas standard deviations.
 struct Tear {
   EdgeId edge;
   FrameId a, b;
@@ -37,15 +42,15 @@ inline constexpr double kTearSigmas = 6;
 struct DoubtfulStep {
   EdgeId edge;
   FrameId a, b;
-  std::string guess;               // of what: "constant velocity", "unsensed", "gap"
-  std::vector<EdgeId> carried_by;  // closures that say so; then it is no guess
-  double sigma_m = 0;              // standard deviation of a guess, along each axis
-  // What else joins its ends.
+  std::string guess;               // what the guess is made of: "constant velocity", "unsensed", "gap"
+  std::vector<EdgeId> carried_by;  // closures that say that the robot was carried; then the step is no guess
+  double sigma_m = 0;              // standard deviation of a guess along each axis, metres
+  // What else connects the ends of the step.
   enum class Beside : std::uint8_t {
     kUnknown,
-    kNothing,    // the part hangs together by this step
-    kMeasured,   // measured edges: it matters little
-    kNotJoined,  // it holds nothing, and they are in different parts
+    kNothing,    // nothing: only this step holds the part together
+    kMeasured,   // measured edges, so the step matters little
+    kNotJoined,  // nothing, and the step does not count: its ends are in different parts
   };
   Beside beside = Beside::kUnknown;
 
@@ -53,14 +58,14 @@ struct DoubtfulStep {
 };
 // "unknown", "nothing", "measured", "not joined"
 const char* name_of(DoubtfulStep::Beside beside);
-// Of an edge that nothing measured, or along which the robot was carried; `beside` is not known yet.
+// Describes an edge that nothing measured, or along which the robot was carried; `beside` is kUnknown.
 DoubtfulStep doubtful_step(const client::Edge& edge);
 
-// Frames that hang together.
+// A connected part of the graph.
 struct MapPart {
-  FrameId root;                     // in whose coordinates the poses are; one of `frames`
+  FrameId root;                     // the frame of reference of the poses; one of `frames`
   std::vector<PlacedFrame> frames;  // ascending
-  std::vector<std::size_t> edges;   // of RelaxedMap::springs
+  std::vector<std::size_t> edges;   // indices into RelaxedMap::springs
   std::vector<Tear> tears;          // the worst first
   std::vector<DoubtfulStep> doubtful;
   struct Label {
@@ -69,28 +74,28 @@ struct MapPart {
   };
   std::vector<Label> labels;
 
-  const SE3* find(FrameId frame) const;  // its pose; null: it is not in the part
+  const SE3* find(FrameId frame) const;  // T_root_frame; null if the frame is not in the part
   std::vector<SessionNumber> sessions() const;
 };
 
 struct RelaxedMap {
   MapGraph graph;
-  // Edges as they hold: of the graph's, with the covariance that they count with.
+  // The edges of the graph that may count in the relaxation, with the covariance that they count with.
   struct Spring {
     EdgeId edge;
     client::EdgeKind kind = client::EdgeKind::kOdometry;
     bool doubtful = false;  // a step that nothing measured, or along which the robot was carried
-    bool pulls = true;      // false: a doubtful one that is left to the measured edges which join its ends
+    bool pulls = true;      // false: a doubtful step that does not count, since measured edges connect its ends
     client::RelaxationEdge relaxed;
   };
   std::vector<Spring> springs;
-  std::vector<MapPart> parts;  // the one with the chosen root first, then by number of frames, the largest first
+  std::vector<MapPart> parts;  // the one with the chosen root first, then the others, largest first
 
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
 };
 
-// `root`: in whose frame its part is to be; of the others, and if none is chosen, it is the first frame. NO_SUCH_FRAME:
-// the graph has no such frame; EMPTY_MAP: it has none at all; and what relaxation.h says.
+// Relaxes the graph. `root` becomes the root of its part; every other part has its first frame as root. NO_SUCH_FRAME
+// if the graph does not have `root`; EMPTY_MAP if it has no frames; and the reasons of client::relax().
 Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledFrames>& labels,
                              std::optional<FrameId> root = {});
 

@@ -55,7 +55,7 @@ MapGraph graph_of(std::vector<client::Edge> edges) {
 constexpr FrameId at(std::uint32_t index, SessionNumber session = 1) { return {session, index}; }
 const Vector3 kAhead(0, 0, 1);
 
-TEST(RelaxedMap, ThereIsAPartForAllThatHangsTogetherTheLargestFirst) {
+TEST(RelaxedMap, PartsAreTheConnectedComponentsLargestFirst) {
   const RelaxedMap map = relax_map(graph_of({step(at(0, 1), at(1, 1), kAhead), step(at(0, 2), at(1, 2), kAhead),
                                              step(at(1, 2), at(2, 2), kAhead), closure(at(5, 3), at(2, 2), {1, 0, 0})}),
                                    {{"dock", {at(1, 2), at(9, 9)}}})
@@ -89,7 +89,7 @@ TEST(RelaxedMap, TheRootCanBeChosen) {
   EXPECT_EQ(relax_map({}, {}).reason(), Reason::EMPTY_MAP);
 }
 
-TEST(RelaxedMap, AStepOfWhichNothingIsKnownHoldsNothing) {
+TEST(RelaxedMap, AnUnsensedStepConnectsNothing) {
   const RelaxedMap map =
       relax_map(graph_of({step(at(0), at(1), kAhead), guess(at(1), at(2), {0, 0, 0}, MotionSource::kUnsensed, 10),
                           step(at(2), at(3), kAhead), step(at(3), at(4), kAhead)}),
@@ -105,7 +105,7 @@ TEST(RelaxedMap, AStepOfWhichNothingIsKnownHoldsNothing) {
 }
 
 // The robot was carried 5 m aside; closures behind that with what it saw before tell where to.
-TEST(RelaxedMap, ClosuresPlaceWhatIsBehindAStepOfWhichNothingIsKnown) {
+TEST(RelaxedMap, ClosuresPlaceWhatFollowsAnUnsensedStep) {
   const RelaxedMap map =
       relax_map(graph_of({step(at(0), at(1), kAhead), guess(at(1), at(2), {0, 0, 0}, MotionSource::kUnsensed, 10),
                           step(at(2), at(3), kAhead), closure(at(0), at(3), {5, 0, 1})}),
@@ -115,7 +115,7 @@ TEST(RelaxedMap, ClosuresPlaceWhatIsBehindAStepOfWhichNothingIsKnown) {
   EXPECT_LT((map.parts[0].find(at(2))->t - Vector3(5, 0, 0)).norm(), 1e-6);
   EXPECT_TRUE(map.parts[0].tears.empty());
   ASSERT_EQ(map.parts[0].doubtful.size(), 1u);
-  EXPECT_THAT(map.parts[0].doubtful[0].words(), HasSubstr("measured edges join its ends, too"));
+  EXPECT_THAT(map.parts[0].doubtful[0].words(), HasSubstr("measured edges also connect its ends"));
 }
 
 TEST(RelaxedMap, LandmarksThatAreSeenFromBothSidesMeasureAStep) {
@@ -127,7 +127,7 @@ TEST(RelaxedMap, LandmarksThatAreSeenFromBothSidesMeasureAStep) {
   EXPECT_TRUE(map.parts[0].doubtful.empty());
 }
 
-TEST(RelaxedMap, DeadReckoningHoldsAsWellAsItSaysAndIsNamed) {
+TEST(RelaxedMap, DeadReckoningCountsWithItsCovarianceAndIsNamed) {
   std::vector<client::Edge> edges{step(at(0), at(1), kAhead),
                                   guess(at(1), at(2), {0, 0, 2}, MotionSource::kConstantVelocity, 0.5),
                                   step(at(2), at(3), kAhead)};
@@ -136,16 +136,16 @@ TEST(RelaxedMap, DeadReckoningHoldsAsWellAsItSaysAndIsNamed) {
   EXPECT_LT((alone.parts[0].find(at(3))->t - Vector3(0, 0, 4)).norm(), 1e-6);
   ASSERT_EQ(alone.parts[0].doubtful.size(), 1u);
   EXPECT_EQ(alone.parts[0].doubtful[0].words(),
-            "1:1 to 1:2: constant velocity, sigma 0.50 m; nothing measured joins its ends");
+            "1:1 to 1:2: constant velocity, sigma 0.50 m; no measured edges connect its ends");
   edges.push_back(closure(at(0), at(3), {0, 0, 3.2}));
   const RelaxedMap closed = relax_map(graph_of(edges), {}).or_throw();
   EXPECT_LT((closed.parts[0].find(at(3))->t - Vector3(0, 0, 3.2)).norm(), 1e-3) << "what was measured counts more";
   EXPECT_TRUE(closed.parts[0].tears.empty());
 }
 
-// A step that landmarks have measured since keeps the covariance of the guess that it began as. In one loop with
-// another guess that is 9 m off, it took most of that upon itself.
-TEST(RelaxedMap, AGuessIsLeftToTheMeasuredEdgesThatJoinItsEnds) {
+// A step that landmarks have measured later keeps the covariance of its first guess. In a loop with another guess that
+// is 9 m off, it used to absorb most of that error.
+TEST(RelaxedMap, AGuessDoesNotCountIfMeasuredEdgesConnectItsEnds) {
   client::Edge measured = guess(at(3), at(4), kAhead, MotionSource::kConstantVelocity, 15);
   measured.unmeasured = false;
   const RelaxedMap map = relax_map(graph_of({step(at(0), at(1), kAhead),
@@ -157,7 +157,7 @@ TEST(RelaxedMap, AGuessIsLeftToTheMeasuredEdgesThatJoinItsEnds) {
   for (std::uint32_t i = 0; i < 5; ++i) EXPECT_NEAR(map.parts[0].find(at(i))->t.z(), i, 1e-6) << i;
 }
 
-TEST(RelaxedMap, AGapIsNamedSo) {
+TEST(RelaxedMap, AGapIsNamedAsGap) {
   client::Edge gap = guess(at(1), at(9), {0, 0, 8}, MotionSource::kVision, 0.1);
   gap.reason = Reason::DECLARED_GAP;
   const RelaxedMap map = relax_map(graph_of({step(at(0), at(1), kAhead), gap}), {}).or_throw();
@@ -184,10 +184,11 @@ TEST(RelaxedMap, WhereARobotWasCarriedClosuresCountAndNotItsOdometry) {
   EXPECT_LT((part.find(at(4))->t - Vector3(0, -kFloor, 1)).norm(), 0.01) << "up is -y";
   EXPECT_TRUE(part.tears.empty());
   ASSERT_EQ(part.doubtful.size(), 3u);
-  EXPECT_EQ(part.doubtful[0].words(), "1:1 to 1:2: says closure 1:10/1 and 1 more; nothing measured joins its ends");
+  EXPECT_EQ(part.doubtful[0].words(),
+            "1:1 to 1:2: according to closure 1:10/1 and 1 more; no measured edges connect its ends");
 }
 
-TEST(RelaxedMap, TearsAreSaidInMetresTheWorstFirst) {
+TEST(RelaxedMap, TearsAreListedInMetresWorstFirst) {
   std::vector<client::Edge> edges;
   for (std::uint32_t i = 0; i < 10; ++i) edges.push_back(step(at(i), at(i + 1), kAhead));
   edges.push_back(closure(at(0), at(10), {0, 0, 4}));

@@ -22,23 +22,24 @@ std::set<SessionNumber> frozen_ones(const std::vector<client::Session>& sessions
 }
 
 RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<SessionNumber>& frozen) {
-  if (robot.blocked != Reason::OK) return urgent(robot.blocked, "nothing of it can be journalled");
+  if (robot.blocked != Reason::OK) return urgent(robot.blocked, "its keyframes cannot be written to the journal");
   if (robot.not_taken.contains(Reason::SEQUENCE_CONFLICT))
-    return urgent(Reason::SEQUENCE_CONFLICT, "two robots send for one session: has a spool been copied?");
+    return urgent(Reason::SEQUENCE_CONFLICT, "two robots send keyframes of one session: has a spool been copied?");
   if (!robot.same_name.empty())
     return {"SAME_NAME",
             "another robot sends under the same name, for session " + robot.same_name.front() +
                 ": give each a name of its own (--robot)",
             true};
   if (robot.refused.contains(Reason::SESSION_DELETED) || robot.not_taken.contains(Reason::SESSION_DELETED))
-    return urgent(Reason::SESSION_DELETED, "it sends for a session that was deleted");
+    return urgent(Reason::SESSION_DELETED, "it sends keyframes of a session that was deleted");
   if (robot.refused.contains(Reason::SESSION_FROZEN) && frozen.contains(robot.session))
-    return urgent(Reason::SESSION_FROZEN, "it sends for a session that is frozen");
+    return urgent(Reason::SESSION_FROZEN, "it sends keyframes of a session that is frozen");
   if (!robot.refused.empty() && robot.session == 0)
     return {"not begun", "all that it sent was refused: " + std::string(reason_name(robot.refused.begin()->first)),
             true};
   if (robot.dropped_messages > 0)
-    return {std::to_string(robot.dropped_messages) + " dropped", "it sends more than is looked at", true};
+    return {std::to_string(robot.dropped_messages) + " dropped", "it sends messages faster than they can be read",
+            true};
   if (robot.not_taken.contains(Reason::RATE_LIMITED))
     return urgent(Reason::RATE_LIMITED, "it sends more than the daemon takes from one robot");
   if (robot.silent)

@@ -9,15 +9,16 @@
 
 namespace relmap::cli {
 
+// The sessions that are frozen.
 std::set<SessionNumber> frozen_ones(const std::vector<client::Session>& sessions);
 
 struct RobotTrouble {
-  std::string name;     // a word for a column; empty: all is well
-  std::string what;     // a sentence, for an operator who has to do something about it
-  bool urgent = false;  // else it may be gone for good reasons
+  std::string name;     // a word for a table; empty: all is well
+  std::string what;     // a sentence for the operator
+  bool urgent = false;  // false: it may have a good reason, as of a robot that was switched off
 };
 
-// The most urgent of what an operator should look at. `frozen`: sessions that take nothing in.
+// The most urgent trouble of a robot. `frozen`: the frozen sessions.
 RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<SessionNumber>& frozen);
 
 // "4 heard of in the last minute, 1 silent since"

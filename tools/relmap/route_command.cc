@@ -75,36 +75,45 @@ void print(const client::Route& route, const RouteOptions& asked, terminal::Cons
 
 void add_route_options(CLI::App& command, RouteOptions& options, bool required) {
   const char* end =
-      "frame (session:index), label, picture (.png, .jpg), or robot:NAME (where it is now); label:TEXT and "
-      "picture:FILE "
-      "where a name could be both; several: whichever is best";
+      "a frame (session:index), a label, a picture (.png, .jpg) or robot:NAME (where that robot is now); label:TEXT "
+      "and "
+      "picture:FILE tell apart what could be both; may be given again: the best of them is used";
   auto* from = command.add_option("--from", options.from, end)->allow_extra_args(false);
   auto* to = command.add_option("--to", options.to, end)->allow_extra_args(false)->needs(from);
   from->needs(to);
   if (required) from->required(), to->required();
-  auto* by = command.add_option("--by", options.by, "distance, time, or certainty (the least variance)")
-                 ->check(CLI::IsMember({"distance", "time", "certainty"}))
-                 ->capture_default_str();
-  auto* standing = command.add_flag("--standing", options.standing, "by time: count the time that robots stood, too");
+  auto* by =
+      command
+          .add_option("--by", options.by,
+                      "what is minimised: distance, time, or certainty (the variance of the transform along the route)")
+          ->check(CLI::IsMember({"distance", "time", "certainty"}))
+          ->capture_default_str();
+  auto* standing =
+      command.add_flag("--standing", options.standing, "with --by time: count also the time that robots stood still");
   command
-      .add_option("--weigh", options.weights,
-                  "what counts how much: metre=1, second=0.5 (driven), standing=0.1, variance=30 (square metres)")
+      .add_option(
+          "--weigh", options.weights,
+          "minimise a weighted sum instead: metre=1, second=0.5 (of driving), standing=0.1 (a second of standing), "
+          "variance=30 (a square metre)")
       ->allow_extra_args(false)
       ->delimiter(',')
       ->excludes(by)
       ->excludes(standing);
   command
-      .add_option("--max-cost", options.max_cost, "give up beyond so many metres or seconds, or what weights make it")
+      .add_option("--max-cost", options.max_cost, "give up beyond this cost: metres, seconds, or the unit of --weigh")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--only-session", options.sessions, "pass frames of this session only; may be given again")
+  command.add_option("--only-session", options.sessions, "pass only frames of this session; may be given again")
       ->allow_extra_args(false);
-  command.add_option("--avoid", options.avoid, "a frame, or a label whose frames are not passed; may be given again")
-      ->allow_extra_args(false);
-  command.add_option("--min-support", options.min_support, "only edges that so many observations use");
-  command.add_flag("--no-long-loops", options.no_long_loops,
-                   "no loop edge longer than 5 m: passable by assumption only");
   command
-      .add_option("--suppose", options.suppose, "as if closures in this state were in force: candidate or quarantined")
+      .add_option("--avoid", options.avoid, "do not pass this frame, or the frames of this label; may be given again")
+      ->allow_extra_args(false);
+  command.add_option("--min-support", options.min_support,
+                     "use only edges with at least so many observations across them");
+  command.add_flag("--no-long-loops", options.no_long_loops,
+                   "use no loop edge longer than 5 m: nobody drove it, so it is passable by assumption only");
+  command
+      .add_option("--suppose", options.suppose,
+                  "treat closures in this state as if they were in force: candidate or quarantined")
       ->allow_extra_args(false)
       ->check(CLI::IsMember({"candidate", "quarantined"}));
 }
@@ -136,7 +145,7 @@ Result<client::RouteWeights> parse_weights(const std::vector<std::string>& texts
     const double value = equals == std::string::npos ? -1 : std::strtod(text.c_str() + equals + 1, &end);
     if (!weight || !end || *end != 0 || end == text.c_str() + equals + 1 || !(value >= 0))
       return {Reason::INVALID_ARGUMENT,
-              "'" + text + "' is no weight; one is metre=N, second=N, standing=N or variance=N, N being 0 or more"};
+              "'" + text + "' is no weight; a weight is metre=N, second=N, standing=N or variance=N, with N >= 0"};
     *weight = value;
   }
   return weights;
@@ -187,21 +196,25 @@ void add_route(CLI::App& app, Action& action) {
     ViewOptions camera;
     bool steps = false;
   };
-  auto* command = app.add_subcommand("route", "the shortest or quickest way");
+  auto* command = app.add_subcommand("route", "find the shortest, quickest or most certain route");
   auto asked = std::make_shared<Asked>();
   add_route_options(*command, asked->route, true);
   add_view_options(*command, asked->camera);
-  auto* steps = command->add_flag("--steps", asked->steps, "print every frame on the way");
-  command->add_flag("--covariance", asked->route.covariance, "with each step how well it is known from the start")
+  auto* steps = command->add_flag("--steps", asked->steps, "print every frame of the route");
+  command
+      ->add_flag("--covariance", asked->route.covariance,
+                 "print for each step how well its pose relative to the start is known")
       ->needs(steps);
   command->footer(
       "Examples:\n"
       "  relmap route --from 3:120 --to kitchen\n"
       "  relmap route --from robot:anna --to dock --to charger --by time --standing\n"
       "  relmap route --from photo.jpg --to 5:77 --weigh metre=1,second=0.5 --avoid lift --no-long-loops\n"
-      "Loop closures that only bind landmarks are no edges of the graph. They are ways nevertheless where the daemon\n"
-      "searches frame by frame, and where the route is short (50 steps, or edges lead to no goal) and its goal lies\n"
-      "among the 2,000 frames nearest to the start; in all other routes by cells they are none.");
+      "Loop closures that only bind landmarks are no edges of the graph. A route may take them nevertheless if the "
+      "daemon\n"
+      "searches frame by frame, or if the route is short (50 steps, or edges lead to no goal) and its goal is among "
+      "the\n"
+      "2,000 frames nearest to the start. All other routes by cells follow edges only.");
   command->callback([&action, asked] {
     action = [asked](client::Client& client, terminal::Console& console) -> Status {
       const auto request = make_route_request(client, console, asked->route, asked->camera);

@@ -1,4 +1,4 @@
-// A route as the user asks for it.
+// The options by which the user describes a route.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,7 +10,7 @@
 namespace relmap::cli {
 
 struct RouteOptions {
-  std::vector<std::string> from, to;  // an end and its alternatives
+  std::vector<std::string> from, to;  // each an end and its alternatives
   std::string by = "distance";
   bool standing = false;
   std::vector<std::string> weights;

@@ -1,4 +1,4 @@
-// Sessions: looked at and changed.
+// relmap sessions and session: sessions are listed, frozen, thawed and deleted.
 #include <algorithm>
 #include <memory>
 #include <ostream>
@@ -35,8 +35,10 @@ void add_freeze(CLI::App& app, Action& action, const char* name, const char* des
   auto* command = app.add_subcommand(name, description);
   auto session = std::make_shared<std::string>();
   command->add_option("SESSION", *session, "number or name")->required();
-  command->footer(std::string(frozen ? "" : "It is what it was before it was frozen: one that had ended has.\n") +
-                  "Examples:\n  relmap session " + name + " survey-2026\n  relmap session " + name + " 3");
+  command->footer(
+      std::string(frozen ? ""
+                         : "The session returns to the state before the freeze: one that had ended is ended again.\n") +
+      "Examples:\n  relmap session " + name + " survey-2026\n  relmap session " + name + " 3");
   command->callback([&action, session, frozen] {
     action = [session, frozen](client::Client& client, terminal::Console& console) -> Status {
       const auto number = find_session(client, console, *session);
@@ -57,7 +59,7 @@ struct DeleteOptions {
 Status confirm_deletion(const client::Session& session, terminal::Console& console) {
   const std::string which = "session " + std::to_string(session.number) + " '" + session.name + "' of robot " +
                             session.robot + " with its " + counted_text(session.frames, "frame");
-  if (!terminal::can_ask()) return {Reason::NOT_CONFIRMED, which + " would be deleted for good: say --yes"};
+  if (!terminal::can_ask()) return {Reason::NOT_CONFIRMED, which + " would be deleted for good: --yes confirms it"};
   return terminal::ask(console, "Delete " + which + ", for good?");
 }
 
@@ -90,8 +92,8 @@ Status delete_session(const DeleteOptions& options, client::Client& client, term
   while (status.reason() == Reason::DEADLINE && !terminal::interrupted());
   bar.end();
   if (terminal::interrupted() && !status.ok())
-    return {status.reason(),
-            "the daemon goes on deleting session " + std::to_string(session.number) + "; the same command looks on"};
+    return {status.reason(), "the daemon goes on deleting session " + std::to_string(session.number) +
+                                 "; the same command shows how far it is"};
   if (status.ok() && !console.json)
     console.out() << "session " << session.number << " '" << session.name << "' is deleted\n";
   return status;
@@ -99,15 +101,17 @@ Status delete_session(const DeleteOptions& options, client::Client& client, term
 
 void add_delete(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("delete",
-                                     "its frames leave the map, for good; what other sessions see of its landmarks "
-                                     "stays with them, and where they hung together by it they still do");
+                                     "take the frames of a session out of the map, for good; other sessions keep the "
+                                     "landmarks that they see, and stay connected where it connected them");
   auto options = std::make_shared<DeleteOptions>();
   command->add_option("SESSION", options->session, "number or name")->required();
   command->add_flag("--yes", options->yes, "do not ask");
   command->footer(
-      "The daemon goes on whether anybody looks on or not (Ctrl-C), also after a restart. Keyframes that a robot still "
-      "sends for it are refused (SESSION_DELETED). Asks first on a terminal; elsewhere it is refused without --yes "
-      "(NOT_CONFIRMED, exit code 1).\n"
+      "The daemon goes on deleting if this command is interrupted (Ctrl-C), and after a restart. Keyframes that a "
+      "robot\n"
+      "still sends for the session are refused (SESSION_DELETED). The command asks first on a terminal; elsewhere it "
+      "is\n"
+      "refused without --yes (NOT_CONFIRMED, exit code 1).\n"
       "Examples:\n"
       "  relmap session delete test-drive\n"
       "  relmap session delete 7 --yes");
@@ -121,7 +125,7 @@ void add_delete(CLI::App& app, Action& action) {
 }  // namespace
 
 void add_sessions(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("sessions", "the trajectories in the map");
+  auto* command = app.add_subcommand("sessions", "list the sessions in the map");
   command->footer(
       "Examples:\n"
       "  relmap sessions\n"
@@ -137,14 +141,16 @@ void add_sessions(CLI::App& app, Action& action) {
 }
 
 void add_session(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("session", "change a session");
+  auto* command = app.add_subcommand("session", "freeze, thaw or delete a session");
   command->require_subcommand(1);
   command->footer(
       "Examples:\n"
-      "  relmap session freeze survey-2026   # nothing in it moves any more; thaw undoes it\n"
+      "  relmap session freeze survey-2026   # takes no more keyframes, is not adjusted; thaw undoes it\n"
       "  relmap session delete test-drive    # for good; asks first");
-  add_freeze(*command, action, "freeze", "it takes no more keyframes, and nothing in it moves", true);
-  add_freeze(*command, action, "thaw", "it takes keyframes again, and is relaxed with what is around it", false);
+  add_freeze(*command, action, "freeze", "make a session take no more keyframes, and adjust nothing in it any more",
+             true);
+  add_freeze(*command, action, "thaw",
+             "undo a freeze: the session takes keyframes again, and is adjusted with its surroundings", false);
   add_delete(*command, action);
 }
 

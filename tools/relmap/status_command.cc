@@ -23,9 +23,11 @@ Status show_status(bool all, client::Client& client, terminal::Console& console)
 }  // namespace
 
 void add_status(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("status", "how the daemon and its map are; first what needs attention");
+  auto* command = app.add_subcommand("status", "show the state of daemon and map, with what needs attention first");
   auto all = std::make_shared<bool>(false);
-  command->add_flag("--all", *all, "also each share of memory, the journal's numbers, and the vocabulary's terms");
+  command->add_flag(
+      "--all", *all,
+      "show also each share of memory, the journal's sequences, and the source and licence of the vocabulary");
   command->footer(
       "Examples:\n"
       "  relmap status\n"
@@ -37,9 +39,9 @@ void add_status(CLI::App& app, Action& action) {
 }
 
 void add_wait(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("wait", "until all that came in is applied, looked up and relaxed");
+  auto* command = app.add_subcommand("wait", "wait until everything received is applied, looked up and relaxed");
   command->footer(
-      "Exit code 0: it is. 1: not within --deadline (DEADLINE).\n"
+      "Exit code 0: nothing is left to do; 1: something still is after --deadline seconds (DEADLINE).\n"
       "Examples:\n"
       "  relmap wait\n"
       "  relmap --deadline 600 wait");

@@ -12,8 +12,8 @@ namespace {
 
 using Facts = std::vector<std::pair<std::string, std::string>>;
 
-constexpr std::size_t kMaxRobots = 4;      // named one by one
-constexpr std::uint64_t kNearlyFull = 95;  // per cent of a share
+constexpr std::size_t kMaxRobots = 4;      // robots named one by one
+constexpr std::uint64_t kNearlyFull = 95;  // per cent of a memory share
 
 std::string counts_text(const client::ReasonCounts& counts) {
   std::string text;
@@ -24,7 +24,7 @@ std::string counts_text(const client::ReasonCounts& counts) {
 
 std::string milliseconds(double us) { return fixed(us / 1000, 2) + " ms"; }
 
-// Shares that stand at their allowance because somebody gets less than he asks for.
+// The memory shares which hold somebody back when they are full, and what is then noticed.
 const std::map<std::string, const char*>& felt_when_full() {
   static const std::map<std::string, const char*> shares{{"queues", "robots are told to wait"},
                                                          {"reassembly", "robots are told to wait"},
@@ -64,7 +64,7 @@ std::string routes_text(const client::DaemonStatus& s) {
          count_text(s.route_cells_outdated) + " outdated";
 }
 
-// What it is, without what it was made of and under which terms.
+// The first sentence of the source, without its origin and licence.
 std::string name_of_vocabulary(const std::string& source) {
   return source.substr(0, std::min(source.find(". "), source.find(';')));
 }
@@ -86,8 +86,8 @@ std::string doubt_text(const client::DoubtfulCamera& camera) {
   for (const SessionNumber session : camera.against) others += (others.empty() ? "" : ", ") + std::to_string(session);
   return camera.robot + ", " + camera.name +
          ": its camera's calibration is in doubt: " + counted_text(camera.contradicted, "keyframe") +
-         " contradict it (sessions " + others + "), and no closures are made there. The last: " + camera.message +
-         ". Calibrate the camera and take the drive in anew";
+         " contradict it (against sessions " + others + "), and these make no closures. The last: " + camera.message +
+         ". Calibrate the camera, and take the drive in again";
 }
 
 }  // namespace
@@ -102,7 +102,7 @@ Facts needs_attention(const StatusMoment& now) {
     facts.emplace_back("session " + std::to_string(camera.session), doubt_text(camera));
   if (s.places_left_out > 0)
     facts.emplace_back("places", count_text(s.places_left_out) +
-                                     " frames found no room in the place index: none will be recognised there");
+                                     " frames have no room in the place index: their places are not recognised");
   add_memory(s, facts);
   add_robots(now, false, facts);
   return facts;

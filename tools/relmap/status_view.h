@@ -1,4 +1,4 @@
-// What `relmap status` shows: what needs attention, then how the daemon and its map are, on one screen.
+// The output of `relmap status`: what needs attention, then the state of the daemon and its map, on one screen.
 #pragma once
 
 #include <set>
@@ -14,14 +14,13 @@ namespace relmap::cli {
 struct StatusMoment {
   client::DaemonStatus status;
   std::vector<client::RobotStatus> robots;
-  std::set<SessionNumber> frozen;  // sessions that take nothing in
+  std::set<SessionNumber> frozen;  // frozen sessions
 };
 
-// What an operator should look at, most urgent first: where it is, and what is the matter.
+// What an operator should look at, most urgent first: pairs of where it is and what is wrong.
 std::vector<std::pair<std::string, std::string>> needs_attention(const StatusMoment& now);
 
-// `all`: also what only somebody who looks for something wants: each share of memory, the journal's numbers, what the
-// vocabulary was made of and under which terms.
+// `all` adds details: each share of memory, the sequences of the journal, the vocabulary's source and licence.
 void print_status(const StatusMoment& now, bool all, terminal::Console& console);
 
 }  // namespace relmap::cli

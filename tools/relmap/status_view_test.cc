@@ -93,8 +93,9 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   EXPECT_LT(last, text.find("daemon "));
   EXPECT_THAT(text, HasSubstr("DISK_FULL: 12 MiB of 100000 MiB free"));
   EXPECT_THAT(text, HasSubstr("SAME_NAME: another robot sends under the same name, for session 99999999-"));
-  EXPECT_THAT(text,
-              HasSubstr("car, monday: its camera's calibration is in doubt: 41 keyframes contradict it (sessions"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("car, monday: its camera's calibration is in doubt: 41 keyframes contradict it (against sessions"));
   EXPECT_THAT(text, HasSubstr("it fits a focal length 10 % longer. Calibrate"));
   EXPECT_THAT(text, HasSubstr("silent: not heard of for 5 min 00 s, and its session has not ended"));
   EXPECT_THAT(text, HasSubstr("queues hold 67.1 MB of 67.1 MB: robots are told to wait"));

@@ -1,4 +1,4 @@
-// relmap top: how the daemon and its robots stand, again and again.
+// relmap top: the state of the daemon and its robots, refreshed once a second.
 #include <unistd.h>
 
 #include <memory>
@@ -16,8 +16,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kPause{1};  // after a look that failed
-constexpr char kHome[] = "\x1b[H\x1b[J";   // to the upper left corner, and all behind it cleared
+constexpr std::chrono::seconds kPause{1};  // after a request that failed
+constexpr char kHome[] = "\x1b[H\x1b[J";   // moves the cursor to the upper left corner, and clears the screen
 
 struct TopOptions {
   double interval_s = 1;
@@ -40,7 +40,7 @@ Result<TopMoment> look(client::Client& client) {
   return moment;
 }
 
-// Until `end`, or an interrupt.
+// Sleeps until `end`, or until an interrupt.
 void sleep_until(Clock::time_point end) {
   while (Clock::now() < end && !terminal::interrupted())
     std::this_thread::sleep_for(std::min<Clock::duration>(end - Clock::now(), std::chrono::milliseconds(50)));
@@ -62,7 +62,7 @@ Status run(const TopOptions& options, client::Client& client, terminal::Console&
       continue;
     }
     if (!console.json) {
-      std::ostringstream text;  // drawn at once, so that it does not flicker
+      std::ostringstream text;  // written in one piece, so that the screen does not flicker
       terminal::Console page(text, console.err());
       print_top(*now, before, options.limits, page);
       console.out() << (terminal ? kHome : shown > 0 ? "\n" : "") << text.str();
@@ -79,20 +79,22 @@ Status run(const TopOptions& options, client::Client& client, terminal::Console&
 }  // namespace
 
 void add_top(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("top", "live: robots, sessions, the worker, memory (ends with Ctrl-C)");
+  auto* command = app.add_subcommand("top", "show robots, sessions, the worker and memory, live (Ctrl-C ends it)");
   auto options = std::make_shared<TopOptions>();
-  command->add_option("--interval", options->interval_s, "seconds between two looks")
+  command->add_option("--interval", options->interval_s, "seconds between two updates")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  command->add_option("--count", options->count, "so many looks, then end (default: until interrupted)");
-  command->add_option("--robots", options->limits.robots, "rows of robots, those in trouble first")
+  command->add_option("--count", options->count, "end after so many updates (default: when interrupted)");
+  command->add_option("--robots", options->limits.robots, "show at most so many robots, those in trouble first")
       ->capture_default_str();
-  command->add_option("--sessions", options->limits.sessions, "rows of sessions, those that grew last first")
+  command
+      ->add_option("--sessions", options->limits.sessions,
+                   "show at most so many sessions, those with the newest frames first")
       ->capture_default_str();
   command->footer(
-      "A robot in trouble stands first, and its row says why. One that fell silent without ending its session is "
-      "listed "
-      "for ten minutes.\n"
+      "Robots in trouble are listed first, with what is wrong. A robot that falls silent without ending its session "
+      "stays\n"
+      "listed for ten minutes.\n"
       "Examples:\n"
       "  relmap top\n"
       "  relmap top --interval 5\n"

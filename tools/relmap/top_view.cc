@@ -62,7 +62,7 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
 
 int rank(const RobotTrouble& trouble) { return trouble.urgent ? 0 : trouble.name.empty() ? 2 : 1; }
 
-void print_robots(std::vector<client::RobotStatus> robots, const std::set<SessionNumber>& frozen, std::size_t most,
+void print_robots(std::vector<client::RobotStatus> robots, const std::set<SessionNumber>& frozen, std::size_t max_rows,
                   terminal::Console& console) {
   if (robots.empty()) return;
   std::stable_sort(robots.begin(), robots.end(), [&](const client::RobotStatus& a, const client::RobotStatus& b) {
@@ -70,7 +70,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
   });
   Rows rows;
   for (const client::RobotStatus& r : robots) {
-    if (rows.size() == most) break;
+    if (rows.size() == max_rows) break;
     rows.push_back({r.robot.empty() ? "?" : r.robot,
                     r.session ? std::to_string(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
                     fixed(r.keyframes_per_s, 1), terminal::bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
@@ -85,7 +85,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
   if (robots.size() > rows.size()) console.out() << "... and " << robots.size() - rows.size() << " more\n";
 }
 
-void print_sessions(std::vector<client::Session> sessions, const std::optional<TopMoment>& before, std::size_t most,
+void print_sessions(std::vector<client::Session> sessions, const std::optional<TopMoment>& before, std::size_t max_rows,
                     terminal::Console& console) {
   if (sessions.empty()) return;
   std::map<SessionNumber, std::uint32_t> frames;
@@ -94,7 +94,7 @@ void print_sessions(std::vector<client::Session> sessions, const std::optional<T
   std::stable_sort(sessions.begin(), sessions.end(),
                    [](const client::Session& a, const client::Session& b) { return a.last_time_us > b.last_time_us; });
   const std::size_t all = sessions.size();
-  sessions.resize(std::min(all, most));
+  sessions.resize(std::min(all, max_rows));
   Rows rows;
   for (const client::Session& s : sessions) {
     const std::uint32_t grown = before ? s.frames - std::min(s.frames, frames[s.number]) : 0;

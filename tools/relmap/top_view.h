@@ -1,4 +1,4 @@
-// What `relmap top` shows: the daemon and its robots at one moment, and how fast it works since the moment before.
+// The output of `relmap top`: the daemon and its robots at one moment, with rates since the previous moment.
 #pragma once
 
 #include <chrono>
@@ -18,10 +18,10 @@ struct TopMoment {
 };
 
 struct TopLimits {
-  std::size_t robots = 40, sessions = 10;  // rows; the rest is counted
+  std::size_t robots = 40, sessions = 10;  // rows at most; the rest is counted
 };
 
-// Robots in trouble first, then by name; sessions that grew last first.
+// Lists robots in trouble first, and sessions by the time of their newest frame, newest first.
 void print_top(const TopMoment& now, const std::optional<TopMoment>& before, const TopLimits& limits,
                terminal::Console& console);
 

@@ -104,7 +104,7 @@ TEST(Top, RobotsOfOneNameAndThoseThatFellSilentAreNamed) {
                                   ".*a-well"));
 }
 
-TEST(Top, SaysThatAnOperatorClosedTheSessionThatARobotSendsFor) {
+TEST(Top, ReportsThatARobotSendsForAFrozenOrDeletedSession) {
   TopMoment now = moment(1, 1);
   client::RobotStatus robot;
   robot.robot = "cart";

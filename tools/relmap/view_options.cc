@@ -23,17 +23,17 @@ bool looks_like_picture(const std::string& path) {
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
-// A rig's right eye as a camera by itself: what it sees is told from where it stands.
+// The right eye of a rectified rig as a camera of its own; poses are those of that eye.
 StereoCamera right_eye_of(StereoCamera rig) {
   rig.baseline = 0;
   return rig;
 }
 
 void tell_right_eye(terminal::Console& console) {
-  console.err() << "camera: its right eye, as the name says; the answer is where that eye stood\n";
+  console.err() << "camera: the right eye, according to the name; the answer is the pose of that eye\n";
 }
 
-// The camera that the file describes, for pictures of this size; `right`: they are the right eye's.
+// Sets the camera that the file describes, for pictures of the size of view.left; `right`: of its right eye.
 Status use_calibration(terminal::Console& console, const std::string& path, bool right, client::View& view) {
   auto calibration = load_calibration(path);
   if (!calibration.ok()) return calibration.status();
@@ -55,13 +55,13 @@ Status use_calibration(terminal::Console& console, const std::string& path, bool
   return {};
 }
 
-// Whether the calibration can be of pictures of this size.
+// Whether the calibration can belong to pictures of this size.
 bool fits(const StereoCalibration& calibration, const PixelSize& size) {
   return calibration.width == 0 || (calibration.width == size.width && calibration.height == size.height);
 }
 
-// Where a data set keeps the calibration of its pictures: in their folder, or in the one above it. Of KITTI and EuRoC
-// that folder may hold another one, data.
+// Where a data set keeps the calibration of its pictures: in their folder, or in the one above. KITTI and EuRoC have
+// the pictures in a further folder "data".
 std::optional<std::string> calibration_beside(const std::string& picture, const PixelSize& size, bool pair) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -74,8 +74,8 @@ std::optional<std::string> calibration_beside(const std::string& picture, const 
   return std::nullopt;
 }
 
-// The right eye of a session's rig, for pictures of this size: as its camera takes them, or rectified. What is of
-// neither size the daemon refuses by name, given the session.
+// Sets the right eye of a session's rig as the camera, raw or rectified, whichever has the size of the picture. If
+// neither has, the camera stays the session, and the daemon refuses the picture by name.
 void use_right_eye(const client::Session& session, terminal::Console& console, client::View& view) {
   const auto size = pixel_size(view.left);
   if (!size.ok()) return;
@@ -108,7 +108,7 @@ Status use_session(client::Client& client, terminal::Console& console, const Vie
 Status guess_camera(client::Client& client, terminal::Console& console, const std::string& picture, bool right,
                     client::View& view) {
   const auto size = pixel_size(view.left);
-  if (!size.ok()) return {};  // the daemon says what is wrong with it
+  if (!size.ok()) return {};  // the daemon will tell what is wrong with the picture
   const bool pair = !view.right.empty();
   if (const auto beside = calibration_beside(picture, *size, pair)) {
     console.err() << "camera: the calibration in " << *beside << '\n';
@@ -117,14 +117,14 @@ Status guess_camera(client::Client& client, terminal::Console& console, const st
   const terminal::Console::Aside aside(console);
   auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
-  // That of a mono session may be a guess itself.
+  // The camera of a mono session may be a guess itself.
   std::erase_if(*sessions, [&](const client::Session& session) {
     const StereoCamera& camera = session.camera;
     return is_deleted(session) || !camera.is_stereo() || camera == kNoCamera ||
            !((size->width == camera.width && size->height == camera.height) ||
              (session.raw && fits(*session.raw, *size)));
   });
-  std::string why = "no session's camera takes pictures of " + size_text(size->width, size->height);
+  std::string why = "no session has pictures of " + size_text(size->width, size->height);
   if (!sessions->empty()) {
     const client::Session& first = sessions->front();
     const bool same = std::all_of(sessions->begin(), sessions->end(), [&](const client::Session& session) {
@@ -134,22 +134,22 @@ Status guess_camera(client::Client& client, terminal::Console& console, const st
       view.camera = first.number;
       view.supposed = true;
       console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "")
-                    << ", since it takes pictures of this size; --session " << first.name << " if it is known\n";
+                    << ", since its pictures have this size; --session " << first.name << " if you know that it is\n";
       view.either_eye = !pair && first.raw && eye_of_picture(picture) == Eye::kNotSaid;
       if (view.either_eye)
-        console.err() << "camera: its left eye, and the answer's rotation allows for the right one; a name that ends "
-                         "with _left or _right says which\n";
+        console.err() << "camera: its left eye, but the covariance of the rotation allows for the right eye; a name "
+                         "that ends in _left or _right tells which\n";
       if (right) use_right_eye(first, console, view);
       return {};
     }
-    why = "sessions of different cameras take pictures of this size";
+    why = "sessions with different cameras have pictures of this size";
   }
   if (!pair) return {};
-  return {Reason::NO_CALIBRATION, "a pair needs its camera: none lies beside it, and " + why +
-                                      "; --calibration FILE or --session NAME says which it is"};
+  return {Reason::NO_CALIBRATION, "a stereo pair needs its calibration: there is none beside it, and " + why +
+                                      "; give --calibration FILE or --session NAME"};
 }
 
-// One picture by itself; where its own name says nothing, that of the calibration that somebody gives for it.
+// Whether a single picture is the right eye's, by its name or else by the name of the given calibration.
 bool is_of_right_eye(const std::string& picture, const ViewOptions& options) {
   const Eye eye = eye_of_picture(picture);
   if (eye != Eye::kNotSaid || options.calibration.empty()) return eye == Eye::kRight;
@@ -159,14 +159,18 @@ bool is_of_right_eye(const std::string& picture, const ViewOptions& options) {
 }  // namespace
 
 void add_view_options(CLI::App& command, ViewOptions& options) {
-  auto* file = command.add_option("--calibration", options.calibration,
-                                  "the pictures' camera: KITTI, OpenCV or EuRoC file, or a data set's folder");
-  command.add_option("--session", options.session, "the pictures are from the camera of this session (number or name)")
+  auto* file =
+      command.add_option("--calibration", options.calibration,
+                         "calibration of the pictures' camera: a KITTI, OpenCV or EuRoC file, or the folder of "
+                         "a data set");
+  command
+      .add_option("--session", options.session,
+                  "the pictures were taken with the camera of this session (number or name)")
       ->excludes(file);
   command
       .add_flag("--rectified", options.rectified,
-                "with --session: the pictures are rectified already, as the map keeps them; without, they are as the "
-                "camera takes them")
+                "with --session: the pictures are rectified, like those in the map (default: they are as the camera "
+                "takes them)")
       ->needs("--session");
 }
 
@@ -175,7 +179,8 @@ Result<client::View> make_view(client::Client& client, terminal::Console& consol
   client::View view;
   if (const auto frame = FrameId::parse(left); frame && right.empty()) {
     if (!options.calibration.empty() || !options.session.empty())
-      return {Reason::INVALID_ARGUMENT, "frame " + left + " was seen by its session's camera: name no other"};
+      return {Reason::INVALID_ARGUMENT,
+              "frame " + left + " was taken with its session's camera: no camera can be given"};
     view.frame = *frame;
     return view;
   }
@@ -206,7 +211,7 @@ Result<SessionNumber> find_session(client::Client& client, terminal::Console& co
   for (const client::Session& session : *sessions)
     if (session.name == text || session.uuid == text || session.robot + "/" + session.name == text)
       called.push_back(session);
-  // One that is deleted is meant only if no other one is.
+  // A deleted session counts only if no other has the name.
   if (!std::all_of(called.begin(), called.end(), is_deleted)) std::erase_if(called, is_deleted);
   if (called.empty()) return {Reason::NO_SUCH_SESSION, "no session is called '" + text + "'"};
   if (called.size() == 1) return called.front().number;
@@ -226,7 +231,7 @@ Result<client::RouteEnd> make_route_end(client::Client& client, terminal::Consol
   if (const auto frame = FrameId::parse(text); frame && !picture) return client::RouteEnd(*frame);
   if (!picture && !looks_like_picture(text)) return client::RouteEnd(text);
   if (std::error_code ignored; !picture && !std::filesystem::exists(text, ignored))
-    return {Reason::NO_SUCH_FILE, "no picture '" + text + "'; a label of that name is written label:" + text};
+    return {Reason::NO_SUCH_FILE, "there is no picture '" + text + "'; a label of that name is written label:" + text};
   auto view = make_view(client, console, picture ? text.substr(kPicture.size()) : text, "", options);
   if (!view.ok()) return view.status();
   return client::RouteEnd(std::move(view).value());
@@ -234,7 +239,7 @@ Result<client::RouteEnd> make_route_end(client::Client& client, terminal::Consol
 
 Result<FrameId> parse_frame(const std::string& text) {
   if (const auto frame = FrameId::parse(text)) return *frame;
-  return {Reason::INVALID_ARGUMENT, "'" + text + "' is no frame; one is written session:index, as 3:120"};
+  return {Reason::INVALID_ARGUMENT, "'" + text + "' is no frame; a frame is written session:index, as 3:120"};
 }
 
 }  // namespace relmap::cli

@@ -1,4 +1,4 @@
-// How the user says what was seen, and by which camera.
+// The options by which the user says what was seen, and with which camera.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -13,28 +13,32 @@ namespace relmap::cli {
 struct ViewOptions {
   std::string calibration;  // file or folder
   std::string session;      // number or name
-  bool rectified = false;   // the pictures are
+  bool rectified = false;   // whether the pictures are rectified
 };
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Without an option the camera is that of a calibration which lies in the picture's folder or the one above it, as in a
-// data set; else that of the map's stereo sessions whose camera takes pictures of this size, when they have the same
-// one; which it is is told on stderr. Else there is none, and the lens is estimated; a pair is NO_CALIBRATION then, and
-// the message names the options. One picture whose name or calibration says that it is the right eye's (eye_names.h) is
-// of that eye by itself, which is told on stderr, too. `left` may be a frame ("3:120"): what that frame of the map saw.
+// Reads the pictures `left` and `right` (empty: a single picture) and finds their camera. `left` may also be a frame of
+// the map ("3:120"): the view is then what that frame saw.
+//
+// Without an option the camera is
+//   - that of a calibration in the picture's folder or the folder above, as in a data set;
+//   - else that of the map's stereo sessions whose pictures have this size, if all of these have the same camera;
+//   - else unknown: the daemon estimates the lens of a single picture; a pair is refused (NO_CALIBRATION).
+// A single picture that is the right eye's by its name or calibration (eye_names.h) gets the right camera of the rig.
+// Both choices are told on stderr.
 Result<client::View> make_view(client::Client& client, terminal::Console& console, const std::string& left,
                                const std::string& right, const ViewOptions& options);
 
-// "3", "morning#2", "cart-1/morning#2" or a uuid. NO_SUCH_SESSION; INVALID_ARGUMENT: several are called so, with their
-// numbers.
+// The session that `text` names: "3", "morning#2", "cart-1/morning#2" or a uuid. NO_SUCH_SESSION; INVALID_ARGUMENT if
+// several have that name; the message tells their numbers.
 Result<SessionNumber> find_session(client::Client& client, terminal::Console& console, const std::string& text);
 
-// A frame ("3:120"), else a picture (a file that exists and ends like one), else a label. "label:..." and "picture:..."
-// say which it is.
+// The end of a route that `text` names: a robot ("robot:NAME"), a frame ("3:120"), a picture (the extension of a
+// picture; NO_SUCH_FILE if there is no such file), else a label. "label:..." and "picture:..." force these.
 Result<client::RouteEnd> make_route_end(client::Client& client, terminal::Console& console, const std::string& text,
                                         const ViewOptions& options);
 
-// INVALID_ARGUMENT
+// Parses "3:120". INVALID_ARGUMENT if `text` is not of that form.
 Result<FrameId> parse_frame(const std::string& text);
 
 }  // namespace relmap::cli

@@ -1,4 +1,4 @@
-// A board that moves before the camera by itself: what an odometry must not take for the world.
+// A board that moves in front of the camera by itself, which odometry must not take for the fixed world.
 #pragma once
 
 #include "proto/geometry/camera.h"
@@ -8,18 +8,18 @@
 
 namespace relmap::sim {
 
-// Upright and rigid; it crosses the view at 0.5 m/s as the camera sees it, and comes nearer and goes away again
-// between 2.2 and 2.8 m.
+// An upright rigid board that crosses the view at 0.5 m/s relative to the camera, at a distance that varies between 2.2
+// and 2.8 m.
 class Board {
  public:
-  // As large as covers some 30 % of the camera's picture. Its texture is added to the scene.
+  // The board covers some 30 % of the picture. Its texture is added to the scene.
   Board(const StereoCamera& camera, Scene& scene, Random random);
 
-  // `seconds` since it appeared, 0 .. 3, while the left camera moves as `motion` says.
+  // The board `seconds` (0 to 3) after it appeared. `motion`: of the left camera at that time.
   MovingSurface at(double seconds, const Motion& motion) const;
 
  private:
-  Surface surface_;  // in its own coordinates: the middle at the origin, seen along z
+  Surface surface_;  // in the board's coordinates: its middle is the origin, and it is seen along z
 };
 
 }  // namespace relmap::sim

@@ -99,7 +99,7 @@ class BuildingBuilder : private SceneBuilder {
     return lift(road_.beside(way, offset), floor_height);
   }
 
-  // Where a lift goes through the floor, or steps take its place.
+  // Where a lift shaft or an escalator takes the place of the floor.
   bool is_open(int k) const {
     const double begin = k * length_, end = begin + length_;
     const auto overlaps = [&](double from, double to) { return begin < to && end > from; };

@@ -1,4 +1,4 @@
-// The building of a simulated world: a corridor that goes round, on one floor or two, or winds up to where it began.
+// The building of a simulated world: a closed corridor on one floor or two, or with a ramp that winds once round.
 #pragma once
 
 #include "tools/sim/picture_world_options.h"
@@ -9,8 +9,8 @@ namespace relmap::sim {
 
 inline constexpr double kCorridor = 1.35;  // metres from its middle to its walls
 
-// Walls, doors, posters and things beside them. kLiftAlike: the second floor looks as the first does, kAlike: the
-// second half as the first, but that about a quarter of what hangs and stands at the walls is another's.
+// Walls, doors, posters and things beside them. With kLiftAlike the second floor looks like the first, with kAlike the
+// second half of the corridor like the first half, except for about a quarter of the things at the walls.
 Scene build_building(const PictureWorldOptions& options, const Road& road);
 
 }  // namespace relmap::sim

@@ -1,4 +1,4 @@
-// By the depth of one frame its points are found in another one: what is drawn is where the truth has it.
+// Transfers the points of one frame to another by its depth and the truth, to check that both pictures agree with it.
 #pragma once
 
 #include <cmath>
@@ -10,8 +10,8 @@
 namespace relmap::sim {
 
 struct CarriedPoints {
-  int visible = 0;  // of every `step`-th pixel of `from`, both ways: within the picture of `to`
-  int agree = 0;    // and seen there at their depth; what is hidden by something nearer is not
+  int visible = 0;  // points of every `step`-th pixel (in x and y) of `from` that lie within `to`
+  int agree = 0;    // those of them that have their depth there; points behind something nearer do not
 };
 
 inline CarriedPoints carry_points(const PictureWorld& world, int from, int to, int step) {

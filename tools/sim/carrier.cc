@@ -91,7 +91,7 @@ void Carrier::build_wagon(Scene& scene, Random& random) {
   parts_.push_back(wagon.take());
 }
 
-// Riser towards those who come, tread behind it, walls on either side.
+// A step: the riser in front, the tread behind it, walls on both sides.
 void Carrier::build_steps(Scene& scene, Random& random) {
   for (int k = 0; k < kSteps; ++k) {
     PartBuilder step(scene);

@@ -1,4 +1,4 @@
-// What carries the robot: a lift's cabin, a wagon, the steps of an escalator.
+// The carrier of a robot: the cabin of a lift, a wagon, or the steps of an escalator.
 #pragma once
 
 #include <vector>
@@ -10,14 +10,14 @@
 
 namespace relmap::sim {
 
-inline constexpr double kCabinBack = 1.5, kCabinFront = 2.4;  // metres of a lift behind and before the robot
-inline constexpr double kBeltBack = 2, kBeltFront = 3;        // of an escalator, before and behind the ride's ends
+inline constexpr double kCabinBack = 1.5, kCabinFront = 2.4;  // metres: cabin behind and in front of the robot
+inline constexpr double kBeltBack = 2, kBeltFront = 3;  // metres: belt before the start and after the end of a ride
 
-// The lift is closed by two leaves before the robot. The wagon has side walls, seats and a roof, and is open before and
-// behind. The steps of the escalator bear its side walls; they are flat at both ends.
+// A lift has two door leaves in front of the robot. A wagon has side walls, seats and a roof, and is open in front and
+// behind. The steps of an escalator carry its side walls; they are level at both ends.
 class Carrier {
  public:
-  // The textures are added to the scene. All must outlive it but the scene.
+  // The textures are added to `scene`. `options`, `itinerary` and `road` must outlive the carrier.
   Carrier(const PictureWorldOptions& options, const Itinerary& itinerary, const Road& road, Scene& scene,
           Random random);
 
@@ -29,14 +29,14 @@ class Carrier {
   void build_lift(Scene& scene, Random& random);
   void build_wagon(Scene& scene, Random& random);
   void build_steps(Scene& scene, Random& random);
-  // Those there are at `seconds`, where they are a little later.
+  // The surfaces that exist at `seconds`, at their places `later` seconds after that.
   std::vector<Surface> placed(double seconds, double later) const;
 
   const RideKind kind_;
   const Slope belt_;
   const Itinerary& itinerary_;
   const Road& road_;
-  std::vector<Part> parts_;  // the cabin, and a lift's left and right leaf; or the steps
+  std::vector<Part> parts_;  // the cabin, and for a lift the left and right leaf; or the steps
 };
 
 }  // namespace relmap::sim

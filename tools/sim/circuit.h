@@ -11,8 +11,8 @@ namespace relmap::sim {
 // How far a circuit departs from a circle.
 struct CircuitShape {
   double amplitude[3][2] = {
-      {0.14, 0.24}, {0.04, 0.09}, {0.01, 0.03}};  // least and most of each harmonic, of the radius
-  int samples = 8192;                             // of its table of lengths, which is linear in between
+      {0.14, 0.24}, {0.04, 0.09}, {0.01, 0.03}};  // minimum and maximum of each harmonic, as a share of the radius
+  int samples = 8192;                             // entries of the table of arc lengths, interpolated linearly
 };
 
 // A curve r(angle) with a few harmonics, scaled to its length. Plan coordinates are (x, z) of a world whose y points

@@ -1,4 +1,4 @@
-// What a scene is lit by: the same walls at other hours.
+// Light conditions of a scene.
 #pragma once
 
 #include <optional>
@@ -20,10 +20,10 @@ enum class Daylight {
 const char* daylight_name(Daylight light);
 std::optional<Daylight> daylight_of(const std::string& name);
 
-// Changes the light that falls on each surface: by the way it faces, and by its colour, which differs from texture to
-// texture and is brighter in light of its own kind. What moves by itself stays lit as in clear weather.
+// Changes the light on each surface by its orientation and its colour: each texture has a colour, and is brighter in
+// light of that colour. Moving surfaces stay lit as in clear weather.
 void light_scene(Scene& scene, Daylight light);
-// Of the whole picture; 1 in clear weather.
+// Brightness of the whole picture; 1 in clear weather.
 double brightness(Daylight light);
 
 }  // namespace relmap::sim

@@ -35,7 +35,7 @@ TEST(Daylight, NamesAreReadAsTheyAreWritten) {
   EXPECT_EQ(daylight_of("noon"), std::nullopt);
 }
 
-TEST(Daylight, TheSamePlaceLooksOtherwiseAndStandsWhereItStood) {
+TEST(Daylight, TheSamePlaceLooksDifferentAndStaysWhereItWas) {
   const PictureWorld clear(drive(1, Daylight::kClear));
   const StereoPictures as_painted = clear.render(20);
   for (const Daylight light : kAll) {
@@ -66,10 +66,10 @@ TEST(Daylight, AnotherDriveIsInTheSameWorld) {
   const PictureWorld second(options);
   // Along the same road, at most the deviation beside it, and from elsewhere on.
   const auto to_road = [](const PictureWorld& from, int i, const PictureWorld& road) {
-    double nearest = 1e9;
+    double min_distance = 1e9;
     for (int j = 0; j < road.options().frames; ++j)
-      nearest = std::min(nearest, (road.truth(j).t - from.truth(i).t).norm());
-    return nearest;
+      min_distance = std::min(min_distance, (road.truth(j).t - from.truth(i).t).norm());
+    return min_distance;
   };
   double apart = 0;
   for (int i = 0; i < options.frames; i += 5) {
@@ -81,7 +81,7 @@ TEST(Daylight, AnotherDriveIsInTheSameWorld) {
   EXPECT_GT((first.truth(0).t - second.truth(0).t).norm(), 3);
 }
 
-TEST(Daylight, WithoutASeedOfItsOwnADriveHasTheWorlds) {
+TEST(Daylight, ADriveWithoutASeedTakesTheWorlds) {
   PictureWorldOptions options = drive(1, Daylight::kClear);
   options.noise = 2;
   const StereoPictures seeded = PictureWorld(options).render(3);

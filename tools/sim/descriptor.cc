@@ -20,8 +20,8 @@ Descriptor make_descriptor(Stream& random) {
   return descriptor;
 }
 
-void disturb_descriptor(Descriptor& descriptor, std::uint32_t largest, Stream& random) {
-  const int width = 2 * static_cast<int>(largest) + 1;
+void disturb_descriptor(Descriptor& descriptor, std::uint32_t max_change, Stream& random) {
+  const int width = 2 * static_cast<int>(max_change) + 1;
   std::uint64_t bits = 0;
   for (std::size_t k = 0; k < descriptor.size(); ++k) {
     if (k % 4 == 0) bits = random.bits();

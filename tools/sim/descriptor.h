@@ -11,7 +11,7 @@ namespace relmap::sim {
 using Descriptor = std::array<std::uint8_t, 128>;
 
 Descriptor make_descriptor(Stream& random);
-// Moves each entry that is not zero by at most `largest`, within 0..255.
-void disturb_descriptor(Descriptor& descriptor, std::uint32_t largest, Stream& random);
+// Changes each entry that is not zero by at most `max_change`, within 0..255.
+void disturb_descriptor(Descriptor& descriptor, std::uint32_t max_change, Stream& random);
 
 }  // namespace relmap::sim

@@ -6,16 +6,16 @@
 
 namespace relmap::sim {
 
-// A slow wander along the drive, and jumps that die away as the control finds back.
+// A gain that varies slowly along the drive, with jumps that decay as the exposure control recovers.
 class Exposure {
  public:
   explicit Exposure(const PictureWorldOptions& options);
 
-  // Of frame i, `distance` metres along the drive; 1: as painted.
+  // The gain of frame i, `distance` metres along the drive; 1: as painted.
   double gain(int i, double distance) const;
 
  private:
-  double jump(int i) const;  // by what the gain jumps at frame i; 1: not
+  double jump(int i) const;  // factor of a jump at frame i; 1: no jump
 
   std::uint64_t seed_;
   double variation_, jump_share_;

@@ -7,7 +7,7 @@
 namespace relmap::sim {
 namespace {
 
-TEST(Exposure, JumpsAsOftenAsAskedForAndFindsBack) {
+TEST(Exposure, JumpsAsOftenAsAskedForAndRecovers) {
   PictureWorldOptions options;
   options.exposure_variation = 0;
   options.exposure_jumps = 2;

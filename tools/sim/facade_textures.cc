@@ -8,7 +8,7 @@
 namespace relmap::sim {
 namespace {
 
-// What the windows of one house have in common.
+// The style that the windows of one house share.
 struct WindowStyle {
   double frame, glass, thickness;
   int columns, rows;

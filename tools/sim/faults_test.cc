@@ -26,7 +26,7 @@ double mean(const GreyPicture& picture) {
   return sum / static_cast<double>(picture.pixels.size());
 }
 
-TEST(Faults, AllIsOneOfEachKindAndDropsAtAnyRate) {
+TEST(Faults, AllHasOneOfEachKindAndDropsPairsAtAnyRate) {
   for (const double rate : {10.0, 25.0}) {
     PictureWorldOptions options;
     options.rate = rate;
@@ -85,7 +85,7 @@ TEST(Faults, DropTheirShareOfPairsAndNoneThatOtherFaultsNeed) {
   }
 }
 
-TEST(Faults, BlackPicturesAreBlackInTheEyesSaid) {
+TEST(Faults, BlackPicturesAreBlackInTheGivenEyes) {
   const PictureWorld world(options_with("black:20,one_eye:40,one_eye:70"));
   const auto brightness = [&](int i) {
     const StereoPictures pair = world.render(i);
@@ -149,17 +149,17 @@ TEST(Faults, TheMoverCoversAThirdOfThePictureAndCrossesIt) {
   for (const int i : {40, 55, 69}) {
     const std::vector<float> with = world.render_depth(i), without = empty.render_depth(i);
     int covered = 0;
-    double column = 0, nearest = 1e9, furthest = 0;
+    double column = 0, min_depth = 1e9, max_depth = 0;
     for (std::size_t k = 0; k < with.size(); ++k) {
       if (with[k] == without[k]) continue;
       ++covered;
       column += static_cast<double>(k % camera.width);
-      nearest = std::min<double>(nearest, with[k]);
-      furthest = std::max<double>(furthest, with[k]);
+      min_depth = std::min<double>(min_depth, with[k]);
+      max_depth = std::max<double>(max_depth, with[k]);
     }
     EXPECT_NEAR(covered / static_cast<double>(with.size()), 0.3, 0.08) << i;
-    EXPECT_GT(nearest, 1.9);
-    EXPECT_LT(furthest, 3.1);
+    EXPECT_GT(min_depth, 1.9);
+    EXPECT_LT(max_depth, 3.1);
     (i == 40 ? first_column : last_column) = column / covered;
   }
   EXPECT_NEAR(last_column - first_column, 0.5 * 2.9 / 2.5 * camera.f, 15);

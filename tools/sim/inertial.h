@@ -1,4 +1,4 @@
-// What an inertial unit beside the simulated camera measures.
+// Measurements of an inertial unit beside the simulated camera.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ struct InertialOptions {
   double time_offset = 0;              // seconds the unit's clock is ahead: its time = the cameras' + offset
 };
 
-// From the first frame's true time to the last one's, stamped by the unit's own clock. Faults of the pictures do not
-// touch them, but that the head's turns are felt.
+// Samples from the true time of the first frame to that of the last, stamped by the unit's own clock. Of the faults of
+// pictures, only turns of the head affect them.
 std::vector<ImuSample> simulate_inertial(const PictureWorld& world, const InertialOptions& options);
 
 }  // namespace relmap::sim

@@ -102,7 +102,7 @@ TEST(Inertial, TheUnitsClockIsAheadByTheOffset) {
   }
 }
 
-TEST(Inertial, NoiseIsAsDenseAsSaid) {
+TEST(Inertial, NoiseHasTheGivenDensity) {
   const PictureWorld world(drive());
   InertialOptions noisy = perfect();
   noisy.calibration.gyro_noise = 1e-3;

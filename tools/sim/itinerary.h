@@ -1,4 +1,4 @@
-// Of a drive with rides: what the robot drives, where it stands, and how it is carried, in time.
+// The timetable of a drive with rides: when the robot drives, stands, and is carried.
 #pragma once
 
 #include <vector>
@@ -7,31 +7,30 @@
 
 namespace relmap::sim {
 
-// From 0 to 1 while x goes from 0 to `whole`, at a steady rate but for `ramp` at either end.
+// Rises from 0 to 1 while x goes from 0 to `whole`, at a constant rate except within `ramp` of either end.
 double eased(double x, double whole, double ramp);
 
-// Where the lift, the wagon or the escalator takes the robot in and lets it out: metres along the road; and how much
-// higher that is than the road itself tells.
+// A ride by lift, wagon or escalator.
 struct Ride {
-  double board, alight;
-  double lift;  // metres
+  double board, alight;  // where the robot boards and alights, metres along the road
+  double lift;           // metres by which the ride raises the robot more than the road does
 };
 
 // Each leg is a part of the road that is driven, or a ride.
 class Itinerary {
  public:
-  explicit Itinerary(const PictureWorldOptions& options);  // of a ride; `frames` is not looked at
+  explicit Itinerary(const PictureWorldOptions& options);  // options of a ride; `frames` is ignored
 
   struct State {
     double way = 0;     // metres along the road
-    double level = 0;   // metres above it
-    double driven = 0;  // metres by itself
-    // What carries it: where it is, and how far its doors are closed (0 .. 1).
+    double level = 0;   // metres above the road
+    double driven = 0;  // metres that the robot has driven itself
+    // The place of the carrier, and how far its doors are closed (0 to 1).
     double carrier_way = 0, carrier_level = 0, doors = 0;
-    bool riding = false;   // it stands in what carries it, from the first moment to the last
-    bool carried = false;  // that moves
+    bool riding = false;   // the robot is in the carrier, which may stand
+    bool carried = false;  // the carrier moves with the robot
   };
-  // Seconds since the start. Before it the robot stands at its start, and behind seconds() at its end.
+  // The state `seconds` after the start. Before 0 the robot stands at the start, and after seconds() at the end.
   State at(double seconds) const;
   double seconds() const { return legs_.back().end; }
   const std::vector<Ride>& rides() const { return rides_; }

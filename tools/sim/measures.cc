@@ -42,12 +42,12 @@ std::vector<Revisit> find_revisits(const std::vector<SE3>& truth, const std::vec
   assert(truth.size() == time_us.size());
   std::vector<Revisit> revisits;
   for (std::size_t i = kRevisitFrames + 1; i < truth.size(); ++i) {
-    double nearest = kRevisitMetres;
+    double min_distance = kRevisitMetres;
     std::optional<std::size_t> earlier;
     for (std::size_t k = 0; k + kRevisitFrames < i && time_us[i] - time_us[k] > kRevisitUs; ++k) {
       const double distance = (truth[k].t - truth[i].t).norm();
-      if (distance >= nearest || rotation_angle(truth[k].R.transpose() * truth[i].R) > kRevisitRadians) continue;
-      nearest = distance;
+      if (distance >= min_distance || rotation_angle(truth[k].R.transpose() * truth[i].R) > kRevisitRadians) continue;
+      min_distance = distance;
       earlier = k;
     }
     if (earlier) revisits.push_back({i, *earlier});

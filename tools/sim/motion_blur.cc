@@ -28,7 +28,7 @@ float interpolate(const std::vector<float>& light, const StereoCamera& camera, f
   return top + fy * (bottom - top);
 }
 
-// The sample, of a pixel, that sees the nearest thing.
+// The sample of a pixel that sees the nearest surface.
 std::size_t nearest_sample(const Visibility& visible, int column, int row) {
   std::size_t nearest = static_cast<std::size_t>(row) * kSamplesPerSide * visible.width + column * kSamplesPerSide;
   const std::size_t first = nearest;

@@ -56,7 +56,7 @@ TEST_F(MotionBlur, OfARotationIsTheMeanOfManySharpPictures) {
   }
 }
 
-TEST_F(MotionBlur, OfATranslationIsThatMeanButWhereNearThingsHideFarOnes) {
+TEST_F(MotionBlur, OfATranslationIsThatMeanExceptAtOcclusions) {
   const MovingEye eye = eye_with(Vector3(0.3, 0, 2.0), Vector3::Zero());
   const std::vector<float> mean = slow_truth(eye);
   const double error = difference(shade_blurred(snapshot_, camera_, eye, kExposure), mean);

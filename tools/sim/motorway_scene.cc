@@ -79,7 +79,7 @@ class MotorwayBuilder : private SceneBuilder {
     }
   }
 
-  // What bounds the view on one side: stretches of plain barriers, and of verges with trees further off.
+  // The border of the motorway on one side: stretches of plain barriers, and of verges with trees further away.
   void edge(double d, int side) {
     const Textures barrier = variants([&] { return paint_barrier(kBarrierHeight, random_); });
     const Textures trees = variants([&] { return paint_tree_line(kRoadPiece, kTreeHeight, random_); });

@@ -8,9 +8,9 @@
 
 namespace relmap::sim {
 
-// Metres to the right of the circuit, which is the middle lane's middle; one drives on the right.
+// Metres to the right of the circuit, which is the middle of the middle lane. Traffic drives on the right.
 inline constexpr double kLaneWidth = 3.75;
-inline constexpr double kMedian = -8;  // the opposite carriageway lies as in a mirror here
+inline constexpr double kMedian = -8;  // the opposite carriageway is mirrored at this line
 
 // Large curves only: no radius is below 100 m if the circuit is 650 m long or more.
 Circuit motorway_circuit(std::uint64_t seed, double length_m);

@@ -39,7 +39,7 @@ TEST(Motorway, IsDrivenAsACarDrives) {
   for (double t = 1; t < 39; t += 0.1) EXPECT_LT(motorway().motion_at(t).acceleration.norm(), 8) << t;
 }
 
-TEST(Motorway, IsDullAndMostlyFar) {
+TEST(Motorway, HasLittleTextureMostOfItFarAway) {
   for (const int frame : {10, 200, 390}) {
     const GreyPicture picture = motorway().render(frame).left;
     EXPECT_LT(sim::textured_share(picture, 0, picture.height), 0.35) << frame;

@@ -94,15 +94,15 @@ void paint_composition(Canvas& canvas, double x, double y, double width, double 
 namespace {
 
 struct Courses {
-  double height, shortest, longest, joint, joint_value, spread;
+  double height, min_length, max_length, joint, joint_value, spread;
 };
 
 void paint_courses(Canvas& canvas, double x, double y, double width, double height, double value, const Courses& c,
                    Random& random) {
   canvas.fill_rect(x, y, x + width, y + height, c.joint_value);
   for (double top = y; top < y + height; top += c.height)
-    for (double left = x - random.uniform(0, c.longest); left < x + width;) {
-      const double right = left + random.uniform(c.shortest, c.longest);
+    for (double left = x - random.uniform(0, c.max_length); left < x + width;) {
+      const double right = left + random.uniform(c.min_length, c.max_length);
       const double brick = std::clamp(value * random.uniform(1 - c.spread, 1 + c.spread), 10.0, 245.0);
       canvas.fill_rect(std::max(left, x), top, std::min(right - c.joint, x + width),
                        std::min(top + c.height - c.joint, y + height), brick);

@@ -24,7 +24,7 @@ using sim::Random;
 
 constexpr double kLongExposure = 0.04;  // seconds, where the camera's exposure is at fault
 
-// The camera's noise: a table of normal values, read in a random order.
+// The camera's noise: a table of normally distributed values, read in random order.
 class SensorNoise {
  public:
   SensorNoise() {

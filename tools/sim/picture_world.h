@@ -1,4 +1,4 @@
-// A textured world made from a seed, and a stereo camera driven round it: pictures with exact truth.
+// A textured world made from a seed, and a stereo camera that drives round it: pictures with exact truth.
 //
 // The world is a closed street with houses on both sides, pavements, posters, trees, or a motorway. The camera goes
 // round it, a little beside its own track on each lap, turned by a few degrees. World coordinates: y down, the ground
@@ -35,23 +35,23 @@ class PictureWorld {
   PictureWorld& operator=(PictureWorld&&) noexcept;
 
   const PictureWorldOptions& options() const;
-  // Of frame i, 0 .. frames - 1. T_world_left: the left camera in the world, at the frame's true time.
+  // T_world_left of frame i (0 to frames - 1) at the frame's true time.
   SE3 truth(int i) const;
-  std::int64_t time_us(int i) const;  // its stamp, which a fault may make wrong
-  // What is wrong with pair i. A dropped pair can be rendered, but no one gets to see it.
+  std::int64_t time_us(int i) const;  // time stamp of frame i, which a fault may make wrong
+  // The fault of pair i. A dropped pair can be rendered, but is not delivered.
   FaultKind fault_at(int i) const;
   bool dropped(int i) const;
-  const std::vector<FaultEpisode>& faults() const;  // by beginning, without single drops by chance
-  // At any real number of seconds since frame 0.
+  const std::vector<FaultEpisode>& faults() const;  // sorted by their beginnings, without randomly dropped pairs
+  // Truth and motion at any real number of seconds since frame 0.
   SE3 truth_at(double seconds) const;
   sim::Motion motion_at(double seconds) const;
-  // Of a drive with rides: the robot stands in what may carry it; and that moves, with it.
+  // For a drive with rides: whether the robot is in a carrier, and whether that moves with it.
   bool riding(int i) const;
   bool carried(int i) const;
   StereoPictures render(int i) const;
   // Depth (z) at each left pixel's centre, metres; row by row.
   std::vector<float> render_depth(int i) const;
-  // Which of the left pixels show what is no part of the fixed world: cars, and what carries the robot.
+  // For each left pixel, whether it shows something that is not part of the fixed world: cars, carriers.
   std::vector<bool> moving(int i) const;
 
  private:

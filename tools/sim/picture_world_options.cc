@@ -50,10 +50,11 @@ Status PictureWorldOptions::check() const {
     return bad("a ride's way begins at 0 and is at least 40 m");
   if (ride == RideKind::kLiftRamp && !carried) return bad("from the end of the ramp only the lift leads on");
   const double length = circuit_length();
-  const int shortest = scene == SceneKind::kMotorway ? 500 : 20, longest = scene == SceneKind::kMotorway ? 5000 : 400;
-  if (!(length >= shortest && length <= longest))
+  const int min_length = scene == SceneKind::kMotorway ? 500 : 20,
+            max_length = scene == SceneKind::kMotorway ? 5000 : 400;
+  if (!(length >= min_length && length <= max_length))
     return bad("a circuit of " + number_text(length) + " m (frames * step / laps); it must be " +
-               std::to_string(shortest) + " .. " + std::to_string(longest) + " m long");
+               std::to_string(min_length) + " .. " + std::to_string(max_length) + " m long");
   if (!(lateral_deviation >= 0 && lateral_deviation <= 0.5)) return bad("the lateral deviation must be 0 .. 0.5 m");
   if (!(heading_deviation >= 0 && heading_deviation <= 0.3)) return bad("the heading deviation must be 0 .. 0.3 rad");
   if (!(camera_height >= 0.3 && camera_height <= 2.5)) return bad("the camera must be 0.3 .. 2.5 m above the ground");

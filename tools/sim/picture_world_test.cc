@@ -112,25 +112,25 @@ TEST(PictureWorld, TruthCarriesPointsFromFrameToFrame) {
 TEST(PictureWorld, LapsPassTheSamePlacesBesideTheirTrack) {
   const PictureWorld& world = small_world();
   const auto& options = world.options();
-  double furthest = 0, sum = 0;
+  double max_distance = 0, sum = 0;
   int revisits = 0;
   for (int i = static_cast<int>(options.frames / options.laps) + 8; i < options.frames; ++i) {
-    double nearest = 1e9;
+    double min_distance = 1e9;
     int match = 0;
     for (int j = 0; j < options.frames / 2; ++j) {
       const double distance = (world.truth(i).t - world.truth(j).t).norm();
-      if (distance < nearest) {
-        nearest = distance;
+      if (distance < min_distance) {
+        min_distance = distance;
         match = j;
       }
     }
-    furthest = std::max(furthest, nearest);
-    sum += nearest;
+    max_distance = std::max(max_distance, min_distance);
+    sum += min_distance;
     ++revisits;
     EXPECT_LT(rotation_angle(world.truth(match).R.transpose() * world.truth(i).R), 0.25);
   }
   ASSERT_GT(revisits, 20);
-  EXPECT_LT(furthest, 2 * options.lateral_deviation + options.step);
+  EXPECT_LT(max_distance, 2 * options.lateral_deviation + options.step);
   EXPECT_GT(sum / revisits, 0.02);
 }
 

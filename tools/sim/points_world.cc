@@ -20,7 +20,7 @@ constexpr double kMinDepth = 0.3;         // metres
 constexpr double kPointSize = 0.15;       // metres: the described region
 constexpr double kPixelNoiseLimit = 4.9;  // sigmas; below kMargin
 
-// What a stream of random numbers is for.
+// The purposes of the streams of random numbers.
 enum Purpose : std::uint64_t { kLife, kPlace, kSeenAgain, kPixel, kStep, kDescriptor, kDescriptorNoise };
 
 // PointId: kind, lap (27 bits), phase (24 bits), slot (12 bits).
@@ -124,7 +124,7 @@ PointsWorld::Point PointsWorld::make_point(PointId id) const {
   const auto birth = static_cast<std::int64_t>(lap_of(id) * options_.frames_per_lap + phase_of(id));
   const SE3 T_world_birth = pose(birth);
   const SE3 T_next_world = pose(birth + 1).inverse();
-  // Two frames are to see it: drawn again until the next one does.
+  // Drawn again until the next frame sees the point, too: two frames must see it.
   for (int draw = 0; draw < kMaxDraws; ++draw) {
     const double depth = options_.depth_min * std::pow(options_.depth_max / options_.depth_min, random.uniform());
     const double disparity = point.mono ? 0 : camera.f * camera.baseline / depth;
@@ -191,7 +191,7 @@ TrackMeasurement PointsWorld::measure(const Sighting& sighting, std::uint32_t i)
   TrackMeasurement m;
   m.u_left = static_cast<float>(z.x());
   m.v = static_cast<float>(z.y());
-  // Noise may turn the disparity of a far point round; no matcher would report that.
+  // Noise may make the disparity of a far point negative; no matcher would report that.
   m.u_right =
       sighting.mono || z.z() > z.x() - 0.05 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(z.z());
   return m;

@@ -1,14 +1,13 @@
-// Simulated drives of which only the measurements are made: points with exact truth, no pictures.
+// Simulated drives through a world of points: measurements with exact truth, without pictures.
 //
 // A world is a circuit driven `frames` keyframes far, `frames_per_lap` to a lap. Landmarks are born uniformly in the
 // picture at a log-uniform depth, and are seen for two frames plus a geometric number, as long as both eyes see them.
-// On later laps each landmark of the first lap is seen again, at the same place of the circuit, with probability
-// `seen_again`; others take the place of those that are not. As for a real front-end, a landmark seen again begins a
-// new track: that it is the same is known to landmarks() alone.
+// On later laps each landmark of the first lap is seen again at the same place of the circuit with probability
+// `seen_again`; new landmarks replace the others. As in a real front-end, a landmark that is seen again begins a new
+// track: only landmarks() tells that it is the same.
 //
-// Everything is a pure function of the options: keyframe(i) costs the same for every i, in any order, and nothing grows
-// with the length but two bytes a frame. One world for one configuration: `noise_seed` changes pixel noise, odometry
-// noise and descriptor noise, and nothing else.
+// Everything is a pure function of the options. keyframe(i) costs the same for every i, in any order, and memory grows
+// by only two bytes a frame. `noise_seed` changes the noise of pixels, odometry and descriptors, and nothing else.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +31,8 @@ struct PointsWorldOptions {
   double speed = 1;            // m/s
   double height = 0.05;        // metres: amplitude of height(s) = height sin(0.7 s)
   double pitch = 0.02;         // radians: amplitude of pitch(s) = pitch sin(1.3 s)
-  double lateral_per_lap = 0;  // metres that each lap is driven further to the right
-  double climb = 0;            // metres that a lap climbs; where the next begins, it falls back (a lift)
+  double lateral_per_lap = 0;  // each lap is driven by so many metres further to the right
+  double climb = 0;            // each lap climbs by so many metres, and falls back where the next begins (a lift)
 
   StereoCamera camera{400, 256, 192, 0.12, 512, 384};
   double births = 11.1;                    // landmarks born in each frame
@@ -46,7 +45,7 @@ struct PointsWorldOptions {
   double step_noise_m = 0.01;  // sigma of the odometry step, per axis
   double step_noise_rad = 0.05 * 0.017453292519943295;
 
-  std::uint32_t appearance = 0;        // features of the appearance set; 0: none. Tracked landmarks are among them
+  std::uint32_t appearance = 0;        // features of the appearance, with the tracked landmarks; 0: none
   std::uint32_t descriptor_noise = 8;  // largest change of an entry
 
   SessionUuid uuid{{0x72, 0x65, 0x6c, 0x6d, 0x61, 0x70, 0x20, 0x70, 0x6f, 0x69, 0x6e, 0x74, 0x73, 0, 0, 1}};
@@ -58,7 +57,7 @@ struct PointsWorldOptions {
 // The world of docs/method.md, 5: 288 frames, about 3,200 landmarks and 12,600 observations.
 PointsWorldOptions figure8_options(std::uint64_t noise_seed);
 
-// A point of the world, whatever tracks see it. Equal ids: the same point.
+// Identifies a point of the world, whatever tracks see it.
 using PointId = std::uint64_t;
 
 class PointsWorld {
@@ -95,7 +94,7 @@ class PointsWorld {
     bool mono = false;
   };
 
-  SE3 pose(std::int64_t i) const;  // also before the start: what is born there may still be seen in frame 0
+  SE3 pose(std::int64_t i) const;  // also for i < 0: landmarks born there may still be seen in frame 0
   std::uint32_t births(std::int64_t i, Kind kind) const;
   PointId born(std::int64_t i, std::uint32_t slot, Kind kind) const;
   std::uint32_t life(PointId id) const;

@@ -1,11 +1,11 @@
-// The generator that paints and builds picture worlds: a stream, read in order.
+// The random generator for painting and building picture worlds, a stream that is read in order.
 #pragma once
 
 #include "tools/sim/random_stream.h"
 
 namespace relmap::sim {
 
-// A value: copies continue independently.
+// Copies continue independently.
 class Random : public Stream {
  public:
   using Stream::Stream;

@@ -1,5 +1,5 @@
-// Random numbers that are a pure function of what they are for: a stream is keyed by a seed and up to three numbers
-// (what, which frame, which item), so that anything can be made again, in any order, without its predecessors.
+// Streams of random numbers that are keyed by a seed and up to three numbers (purpose, frame, item). Numbers are a pure
+// function of the key, so that anything can be generated again, in any order, without what came before it.
 #pragma once
 
 #include <cmath>

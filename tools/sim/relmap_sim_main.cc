@@ -1,4 +1,4 @@
-// relmap-sim: drives through simulated worlds, as files.
+// relmap-sim: writes drives through simulated worlds as files.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
@@ -31,7 +31,7 @@ std::ofstream create(const fs::path& path) {
   return out;
 }
 
-// A new folder; one that holds another drive is refused, since the two would mix.
+// Creates the folder. Refuses one that holds another drive, since the two would mix.
 void prepare_folder(const fs::path& folder, bool overwrite) {
   if (fs::exists(folder) && !fs::is_empty(folder)) {
     if (!overwrite || !fs::exists(folder / "sim.json"))
@@ -92,61 +92,71 @@ struct PicturesCommand {
         "  calib.txt                             P0 and P1\n"
         "  times.txt                             seconds since the first pair\n"
         "  poses.txt                             truth: left camera in the first one's frame, 3x4 by rows\n"
-        "  faults.csv                            frame,kind of each frame at fault; with faults only\n"
-        "  rides.csv                             frame,carried,moving_share of each frame in what may carry the "
-        "robot;\n"
-        "                                        the share of the pixels that show no part of the fixed world\n"
-        "  imu.csv, imu.yaml                     EuRoC's, with --imu; the clock of times.txt\n"
-        "  sim.json                              the options, and where the first left camera is in the world\n"
-        "Pictures bear the numbers of their frames. A dropped pair has neither picture, nor time, nor pose.\n"
-        "Of a fleet, each robot has a --drive-seed and a --start of its own in the world of one --seed, and --light.\n"
+        "  faults.csv                            with faults: frame,kind of each faulty frame\n"
+        "  rides.csv                             with --ride: frame,carried,moving_share of each frame in a lift,\n"
+        "                                        wagon or escalator; moving_share is the share of pixels that do not\n"
+        "                                        show the fixed world\n"
+        "  imu.csv, imu.yaml                     with --imu: in EuRoC's format, by the clock of times.txt\n"
+        "  sim.json                              the options, and the pose of the first left camera in the world\n"
+        "Pictures are named by the numbers of their frames. A dropped pair has no picture, no time and no pose.\n"
+        "For a fleet, give all robots the same --seed, and each its own --drive-seed, --start and --light.\n"
         "Faults: dropped, black, long_black, swivel, blur, one_eye, mover, doubled, time_back, time_ahead.");
     c->add_option("--out", out, "Folder to write")->required();
-    c->add_option("--seed", world.seed, "World, and the drive unless it has a seed of its own")->capture_default_str();
-    c->add_option("--drive-seed", world.drive_seed, "How it is driven: sway, speed, traffic, exposure, noise, faults");
+    c->add_option("--seed", world.seed, "Seed of the world, and of the drive unless --drive-seed is given")
+        ->capture_default_str();
+    c->add_option("--drive-seed", world.drive_seed, "Seed of the drive: sway, speed, traffic, exposure, noise, faults");
     c->add_option("--start", world.start, "Metres along the circuit where the drive begins")->capture_default_str();
-    c->add_option("--light", light, "clear, morning or evening (a low sun from elsewhere), overcast, dusk (dark)")
+    c->add_option("--light", light, "clear, morning or evening (a low sun from either side), overcast, or dusk (dark)")
         ->check(CLI::IsMember({"clear", "morning", "evening", "overcast", "dusk"}))
         ->capture_default_str();
     c->add_option("--scene", scene_kind,
                   "street, or motorway: little texture, KITTI's camera, 2.5 m a pair, a circuit of 2 to 5 km")
         ->check(CLI::IsMember({"street", "motorway"}))
         ->capture_default_str();
-    c->add_option("--ride", ride,
-                  "The robot is carried on its way. lift: up and down between floors that differ; lift-alike: that "
-                  "look alike but for a few things; lift-ramp: down by lift where it came up a ramp; train; escalator; "
-                  "alike: it only stands for as long, in a building whose halves look alike")
+    c->add_option(
+         "--ride", ride,
+         "The robot is carried on its way. lift: up and down between two floors that differ; lift-alike: between "
+         "floors that look alike except for a few things; lift-ramp: up a ramp, and down by lift; train; "
+         "escalator; alike: not carried, it stands still as long in a building whose halves look alike")
         ->check(CLI::IsMember({"none", "lift", "lift-alike", "lift-ramp", "train", "escalator", "alike"}))
         ->capture_default_str();
-    c->add_flag("--on-foot", on_foot, "With --ride: it waits where it would be carried, and goes there by itself");
-    c->add_option("--width", width, "Pixels; the camera sees as much as before")->check(CLI::Range(160, 4096));
-    c->add_option("--pairs", world.frames, "Stereo pairs")->capture_default_str();
+    c->add_flag("--on-foot", on_foot,
+                "With --ride: the robot is not carried; it waits where it would board, and drives all the way");
+    c->add_option("--width", width, "Width of the pictures, pixels; the field of view stays the same")
+        ->check(CLI::Range(160, 4096));
+    c->add_option("--pairs", world.frames, "Number of stereo pairs")->capture_default_str();
     c->add_option("--laps", world.laps, "Times round the circuit, which is pairs * step / laps long")
         ->capture_default_str();
-    c->add_option("--step", world.step, "Metres between two pairs")->capture_default_str();
+    c->add_option("--step", world.step, "Metres between two pairs, on average")->capture_default_str();
     c->add_option("--rate", world.rate, "Pairs per second")->capture_default_str();
-    c->add_option("--baseline", world.camera.baseline, "Metres")->capture_default_str();
-    c->add_option("--noise", world.noise, "Standard deviation of a pixel, of 255")->capture_default_str();
-    c->add_option("--exposure-variation", world.exposure_variation, "Relative, at most")->capture_default_str();
+    c->add_option("--baseline", world.camera.baseline, "Stereo baseline, metres")->capture_default_str();
+    c->add_option("--noise", world.noise, "Standard deviation of a pixel's value (0 to 255)")->capture_default_str();
+    c->add_option("--exposure-variation", world.exposure_variation, "Slow change of the gain, relative, at most")
+        ->capture_default_str();
     c->add_option("--exposure-jumps", world.exposure_jumps, "Sudden changes of the gain per 100 pairs")
         ->capture_default_str();
-    c->add_option("--exposure", world.exposure_s, "Seconds a picture gathers light for: motion blur")
+    c->add_option("--exposure", world.exposure_s, "Exposure time in seconds, for motion blur")->capture_default_str();
+    c->add_option("--faults", faults, "none, all (which also drops 5 % of the pairs), or kind:frame,kind:frame...")
         ->capture_default_str();
-    c->add_option("--faults", faults, "all, none, or kind:frame,kind:frame...; all drops 5 % of the pairs, too")
-        ->capture_default_str();
-    c->add_option("--drop-share", world.drop_share, "Share of the pairs that are missing")->capture_default_str();
-    c->add_flag("--imu", imu, "Write what an inertial unit measures, too");
-    c->add_option("--imu-offset", inertial.time_offset, "Seconds its clock is ahead of the pictures'")
+    c->add_option("--drop-share", world.drop_share, "Share of the pairs that are dropped")->capture_default_str();
+    c->add_flag("--imu", imu, "Write also the measurements of an inertial unit");
+    c->add_option("--imu-offset", inertial.time_offset,
+                  "Seconds that the inertial unit's clock is ahead of the pictures'")
         ->check(CLI::Range(-1.0, 1.0))
         ->capture_default_str();
-    c->add_option("--lateral-deviation", world.lateral_deviation, "Metres beside the road's middle, at most")
+    c->add_option("--lateral-deviation", world.lateral_deviation,
+                  "Distance from the middle of the road, metres, at most")
         ->capture_default_str();
-    c->add_option("--heading-deviation", world.heading_deviation, "Radians, at most")->capture_default_str();
+    c->add_option("--heading-deviation", world.heading_deviation,
+                  "Deviation of the heading from the road, radians, at most")
+        ->capture_default_str();
     c->add_option("--format", picture_format, "png or jpg (quality 95)")
         ->check(CLI::IsMember({"png", "jpg"}))
         ->capture_default_str();
-    c->add_option("--threads", threads, "Pictures rendered at once")->check(CLI::Range(1, 64))->capture_default_str();
-    c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
+    c->add_option("--threads", threads, "Number of pictures rendered at a time")
+        ->check(CLI::Range(1, 64))
+        ->capture_default_str();
+    c->add_flag("--overwrite", overwrite, "Replace the simulated drive in the folder");
     c->final_callback([this, c] {
       world.light = *relmap::sim::daylight_of(light);
       if (scene_kind == "motorway") take_to_motorway(*c);
@@ -156,7 +166,7 @@ struct PicturesCommand {
     });
   }
 
-  // The motorway's own defaults, where nothing else was asked for.
+  // Takes the defaults of the motorway for options that are not given.
   void take_to_motorway(const CLI::App& given) {
     const relmap::sim::PictureWorldOptions motorway = relmap::sim::motorway_options(world.seed, world.frames);
     const double baseline = world.camera.baseline;
@@ -209,7 +219,7 @@ struct PicturesCommand {
     render(scene, folder);
   }
 
-  // The unit's axes are EuRoC's: x up, y to the right, z ahead, a little beside the left camera.
+  // The axes of the inertial unit are EuRoC's: x up, y right, z ahead. It sits a little beside the left camera.
   void write_inertial(const relmap::sim::PictureWorld& scene, const fs::path& folder) {
     inertial.seed = world.seed_of_drive();
     inertial.calibration.R_camera_imu << 0, 1, 0, -1, 0, 0, 0, 0, 1;
@@ -251,7 +261,7 @@ struct PicturesCommand {
         csv << i << "," << relmap::sim::fault_name(kind) << "\n";
   }
 
-  // Of each pair of which the robot stands in what may carry it.
+  // Writes a line for each pair at which the robot stands in a lift, wagon or escalator.
   static void write_rides(const relmap::sim::PictureWorld& scene, const std::vector<int>& delivered,
                           const fs::path& path) {
     std::ofstream csv = create(path);
@@ -351,7 +361,8 @@ struct PointsCommand {
   bool overwrite = false;
 
   void add_to(CLI::App& app) {
-    CLI::App* c = app.add_subcommand("points", "Make the keyframes of a drive among points, without pictures");
+    CLI::App* c =
+        app.add_subcommand("points", "Make the keyframes of a drive through a world of points, without pictures");
     c->footer(
         "Example:\n"
         "  relmap-sim points --out laps --frames 3000 --frames-per-lap 1000\n"
@@ -360,19 +371,24 @@ struct PointsCommand {
         "  poses.txt       truth: the frame in the first one's coordinates, 3x4 by rows\n"
         "  sim.json        the options");
     c->add_option("--out", out, "Folder to write")->required();
-    c->add_option("--seed", world.world_seed, "The world")->capture_default_str();
-    c->add_option("--noise-seed", world.noise_seed, "Noise of pixels, odometry and descriptors")->capture_default_str();
+    c->add_option("--seed", world.world_seed, "Seed of the world")->capture_default_str();
+    c->add_option("--noise-seed", world.noise_seed, "Seed of the noise of pixels, odometry and descriptors")
+        ->capture_default_str();
     c->add_option("--shape", shape, "circle, rectangle, or figure8 (the 288 frames of docs/method.md, 5)")
         ->check(CLI::IsMember({"circle", "rectangle", "figure8"}))
         ->capture_default_str();
-    c->add_option("--frames", world.frames, "Keyframes")->check(CLI::Range(1U, 100'000'000U))->capture_default_str();
-    c->add_option("--frames-per-lap", world.frames_per_lap, "Keyframes round the circuit")
+    c->add_option("--frames", world.frames, "Number of keyframes")
+        ->check(CLI::Range(1U, 100'000'000U))
+        ->capture_default_str();
+    c->add_option("--frames-per-lap", world.frames_per_lap, "Keyframes in one lap of the circuit")
         ->check(CLI::Range(20U, 100'000'000U))
         ->capture_default_str();
-    c->add_option("--appearance", world.appearance, "Features of each appearance set; 0: none")->capture_default_str();
-    c->add_option("--pixel-noise", world.pixel_noise, "Standard deviation, pixels")->capture_default_str();
+    c->add_option("--appearance", world.appearance, "Features in the appearance of each keyframe; 0: none")
+        ->capture_default_str();
+    c->add_option("--pixel-noise", world.pixel_noise, "Standard deviation of a measurement, pixels")
+        ->capture_default_str();
     c->add_option("--session", world.session, "Name of the session")->capture_default_str();
-    c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
+    c->add_flag("--overwrite", overwrite, "Replace the simulated drive in the folder");
     c->final_callback([this] { run(); });
   }
 
@@ -417,7 +433,7 @@ struct PointsCommand {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Drives through simulated worlds, made from a seed, with exact truth.", "relmap-sim");
+  CLI::App app("Makes drives through simulated worlds from a seed, with exact truth.", "relmap-sim");
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"

@@ -9,17 +9,17 @@
 
 namespace relmap::sim {
 
-inline constexpr int kSamplesPerSide = 2;  // of a pixel that is shaded
+inline constexpr int kSamplesPerSide = 2;  // a shaded pixel has 2 x 2 samples
 
-// What each sample of a picture sees. `factor` samples a side stand evenly in each pixel.
+// What each sample of a picture sees. Each pixel has factor x factor evenly spaced samples.
 struct Visibility {
   int width = 0;  // samples: camera.width * factor
   int height = 0;
   std::vector<float> inverse_depth;   // 1/m along the optical axis; 0: nothing
-  std::vector<std::int32_t> surface;  // of snapshot.surface(); -1: nothing
+  std::vector<std::int32_t> surface;  // index for snapshot.surface(); -1: nothing
 };
 
-// The eye sits at T_world_eye and sees as the left camera of `camera` does.
+// Finds what an eye at T_world_eye sees; its intrinsics are those of `camera`.
 Visibility find_visible(const Snapshot& snapshot, const StereoCamera& camera, const SE3& T_world_eye, int factor);
 
 // Brightness 0..255, before exposure and noise; row by row. `visible`: by find_visible() with kSamplesPerSide.

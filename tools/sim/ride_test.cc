@@ -63,7 +63,7 @@ double difference(const GreyPicture& a, const GreyPicture& b) {
   return sum / static_cast<double>(a.pixels.size());
 }
 
-TEST(Ride, NameIsReadBack) {
+TEST(Ride, NamesAreParsedAsPrinted) {
   for (const RideKind kind : kCarrying) EXPECT_EQ(ride_of(ride_name(kind)), kind);
   EXPECT_FALSE(ride_of("ferry"));
 }
@@ -79,7 +79,7 @@ TEST(Ride, OptionsThatContradictOneAnotherAreRefused) {
   EXPECT_EQ(ride_options(RideKind::kLiftRamp, 1, false).check().reason(), Reason::INVALID_ARGUMENT);
 }
 
-TEST(Ride, EasedGoesFromNoneToAllWithoutAJump) {
+TEST(Ride, EasedGoesFromZeroToOneWithoutAJump) {
   EXPECT_EQ(sim::eased(-1, 5, 1), 0);
   EXPECT_EQ(sim::eased(6, 5, 1), 1);
   EXPECT_DOUBLE_EQ(sim::eased(2.5, 5, 1), 0.5);
@@ -95,16 +95,16 @@ TEST(Ride, TruthIsContinuousThroughEveryRide) {
   for (const RideKind kind : kCarrying) {
     const PictureWorld world(small_ride(kind));
     const double rate = world.options().rate;
-    double carried = 0, longest = 0;
+    double carried = 0, max_step = 0;
     SE3 before = world.truth_at(0);
     for (int k = 1; k < 4 * world.options().frames; ++k) {
       const SE3 here = world.truth_at(k / rate / 4);
       const double step = (here.t - before.t).norm();
-      longest = std::max(longest, step);
+      max_step = std::max(max_step, step);
       if (world.carried(k / 4)) carried += step;
       before = here;
     }
-    EXPECT_LT(longest, 3.5 / rate / 4) << ride_name(kind) << ": no faster than the train";
+    EXPECT_LT(max_step, 3.5 / rate / 4) << ride_name(kind) << ": no faster than the train";
     EXPECT_GT(carried, 3.5) << ride_name(kind);
   }
 }
@@ -181,7 +181,7 @@ double repeated_share(RideKind kind) {
   return repeated / second;
 }
 
-TEST(Ride, FloorsAndHalvesLookAlikeButForAFewThings) {
+TEST(Ride, FloorsAndHalvesLookAlikeExceptForAFewThings) {
   for (const RideKind kind : {RideKind::kLiftAlike, RideKind::kAlike}) {
     EXPECT_GT(repeated_share(kind), 0.8) << ride_name(kind);
     EXPECT_LT(repeated_share(kind), 0.97) << ride_name(kind);

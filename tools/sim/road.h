@@ -1,4 +1,4 @@
-// The road of a drive with rides: a closed plan, and how high it lies.
+// The road of a drive with rides: a closed plan, and its height.
 #pragma once
 
 #include <optional>
@@ -19,8 +19,8 @@ struct Slope {
 double lift_place(const PictureWorldOptions& options);      // where the robot stands in the lift
 Slope escalator_place(const PictureWorldOptions& options);  // from where it boards to where it alights
 
-// The street's circuit, or a building's corridor: a rounded rectangle of which one half is the other, turned by 180
-// degrees. `way`: metres, any real number.
+// The circuit of a street, or the corridor of a building: a rounded rectangle, whose halves are the same after a turn
+// by 180 degrees. `way` is in metres along the road, any real number.
 class Road {
  public:
   Road(const PictureWorldOptions& options, const Circuit& circuit);  // the circuit must outlive it
@@ -28,9 +28,9 @@ class Road {
   double length() const { return options_.circuit_length(); }
   double height(double way) const;
   Vector2 point(double way) const;  // (x, z)
-  // `offset` metres to the right of it, in the plan.
+  // The point `offset` metres to the right of the road, in the plan.
   Vector2 beside(double way, double offset) const;
-  // On the ground: x to the right, y down, z ahead and level.
+  // Pose of the road on the ground: x right, y down, z ahead and level.
   SE3 T_world_road(double way) const;
 
  private:

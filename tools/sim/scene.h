@@ -15,20 +15,21 @@ struct Surface {
   std::array<Vector3, 4> corners;
   int corner_count = 0;
   int texture = 0;
-  float gain = 1;  // of the light that falls on it
+  float gain = 1;  // factor for the light that falls on it
   // Plane: normal . p = distance. Texel coordinates: (u . p + u0, v . p + v0).
   Vector3 normal, u, v;
   double distance = 0, u0 = 0, v0 = 0;
 };
 
-// Of clear weather: what falls on a surface from everywhere, and at most from the sun.
+// Light of clear weather on a surface: from everywhere, and at most from the sun.
 inline constexpr double kDiffuseLight = 0.92, kDirectLight = 0.3;
 
-// Lit by the sun, both sides alike. `texels`: of the first three corners, with (0, 0) the texture's corner.
+// A surface that the sun lights, the same on both sides. `texels`: texture coordinates of the first three corners; (0,
+// 0) is the corner of the texture.
 Surface make_surface(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture);
 Surface moved(Surface surface, const SE3& motion);
 
-// As at one instant.
+// A surface that moves, at one instant.
 struct MovingSurface {
   Surface surface;
   Vector3 velocity;  // m/s, in the world; it turns slowly if at all
@@ -36,10 +37,10 @@ struct MovingSurface {
 
 struct Scene {
   std::vector<Surface> surfaces;
-  std::vector<Texture> textures;  // of what moves, too
+  std::vector<Texture> textures;  // also those of moving surfaces
 };
 
-// What there is to see at one instant.
+// All surfaces at one instant.
 struct Snapshot {
   const Scene& scene;
   std::vector<MovingSurface> moving;

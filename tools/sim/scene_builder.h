@@ -1,4 +1,4 @@
-// What the builders of scenes have in common: polygons, walls, boxes.
+// Base of the builders of scenes: polygons, walls, boxes.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ class SceneBuilder {
 
   int texture(const Canvas& canvas);  // its index
   void polygon(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture_index);
-  // A rectangle, its texture's top left corner at `corner`, shifted to the right by `from` metres.
+  // A rectangle. The top left corner of its texture is at `corner`, shifted to the right by `from` metres.
   void panel(const Vector3& corner, const Vector3& across, const Vector3& down, int texture_index, double texels,
              double from = 0);
   void wall(const Vector2& from, const Vector2& to, double height, double foot, int texture_index, double texels,

@@ -45,14 +45,15 @@ class StreetBuilder : private SceneBuilder {
     panel(lift(sky[0], 2 * far), Vector3(2 * far, 0, 0), Vector3(0, 0, 2 * far), clouds, 1);
   }
 
-  void row_of_houses(int side, double nearest, double furthest) {
-    const double stretch = 1 - side * circuit_.inner_side() * 0.5 * (nearest + furthest) * 2 * M_PI / circuit_.length();
+  void row_of_houses(int side, double min_offset, double max_offset) {
+    const double stretch =
+        1 - side * circuit_.inner_side() * 0.5 * (min_offset + max_offset) * 2 * M_PI / circuit_.length();
     std::vector<double> ends{0}, offsets;
     while (circuit_.length() - ends.back() > 1e-6) {
       double next = ends.back() + random_.uniform(4.0, 7.5) / std::max(0.4, stretch);
       if (next > circuit_.length() - 2.5) next = circuit_.length();
       ends.push_back(next);
-      offsets.push_back(random_.uniform(nearest, furthest));
+      offsets.push_back(random_.uniform(min_offset, max_offset));
     }
     double previous_height = 7;
     for (std::size_t k = 0; k < offsets.size(); ++k) {

@@ -8,8 +8,8 @@
 
 namespace relmap::sim {
 
-// Closed rows of houses on both sides of the circuit, ground, sky, and things on the pavements. What is nearer than 1 m
-// to the road's middle is free.
+// Closed rows of houses on both sides of the circuit, ground, sky, and things on the pavements. The road is free within
+// 1 m of its middle.
 Scene build_street(const Circuit& circuit, std::uint64_t seed);
 
 }  // namespace relmap::sim

@@ -20,7 +20,7 @@ class Texture {
     int width = 0;
     int height = 0;
     float scale = 1;               // of level 0's texels
-    float last_x = 0, last_y = 0;  // as far as coordinates reach
+    float last_x = 0, last_y = 0;  // largest coordinates that are sampled
     std::vector<std::uint8_t> pixels;
   };
   // (u, v) in texels of level 0, texel centres at whole numbers; clamped at the border. `level` in 0..kTopLevel.

@@ -7,7 +7,7 @@
 
 namespace relmap::sim {
 
-// Of 16 x 16 pixels in rows [top, bottom): the share whose values differ clearly.
+// The share of the blocks of 16 x 16 pixels in rows [top, bottom) whose values differ clearly.
 inline double textured_share(const GreyPicture& picture, int top, int bottom) {
   int textured = 0, cells = 0;
   for (int v = top; v + 16 <= bottom; v += 16)

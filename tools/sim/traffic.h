@@ -10,13 +10,14 @@
 
 namespace relmap::sim {
 
-// They keep their lanes and speeds, each near its lane's usual one; the two in the camera's own lane keep its speed.
+// Cars keep their lanes and speeds, which are near the usual one of the lane; the two in the camera's lane have its
+// speed.
 class Traffic {
  public:
   // `speed`: of the camera, m/s. The textures are added to the scene.
   Traffic(const Circuit& circuit, double speed, Scene& scene, Random random);
 
-  // Those within sight of a place in the plan.
+  // The cars within sight of a place in the plan.
   std::vector<MovingSurface> near(const Vector2& place, double seconds) const;
 
  private:

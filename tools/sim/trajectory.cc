@@ -69,7 +69,7 @@ Motion Trajectory::motion(double frame) const {
   const double h = kDifference, frames = h * options_.rate;
   const SE3 here = straight(frame), before = straight(frame - frames), after = straight(frame + frames);
   const Vector3 back = so3_log(here.R.transpose() * before.R), on = so3_log(here.R.transpose() * after.R);
-  // The drive's own motion in differences, the head's as it is defined.
+  // The motion of the drive by finite differences, that of the head analytically.
   const HeadTurn head_turn = faults_.head_turn(frame);
   const Vector3 down = Vector3::UnitY();
   const Matrix3 R_head_straight = so3_exp(-head_turn.angle * down);

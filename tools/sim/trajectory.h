@@ -1,4 +1,4 @@
-// Where the camera of a picture world is, and how it moves, at any time.
+// Pose and motion of the camera of a picture world, at any time.
 #pragma once
 
 #include <optional>
@@ -24,13 +24,13 @@ struct Motion {
 // Times are in frames since the first one, any real number.
 class Trajectory {
  public:
-  // All must outlive it.
+  // All arguments must outlive the trajectory.
   Trajectory(const PictureWorldOptions& options, const Circuit& circuit, const FaultSchedule& faults);
 
   double distance(double frame) const;  // driven along the circuit, metres
   SE3 pose(double frame) const;         // T_world_left
   Motion motion(double frame) const;
-  // Of a drive with rides; none: it has none.
+  // The itinerary of a drive with rides; null if it has none.
   const Itinerary* itinerary() const { return itinerary_ ? &*itinerary_ : nullptr; }
   const Road& road() const { return road_; }
 

@@ -1,4 +1,4 @@
-// A smooth random function: how a drive departs from its road.
+// A smooth random function, for the deviation of a drive from its road.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@ namespace relmap::sim {
 // Within +-1; its waves do not repeat with the laps.
 class Wander {
  public:
-  // `shortest`, `longest`: of the waves, in units of at()'s argument.
-  Wander(Random random, double shortest, double longest) {
+  // Wavelengths are between `min_wave` and `max_wave`, in units of at()'s argument.
+  Wander(Random random, double min_wave, double max_wave) {
     for (Wave& wave : waves_) {
-      wave.rate = 2 * M_PI / random.uniform(shortest, longest);
+      wave.rate = 2 * M_PI / random.uniform(min_wave, max_wave);
       wave.phase = random.uniform(0, 2 * M_PI);
     }
   }

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kMaxMeant = 3;
 constexpr std::size_t kMinBeginning = 3;  // letters
 
-// Letters left out, added or changed, and neighbours exchanged.
+// Damerau-Levenshtein distance: letters left out, added or changed, and neighbours swapped.
 std::size_t slips(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i)
@@ -28,7 +28,7 @@ std::size_t slips(const std::string& a, const std::string& b) {
   return d[a.size()][b.size()];
 }
 
-// The command that was reached, by its whole name.
+// The subcommand that was parsed last, with its full name.
 struct Reached {
   std::vector<const CLI::App*> chain;  // the program first
   std::string name;
@@ -63,7 +63,7 @@ std::string listed(const std::vector<std::string>& names, const std::string& las
   return text;
 }
 
-// What the first word that nobody expected may have been meant to be; empty: that is not what is wrong.
+// A message about the first unexpected word and what it may have been meant to be; empty if there is no such word.
 std::string slip_in(const CLI::App& app) {
   const std::vector<std::string> rest = app.remaining(true);
   if (rest.empty()) return "";
@@ -78,7 +78,7 @@ std::string slip_in(const CLI::App& app) {
   return option ? text : text + " It has " + listed(known, " and ") + ".";
 }
 
-// CLI11 says of a word that is no number that it is out of range; this says what is wrong. Empty: something else is.
+// CLI11 calls a word that is no number "not in range". Returns a better message; empty if that is not the error.
 std::string no_number_in(const CLI::ParseError& error) {
   const std::string what = error.what();
   constexpr std::string_view kValue = "Value ", kOutside = " not in range ";
@@ -112,7 +112,7 @@ void add_version(CLI::App& app) { app.set_version_flag("--version", RELMAP_VERSI
 
 int end_with(const CLI::App& app, const CLI::ParseError& error, std::ostream& out, std::ostream& err, int usage) {
   if (error.get_exit_code() == 0) return app.exit(error, out, err);
-  // One that is mistyped is not there either: what it was meant to be says more than that something is missing.
+  // A mistyped word also makes the intended one missing; what was meant is the more useful message.
   const bool unexpected = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
                           error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
   const std::string slip = unexpected ? slip_in(app) : no_number_in(error);

@@ -1,4 +1,4 @@
-// What all programs do alike with their command lines (CLI11).
+// What all programs share in handling their command lines (CLI11).
 #pragma once
 
 #include <iosfwd>
@@ -15,12 +15,12 @@ namespace relmap::terminal {
 // Adds --version.
 void add_version(CLI::App& app);
 
-// Ends a program whose command line was not to be run: --help and --version go to `out`, and 0 is returned; what is
-// wrong goes to `err`, with the command or option that may have been meant, and `usage` is returned.
+// Prints the outcome of a command line that did not parse, and returns the exit code: --help and --version go to `out`
+// with 0; errors go to `err`, with the command or option that may have been meant, and return `usage`.
 int end_with(const CLI::App& app, const CLI::ParseError& error, std::ostream& out, std::ostream& err, int usage);
 
-// Those of `known` that `typed` may be a slip of, the likeliest first, three at most: with few letters left out, added,
-// changed or exchanged, or begun so.
+// The names in `known` that `typed` may be a typing error of, at most three, the likeliest first: names that begin with
+// it, or differ from it in few letters that are left out, added, changed or swapped.
 std::vector<std::string> likely_meant(const std::string& typed, const std::vector<std::string>& known);
 
 }  // namespace relmap::terminal

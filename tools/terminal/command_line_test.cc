@@ -14,7 +14,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-TEST(CommandLine, ASlipIsTakenForWhatItIsNextTo) {
+TEST(CommandLine, ATypingErrorFindsTheNearestName) {
   const std::vector<std::string> known{"status", "stats", "sessions", "session", "edge", "edges", "map", "match"};
   EXPECT_THAT(likely_meant("statsu", known), ElementsAre("stats", "status"));
   EXPECT_THAT(likely_meant("stat", known), ElementsAre("stats", "status"));
@@ -59,7 +59,7 @@ Ended end(std::vector<const char*> arguments) {
   return ended;
 }
 
-TEST(CommandLine, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
+TEST(CommandLine, AMistypedCommandOrOptionGetsASuggestion) {
   const std::pair<std::vector<const char*>, const char*> slips[] = {
       {{"statsu"}, "prog has no command 'statsu'. Did you mean status?\nRun prog --help"},
       {{"--server", "a", "fly"}, "prog has no command 'fly'. It has status and edge.\n"},
@@ -80,7 +80,7 @@ TEST(CommandLine, AMistypedCommandOrOptionIsNamedWithWhatWasMeant) {
   }
 }
 
-TEST(CommandLine, HelpIsThatOfTheCommandAskedForAndTheVersionIsSaid) {
+TEST(CommandLine, HelpIsOfTheGivenCommandAndTheVersionIsPrinted) {
   const Ended help = end({"edge", "remove", "--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_THAT(help.out, HasSubstr("prog edge remove 1"));

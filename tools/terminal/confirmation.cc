@@ -13,7 +13,7 @@ Status ask(Console& console, const std::string& question) {
   std::string answer;
   std::getline(std::cin, answer);
   if (answer == "y" || answer == "Y" || answer == "yes" || answer == "Yes") return {};
-  if (!std::cin) console.err() << '\n';  // the end of the input leaves the cursor behind the question
+  if (!std::cin) console.err() << '\n';  // after an end of input the cursor is still behind the question
   return {Reason::NOT_CONFIRMED, "nothing is changed"};
 }
 

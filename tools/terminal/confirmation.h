@@ -1,4 +1,4 @@
-// "Are you sure?", asked of whoever sits at the terminal.
+// Asks the user at the terminal for confirmation.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace relmap::terminal {
 
-// Whether standard input and standard error are a terminal, where a question is seen and an answer typed.
+// Whether standard input and standard error are a terminal, so that a question can be seen and answered.
 bool can_ask();
 
 // Asks "QUESTION [y/N]" on standard error and reads a line of standard input. NOT_CONFIRMED: the answer is not yes.

@@ -1,4 +1,4 @@
-// What the user sees: data on stdout, everything else on stderr.
+// Output of the command lines: data on stdout, everything else on stderr.
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,17 @@ class Console {
  public:
   Console(std::ostream& out, std::ostream& err) : out_(out), err_(err) {}
 
-  // Answers are printed as JSON, a document a line, instead of tables.
+  // Print answers as JSON, one document a line, instead of tables.
   bool json = false;
-  // What was done is done, and what came of it is not to be trusted: the exit code is to say so.
+  // The command is done, but its result cannot be trusted; the exit code will say so.
   bool untrusted = false;
-  // What was done is done, and the daemon refused part of it for good: the exit code is to say so.
+  // The command is done, but the daemon refused part of it for good; the exit code will say so.
   bool incomplete = false;
 
   std::ostream& out() { return out_; }
   std::ostream& err() { return err_; }
 
-  // What the client does in between is not part of the answer.
+  // While an Aside lives, replies to the client are not part of the answer: reply() prints nothing.
   class Aside {
    public:
     explicit Aside(Console& console) : console_(console), was_(console.aside_) { console.aside_ = true; }
@@ -38,9 +38,9 @@ class Console {
     Console& console_;
     const bool was_;
   };
-  void reply(const std::string& document);  // if json
+  void reply(const std::string& document);  // prints it if `json`
 
-  // Left-aligned text, right-aligned numbers (a column whose name begins with '>').
+  // A column whose name begins with '>' is right-aligned, for numbers; the others are left-aligned.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
   // "name   value", aligned.
   void facts(const std::vector<std::pair<std::string, std::string>>& facts);
@@ -62,7 +62,7 @@ std::string duration_text(double seconds);
 std::string vector_text(const Vector3& v);
 // "[######......]": how much of a whole is used
 std::string bar_text(std::uint64_t used, std::uint64_t whole);
-// Columns of a terminal that UTF-8 text takes, one a code point.
+// The number of terminal columns that UTF-8 text takes: one for each code point.
 std::size_t width_of(const std::string& utf8);
 
 }  // namespace relmap::terminal

@@ -28,7 +28,7 @@ TEST(Console, PrintsRepliesOnlyAsJsonAndOnlyThoseThatAreTheAnswer) {
   EXPECT_EQ(out.str(), "{3}\n");
 }
 
-TEST(Units, AreThoseThatPeopleRead) {
+TEST(Units, AreHumanReadable) {
   EXPECT_EQ(bytes_text(1234), "1.2 kB");
   EXPECT_EQ(bytes_text(1500000000), "1.5 GB");
   EXPECT_EQ(bar_text(0, 100), "[....................]");
@@ -43,7 +43,7 @@ TEST(Units, AreThoseThatPeopleRead) {
   EXPECT_EQ(time_text(1'700'000'000'123'456), "2023-11-14T22:13:20.123Z");
 }
 
-TEST(ProgressBar, SaysALineAtEachStepWhereThereIsNoTerminal) {
+TEST(ProgressBar, PrintsALineForEachStepWithoutATerminal) {
   std::ostringstream err;
   ProgressBar bar(err, false);
   for (std::uint64_t done = 0; done <= 200; ++done) bar.show("copying", done, 200, "frames");

@@ -1,10 +1,10 @@
-// Ctrl-C as a question that long work asks now and then.
+// Ctrl-C as a flag that long work checks from time to time.
 #pragma once
 
 namespace relmap::terminal {
 
-// From now on the first SIGINT or SIGTERM only sets a flag, so that work can end in order; the second one ends the
-// program as ever.
+// After this call the first SIGINT or SIGTERM only sets a flag, so that work can end in order. A second one ends the
+// program as usual.
 void watch_interrupts();
 bool interrupted();
 

@@ -1,5 +1,5 @@
-// How far long work has come: a bar that redraws itself on a terminal; elsewhere a line at each step, and at each tenth
-// of it unless that follows within two seconds.
+// Shows the progress of long work: a bar that redraws itself on a terminal; elsewhere a line for each step, and for
+// each tenth of a step unless it follows within two seconds.
 #pragma once
 
 #include <chrono>
@@ -16,9 +16,9 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  // `total` 0: not known. `unit`: "frames", "bytes", ... An empty step says nothing.
+  // `total` 0: not known. `unit`: "frames", "bytes", ... An empty step shows nothing.
   void show(const std::string& step, std::uint64_t done, std::uint64_t total, const std::string& unit);
-  // Takes the bar away; also to make room for other text.
+  // Erases the bar, at the end or to make room for other text.
   void end();
 
  private:
@@ -33,7 +33,7 @@ class ProgressBar {
   bool visible_ = false;
 };
 
-// Standard error is one, and it is able to move the cursor.
+// Whether standard error is a terminal that can move the cursor.
 bool is_terminal();
 
 }  // namespace relmap::terminal

@@ -16,9 +16,9 @@ namespace relmap::vocab {
 namespace {
 
 constexpr double kConfident = 0.5;
-constexpr double kMinProbability = 1e-4;  // that an answer can be blamed for
+constexpr double kMinProbability = 1e-4;  // lower ones count as this, so that one answer cannot dominate
 
-// As the server reads a picture that it is asked about.
+// Describes a picture as the server does for a query.
 Result<DescribedPicture> describe(const std::string& file, const place::Vocabulary& vocabulary) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return Status(Reason::NO_SUCH_FILE, file + ": " + std::generic_category().message(errno));
@@ -31,10 +31,10 @@ Result<DescribedPicture> describe(const std::string& file, const place::Vocabula
   return described;
 }
 
-// Counts the answers of one way, query by query.
+// Counts the answers of one method, query by query.
 class RecallCount {
  public:
-  // `right`: of each candidate, the first of which has this certainty; without any it says nothing.
+  // `right`: for each candidate, whether it is right. `certainty`: of the first one; 0: the method gives no answer.
   void add(const std::vector<bool>& right, double certainty) {
     const auto first_right = static_cast<std::size_t>(std::find(right.begin(), right.end(), true) - right.begin());
     if (first_right < right.size())
@@ -58,7 +58,7 @@ class RecallCount {
   double highest_wrong_ = 0;
 };
 
-// What geometry makes of the candidates of one query; each frame is tried once.
+// Geometric verification of the candidates of one query; each frame is tried once.
 class Geometry {
  public:
   Geometry(const GrowingMap& map, const RecognitionSet::Picture& asked, const DescribedPicture& picture)
@@ -76,7 +76,7 @@ class Geometry {
   std::map<FrameId, std::uint32_t> tried_;
 };
 
-// One way to find candidates, judged before and after geometry.
+// Judges one method of finding candidates, before and after geometry.
 class Judge {
  public:
   void add(const GrowingMap& map, const RecognitionSet::Picture& asked, std::vector<place::PlaceCandidate> candidates,
@@ -108,7 +108,7 @@ class Judge {
   std::size_t verified_ = 0, verified_wrong_ = 0;
 };
 
-// What the index says of how likely it all is.
+// Judges the probabilities that the index gives.
 void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& asked, const place::PlaceAnswer& answer,
                          Evaluation& result) {
   const bool is_new = asked.same.empty();

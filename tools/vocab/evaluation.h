@@ -1,4 +1,5 @@
-// How well a vocabulary recognises places: a recording is shown picture by picture, each asks and then becomes a place.
+// Measures how well a vocabulary recognises places. A recording is shown picture by picture; each picture asks for its
+// place, and then becomes a place itself.
 #pragma once
 
 #include <array>
@@ -11,30 +12,30 @@
 
 namespace relmap::vocab {
 
-inline constexpr std::array<std::size_t, 3> kFirst = {1, 5, 20};  // of the candidates, in their order
-inline constexpr std::size_t kVerifiedFirst = 5;                  // candidates that geometry is tried on
+inline constexpr std::array<std::size_t, 3> kFirst = {1, 5, 20};  // numbers of first candidates that are evaluated
+inline constexpr std::size_t kVerifiedFirst = 5;                  // geometry is tried on so many first candidates
 
-// Queries whose place the map holds.
+// Numbers of queries whose place the map holds and which are answered right.
 struct Recall {
   std::array<std::size_t, kFirst.size()> among_first = {};
-  // Right by the first candidate, and that more certain than the most certain wrong one of all queries.
+  // The first candidate is right, and more certain than the most certain wrong first candidate of all queries.
   std::size_t at_full_precision = 0;
 };
 
-// Of one way to find candidates: before geometry, and after it has tried the first few (verified ones then come first,
-// by their inliers, and only they have any certainty).
+// The result of one method of finding candidates, before and after geometry has tried the first few. Verified
+// candidates then come first, by their inliers, and only these have any certainty.
 struct Candidates {
   Recall before, after;
   std::size_t verified = 0, verified_wrong = 0;  // queries whose first candidate is verified; and is wrong
 };
 
-// A probability that was given, and whether it was so.
+// A probability that was given to a statement, and whether the statement was true.
 struct Claim {
   double probability = 0;
   bool right = false;
 };
 
-// A candidate is right where it, or the picture before or after it, which geometry looks at as well, shows the place.
+// A candidate counts as right if it, or the picture before or after it, shows the place: geometry tries these, too.
 struct Evaluation {
   std::size_t queries = 0;
   std::size_t seen_before = 0;  // of them: the map holds the place
@@ -43,12 +44,12 @@ struct Evaluation {
   std::size_t right = 0;        // of those answered
   Candidates ours, tfidf;
   std::size_t new_places_right = 0;  // of new_places: p(new) > 0.5
-  double log_probability = 0;        // mean, of the truth: the place, or that it is new; each at least log 1e-4
-  std::vector<Claim> claims;         // of every query: each candidate, and that the place is new
+  double log_probability = 0;        // mean log probability of the truth (the place, or "new"); at least log 1e-4 each
+  std::vector<Claim> claims;         // of every query: one for each candidate, and one for "new"
 };
 
-// Reads the pictures. `verify`: with geometry, which takes most of the time. NO_SUCH_FILE, and reasons of
-// decode_picture().
+// Evaluates the vocabulary on the set. `verify`: also with geometry, which takes most of the time. NO_SUCH_FILE, and
+// reasons of decode_picture().
 Result<Evaluation> evaluate(const std::shared_ptr<const place::Vocabulary>& vocabulary, const RecognitionSet& set,
                             bool verify, const std::function<void(double)>& progress = {});
 

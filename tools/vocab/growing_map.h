@@ -1,4 +1,4 @@
-// The map that grows picture by picture, and whom its places can be asked of: the place index, and tf-idf.
+// A map that grows picture by picture, with two ways to find its places: the place index, and tf-idf.
 #pragma once
 
 #include <map>
@@ -25,18 +25,19 @@ class GrowingMap {
   // The set must outlive it.
   GrowingMap(std::shared_ptr<const place::Vocabulary> vocabulary, const RecognitionSet& set);
 
-  // The pictures of the set one after another. Throws.
+  // Adds the next picture of the set. Throws.
   void add(const DescribedPicture& picture);
 
   // Places for a picture of the set.
   place::PlaceAnswer by_index(const RecognitionSet::Picture& asked, const DescribedPicture& picture) const;
-  // By the cosine, which stands for a probability: as many, and as far apart.
+  // The same by tf-idf: as many candidates, as far apart, with the cosine in place of a probability.
   std::vector<place::PlaceCandidate> by_tf_idf(const RecognitionSet::Picture& asked,
                                                const DescribedPicture& picture) const;
 
-  // Whether the frame, or the one before or after it, shows what was asked for.
+  // Whether the frame, or the one before or after it, shows the place that was asked for.
   bool shows(FrameId frame, const RecognitionSet::Picture& asked) const;
-  // Inliers of geometry there; nothing where it refuses. No answer is made of what is masked for `asked`.
+  // The number of inliers of geometric verification at `frame`; nullopt if it refuses. Places that are masked for
+  // `asked` are not answers.
   std::optional<std::uint32_t> verify(FrameId frame, const RecognitionSet::Picture& asked,
                                       const DescribedPicture& picture) const;
 

@@ -1,4 +1,4 @@
-// Files of pictures and of what is made of them.
+// Lists pictures, and writes files.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace relmap::vocab {
 
-// The files named, and of each folder named every `every`-th JPEG, PNG or WebP in the order of names, folders within it
-// included. NO_SUCH_FILE.
+// The files in `paths`, and of each folder in `paths`, subfolders included, every `every`-th JPEG, PNG or WebP in the
+// order of names. NO_SUCH_FILE.
 Result<std::vector<std::string>> list_pictures(const std::vector<std::string>& paths, std::size_t every);
 
-// Replaces `path` in one step. IO_ERROR.
+// Replaces the file `path` atomically. IO_ERROR.
 Status write_file(const std::string& path, const Bytes& bytes);
 
 }  // namespace relmap::vocab

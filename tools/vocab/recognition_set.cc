@@ -183,8 +183,8 @@ Result<RecognitionSet> load_tower(const std::vector<std::string>& folders, bool 
   return set;
 }
 
-// The photographs of the first folder, each of a session of its own unless they are `one_walk`, among all pictures of
-// the others; and then each of them asks for those that are `same(i, k)`.
+// The map holds the photographs of the first folder, each as a session of its own unless they are `one_walk`, and the
+// pictures of the other folders. Then each photograph i of the first folder asks for those with `same(i, k)`.
 template <typename Same>
 Result<RecognitionSet> photographs(const std::vector<std::string>& folders, bool one_walk, Same same) {
   RecognitionSet set;
@@ -236,18 +236,19 @@ Result<RecognitionSet> load_front(const std::vector<std::string>& folders) {
 }  // namespace
 
 Result<RecognitionSet> load_recognition_set(const std::string& name, const std::vector<std::string>& folders) {
-  if (folders.empty()) return Status(Reason::INVALID_ARGUMENT, name + ": in no folder");
+  if (folders.empty()) return Status(Reason::INVALID_ARGUMENT, name + ": no folder is given");
   if (name == "tower" || name == "tower-area") return load_tower(folders, name == "tower-area");
   if (name == "walk") return load_walk(folders);
   if (name == "front") return load_front(folders);
   const std::string& folder = folders.front();
   if (folders.size() > 1)
-    return Status(Reason::INVALID_ARGUMENT, folders[1] + ": of no use, since " + name + " is one folder");
+    return Status(Reason::INVALID_ARGUMENT, folders[1] + ": not used, since " + name + " is one folder");
   if (name == "rtabmap" || name == "corridor") return load_rtabmap(folder);
   if (name == "euroc") return load_euroc(folder);
   if (name == "drive") return load_drive(folder);
-  return Status(Reason::INVALID_ARGUMENT, name + ": no set of that name; there are rtabmap, corridor, euroc, drive, " +
-                                              "tower, tower-area, walk, front");
+  return Status(Reason::INVALID_ARGUMENT,
+                name + ": there is no set of that name; there are rtabmap, corridor, euroc, drive, " +
+                    "tower, tower-area, walk, front");
 }
 
 }  // namespace relmap::vocab

@@ -16,24 +16,24 @@ struct RecognitionSet {
   struct Picture {
     std::string file;
     FrameId frame;                        // consecutive in a session: neighbours
-    bool asks = true;                     // what place is this?
-    bool stays = true;                    // and then becomes a place itself
-    std::uint32_t open = 0;               // the pictures before this one are no recent past
-    std::vector<std::uint32_t> same;      // of them, those that show the same place, ascending; none: a new place
-    std::optional<std::uint32_t> itself;  // of them, this very picture: no answer
+    bool asks = true;                     // whether it asks for its place
+    bool stays = true;                    // whether it becomes a place of the map afterwards
+    std::uint32_t open = 0;               // only pictures before this index are old enough to be answers
+    std::vector<std::uint32_t> same;      // those of them that show the same place, ascending; empty: a new place
+    std::optional<std::uint32_t> itself;  // the one of them that is this very picture, which is no answer
   };
   std::vector<Picture> pictures;
 };
 
-// `folders`: of the set, and then of what the map holds beside.
-//   rtabmap, or corridor   two laps of one
+// Loads the set `name` from the first of `folders`; the others hold further places of the map.
+//   rtabmap, or corridor   two laps of one corridor
 //   euroc                  a flight through one room
 //   drive                  of relmap-sim
-//   tower, tower-area      floors that look alike, some of them in each folder: which floor is it? Which area of it?
+//   tower, tower-area      floors that look alike, some in each folder: a query asks for the floor, or its area
 //   walk                   photographs along a street: each asks for those next to it, up to two away
-//   front                  photographs of one thing: each asks for the others
-// The last two among pictures of anything else, a folder of them a session. NO_SUCH_FILE, CORRUPT (a list that does not
-// fit the pictures), INVALID_ARGUMENT (another name, or folders of which the set makes no use).
+//   front                  photographs of one building: each asks for the others
+// For walk and front, each further folder holds pictures of other places and is one session. NO_SUCH_FILE; CORRUPT (a
+// list that does not fit the pictures); INVALID_ARGUMENT (another name, or folders that the set does not use).
 Result<RecognitionSet> load_recognition_set(const std::string& name, const std::vector<std::string>& folders);
 
 }  // namespace relmap::vocab

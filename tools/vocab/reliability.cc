@@ -42,10 +42,10 @@ std::string axes() {
 
 }  // namespace
 
-Reliability reliability(std::span<const Claim> claims, double least) {
+Reliability reliability(std::span<const Claim> claims, double min_probability) {
   Reliability result;
   for (const Claim& claim : claims) {
-    if (claim.probability < least) continue;
+    if (claim.probability < min_probability) continue;
     const auto count = static_cast<double>(result.bins.size());
     auto& bin = result.bins[static_cast<std::size_t>(std::clamp(claim.probability * count, 0.0, count - 1))];
     ++bin.claims;

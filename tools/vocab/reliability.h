@@ -1,4 +1,4 @@
-// Are probabilities what they say? Of claims that are made with about the same one, the share that came true.
+// Reliability of probabilities: of claims with about the same probability, the share that came true.
 #pragma once
 
 #include <array>
@@ -20,14 +20,14 @@ struct Reliability {
   std::size_t claims = 0;
 };
 
-// Of claims of at least `least`: below it there are many, and nobody acts on them.
-Reliability reliability(std::span<const Claim> claims, double least = 0.05);
+// Evaluates claims of at least `min_probability`: there are many below, and nobody acts on them.
+Reliability reliability(std::span<const Claim> claims, double min_probability = 0.05);
 
 struct ReliabilityCurve {
   std::string name;
   Reliability reliability;
 };
-// A diagram, as scalable vector graphics.
+// Draws a reliability diagram as SVG.
 std::string draw(const std::vector<ReliabilityCurve>& curves);
 
 }  // namespace relmap::vocab

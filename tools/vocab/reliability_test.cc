@@ -5,7 +5,7 @@
 namespace relmap::vocab {
 namespace {
 
-TEST(Reliability, ComparesWhatWasSaidWithWhatCameTrue) {
+TEST(Reliability, ComparesProbabilitiesWithHowOftenTheyComeTrue) {
   std::vector<Claim> claims;
   for (int i = 0; i < 10; ++i) claims.push_back({0.85, i < 8});
   for (int i = 0; i < 10; ++i) claims.push_back({0.15, i < 4});

@@ -93,7 +93,7 @@ struct EvaluateArguments {
   bool no_geometry = false, json = false;
 };
 
-// A share, or that there was nothing to share out.
+// part / whole as text, or `nothing` if `whole` is 0.
 std::string share(std::size_t part, std::size_t whole, const char* nothing) {
   if (whole == 0) return nothing;
   char text[32];
@@ -214,60 +214,70 @@ int main(int argc, char** argv) {
   CLI::App* train = app.add_subcommand("train", "Train a vocabulary on pictures");
   train->add_option("--out", arguments.out, "File to write")->required();
   train->add_option("pictures", arguments.pictures, "JPEG, PNG or WebP files, or folders of them")->required();
-  train->add_option("--words", arguments.options.words, "Words, at most")->capture_default_str();
-  train->add_option("--sample-places", arguments.options.sample_places, "Pictures kept to stand for unknown places")
+  train->add_option("--words", arguments.options.words, "Number of words, at most")->capture_default_str();
+  train
+      ->add_option("--sample-places", arguments.options.sample_places,
+                   "Number of pictures kept as samples of unknown places")
       ->capture_default_str();
   train->add_option("--every", arguments.every, "Use every n-th picture of a folder")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  train->add_option("--views", arguments.views, "Pictures taken of one that is much larger than a camera's, at most")
+  train
+      ->add_option("--views", arguments.views,
+                   "Number of views, at most, that are taken of a picture much larger than a camera's")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  train->add_option("--seed", arguments.options.seed, "Of k-means")->capture_default_str();
-  train->add_option("--source", arguments.options.source, "What the pictures are, and under which terms")->required();
+  train->add_option("--seed", arguments.options.seed, "Seed of k-means")->capture_default_str();
+  train
+      ->add_option("--source", arguments.options.source,
+                   "What the pictures are, and their licence; kept in the vocabulary")
+      ->required();
   train->footer(
       "Example:\n"
       "  relmap-vocab train --out my.vocab --source 'our yard, 2026; internal' --every 5 /recordings/yard/left");
 
   std::string file = relmap::place::default_vocabulary_path();
-  CLI::App* info = app.add_subcommand("info", "Describe a vocabulary (by default, the one shipped)");
+  CLI::App* info = app.add_subcommand("info", "Describe a vocabulary (default: the one shipped)");
   info->add_option("file", file, "Vocabulary");
   info->footer("Example:\n  relmap-vocab info my.vocab");
 
   relmap::vocab::EvaluateArguments evaluation;
-  CLI::App* evaluate = app.add_subcommand("evaluate", "Measure how well places are recognised, and against tf-idf");
+  CLI::App* evaluate =
+      app.add_subcommand("evaluate", "Measure how well places are recognised, in comparison with tf-idf");
   const auto add_vocabulary = [&](CLI::App* command) {
-    command->add_option("--vocabulary", evaluation.vocabulary, "By default, the one shipped");
+    command->add_option("--vocabulary", evaluation.vocabulary, "Vocabulary file (default: the one shipped)");
   };
   constexpr const char* kSets =
-      "rtabmap (or corridor: two laps of one), euroc, drive (of relmap-sim), tower (which floor?), tower-area (which "
-      "area "
-      "of it?), walk (which of the photographs next to it?), front (which of the others of one thing?)";
-  evaluate->add_option("--set", evaluation.set, std::string("What the first PATH holds: ") + kSets)->required();
+      "rtabmap (or corridor: two laps of a corridor), euroc, drive (of relmap-sim), tower (find the floor), tower-area "
+      "(find the area of the floor), walk (photographs along a street find those next to them), front (photographs of "
+      "one building find each other)";
+  evaluate->add_option("--set", evaluation.set, std::string("Kind of the set in the first PATH: ") + kSets)->required();
   evaluate
-      ->add_option("path", evaluation.folders,
-                   "Folder of the set; for tower, more floors; for walk and front, pictures of anything else")
+      ->add_option(
+          "path", evaluation.folders,
+          "Folder of the set; then, for tower, folders of more floors; for walk and front, of pictures of other places")
       ->required();
   add_vocabulary(evaluate);
-  evaluate->add_flag("--no-geometry", evaluation.no_geometry, "Recognition only, which is several times as fast");
-  evaluate->add_flag("--json", evaluation.json, "One JSON object");
+  evaluate->add_flag("--no-geometry", evaluation.no_geometry, "Measure recognition only, several times as fast");
+  evaluate->add_flag("--json", evaluation.json, "Print one JSON object");
   evaluate->footer(
-      "Pictures are shown one by one: each asks for its place and then becomes one. among_first_K: of queries whose "
-      "place\n"
-      "was seen before, those with it among the first K candidates; right_at_full_precision: with it as the first, "
-      "and\n"
-      "with more than the highest p of a wrong answer; verified_...: after geometry has tried the first five. Each\n"
-      "beside tf-idf on the same words. precision: of answers with p > 0.5. new_place_right_share: of queries whose "
-      "place\n"
-      "is new, p(new) > 0.5. log_probability: mean of the truth's. calibration_error: mean difference between a\n"
-      "probability and the share of answers of that probability that are right.\n"
+      "Pictures are shown one by one: each asks for its place, and then becomes a place itself. Figures:\n"
+      "  among_first_K            queries with the right place among the first K candidates, of those seen before\n"
+      "  right_at_full_precision  queries whose first candidate is right, and more probable than any wrong first one\n"
+      "  verified_...             the same after geometry has tried the first five candidates\n"
+      "  tfidf_...                the same with tf-idf on the same words\n"
+      "  precision                share of right answers among those with p > 0.5\n"
+      "  new_place_right_share    share of queries of new places with p(new) > 0.5\n"
+      "  log_probability          mean logarithm of the probability given to the truth\n"
+      "  calibration_error        mean difference between a probability and the share of such answers that are right\n"
       "Examples:\n"
       "  relmap-vocab evaluate --vocabulary my.vocab --set drive drive --json\n"
       "  relmap-vocab evaluate --set tower floor-1 floor-2 floor-3");
 
   std::vector<std::string> sets;
-  CLI::App* reliability = app.add_subcommand("reliability", "Draw whether probabilities are what they say");
-  reliability->add_option("--out", evaluation.diagram, "SVG to write")->required();
+  CLI::App* reliability = app.add_subcommand(
+      "reliability", "Draw a reliability diagram: do probabilities agree with how often they come true?");
+  reliability->add_option("--out", evaluation.diagram, "SVG file to write")->required();
   reliability->add_option("sets", sets, std::string("SET=FOLDER[,FOLDER...]; SET is ") + kSets)->required();
   add_vocabulary(reliability);
   reliability->footer("Example:\n  relmap-vocab reliability --out reliability.svg drive=drive rtabmap=corridor");

@@ -1,5 +1,5 @@
-// Bags of visual words, compared by the cosine of their tf-idf weights (Sivic and Zisserman, ICCV 2003): what FAB-MAP
-// is measured against.
+// Bags of visual words compared by the cosine of their tf-idf weights (Sivic and Zisserman, ICCV 2003), the reference
+// that FAB-MAP is measured against.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,11 @@
 
 namespace relmap::vocab {
 
-// Sorted by word; of length one, but for a picture without words.
+// Sorted by word; of unit length, except for a picture without words.
 using WeightedWords = std::vector<std::pair<std::uint32_t, double>>;
 
-// `words` as they come: a word counts as often as it is seen. Documents are those that the vocabulary was trained on:
-// log(N / df) is -log p(z = 1).
+// `words` may contain a word several times; it counts as often. The documents are the pictures that the vocabulary was
+// trained on: log(N / df) is -log p(z = 1).
 WeightedWords tf_idf(const place::Vocabulary& vocabulary, std::span<const std::uint32_t> words);
 
 double cosine(const WeightedWords& a, const WeightedWords& b);

@@ -13,7 +13,7 @@ namespace {
 
 using Descriptors = std::vector<place::Descriptor>;
 
-constexpr std::size_t kMinFeatures = 50;  // features of a picture that shows a place, of some 300
+constexpr std::size_t kMinFeatures = 50;  // a picture with fewer of its some 300 features shows no place
 
 Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t views) {
   const auto pictures = training_views(file, views);

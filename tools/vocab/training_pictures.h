@@ -1,4 +1,4 @@
-// What training pictures show: the descriptors of each, found on all cores.
+// Computes the descriptors of training pictures, on all cores.
 #pragma once
 
 #include <functional>
@@ -10,8 +10,9 @@
 
 namespace relmap::vocab {
 
-// One entry a picture, in the order of `files`; of each file at most `views` (training_views.h). Pictures that show
-// next to nothing are left out: there are no such places. The same for any number of cores. NOT_A_PICTURE.
+// One entry for each picture, in the order of `files`; a file gives at most `views` pictures (training_views.h).
+// Pictures with too few features are left out, since they show no place. The result does not depend on the number of
+// cores. NOT_A_PICTURE.
 Result<std::vector<std::vector<place::Descriptor>>> describe_pictures(const std::vector<std::string>& files,
                                                                       std::size_t views,
                                                                       const std::function<void(double)>& progress);

@@ -10,8 +10,8 @@
 namespace relmap::vocab {
 namespace {
 
-constexpr double kViewsPerArea = 2.5;  // views overlap, as those of a camera that moves
-constexpr double kSlant = 0.12;        // of a side, by which a corner is moved at most
+constexpr double kViewsPerArea = 2.5;  // more than 1: views overlap like those of a moving camera
+constexpr double kSlant = 0.12;        // a corner is moved by at most this share of a side
 
 // Uniform in [0, 1), the same with every standard library.
 class Uniform {
@@ -30,7 +30,7 @@ vision::Image to_image(const cv::Mat& grey) {
   return image;
 }
 
-// What a camera sees that looks at a part of the picture, between one of its own size and the whole.
+// The view of a camera that looks at a part of the picture, at a scale between the camera's own size and the whole.
 cv::Mat look(const cv::Mat& picture, Uniform& uniform) {
   const double largest = std::min(double{1} * picture.cols / kViewWidth, double{1} * picture.rows / kViewHeight);
   const double scale = std::exp(uniform.between(0, std::log(largest)));
@@ -56,15 +56,15 @@ cv::Mat look(const cv::Mat& picture, Uniform& uniform) {
 
 }  // namespace
 
-Result<std::vector<vision::Image>> training_views(const std::string& file, std::size_t most) {
+Result<std::vector<vision::Image>> training_views(const std::string& file, std::size_t max_views) {
   const cv::Mat picture = cv::imread(file, cv::IMREAD_GRAYSCALE);
   if (picture.empty()) return Status(Reason::NOT_A_PICTURE, file);
   const double room = double{1} * picture.cols * picture.rows / (kViewWidth * kViewHeight);
-  if (most <= 1 || picture.cols <= kViewWidth || picture.rows <= kViewHeight || room < 2)
+  if (max_views <= 1 || picture.cols <= kViewWidth || picture.rows <= kViewHeight || room < 2)
     return std::vector<vision::Image>{to_image(picture)};
   std::vector<vision::Image> views;
   Uniform uniform(static_cast<std::uint64_t>(picture.cols) << 32 | static_cast<std::uint32_t>(picture.rows));
-  const auto count = std::min(most, static_cast<std::size_t>(kViewsPerArea * room));
+  const auto count = std::min(max_views, static_cast<std::size_t>(kViewsPerArea * room));
   for (std::size_t i = 0; i < count; ++i) views.push_back(to_image(look(picture, uniform)));
   return views;
 }

@@ -1,4 +1,4 @@
-// Many pictures of one: a photograph is larger than what a robot's camera sees at once, so several cameras look at it.
+// Takes several views of one photograph, since it shows more than a robot's camera sees at once.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@ namespace relmap::vocab {
 
 inline constexpr int kViewWidth = 512, kViewHeight = 384;
 
-// At most `most` views of the picture in a file (JPEG, PNG or WebP), by the room that it has for different ones: each
-// looks at a part of it, at a scale of its own, a little aslant. One of at most a camera's size is its own only view.
-// The same file gives the same views. NOT_A_PICTURE.
-Result<std::vector<vision::Image>> training_views(const std::string& file, std::size_t most);
+// At most `max_views` views of the picture in a file (JPEG, PNG or WebP), the more the larger it is. Each view is a
+// part of the picture, at a scale of its own, a little aslant. A picture no larger than a camera's is its own only
+// view. The same file gives the same views. NOT_A_PICTURE.
+Result<std::vector<vision::Image>> training_views(const std::string& file, std::size_t max_views);
 
 }  // namespace relmap::vocab

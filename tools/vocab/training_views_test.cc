@@ -34,7 +34,7 @@ TEST(TrainingViews, ASmallPictureIsItsOwnOnlyView) {
   EXPECT_EQ(views[0].height(), 300);
 }
 
-TEST(TrainingViews, ALargePictureHasAsManyAsItHasRoomForAndAllDiffer) {
+TEST(TrainingViews, ALargePictureHasViewsByItsSizeAndAllDiffer) {
   const storage::TemporaryFolder folder;
   const std::string file = write_picture(folder / "", 1600, 1200);
   const auto views = training_views(file, 1000).or_throw();
@@ -55,7 +55,7 @@ TEST(TrainingViews, AreTheSameEachTime) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_TRUE(same(a[i], b[i]));
 }
 
-TEST(TrainingViews, RefusesWhatIsNoPicture) {
+TEST(TrainingViews, RefusesAFileThatIsNoPicture) {
   EXPECT_EQ(training_views("/nowhere.jpg", 5).reason(), Reason::NOT_A_PICTURE);
 }
 

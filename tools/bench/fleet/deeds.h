@@ -1,4 +1,4 @@
-// What the robots of a fleet did and heard, written down as it happens, so that not even kill -9 makes it unsaid.
+// A log of what the robots of a fleet did and heard, written at once, so that it survives kill -9.
 #pragma once
 
 #include <cstdint>

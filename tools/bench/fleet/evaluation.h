@@ -1,4 +1,4 @@
-// What became of what a fleet sent: by what its robots did and heard, and by a client who knows nothing but the map.
+// Evaluates a run of a fleet: by the deeds of its robots, and by a client that asks the map for each frame.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +28,12 @@ struct RobotDeeds {
 
 std::map<std::uint32_t, RobotDeeds> by_robot(const std::vector<Deed>& deeds);
 
-// From push() to the acknowledgement, of what was pushed in between; what was never acknowledged counts as infinity.
+// Latencies from push() to the acknowledgement, of keyframes pushed from `from_ns` to `to_ns`; infinity if a keyframe
+// was never acknowledged.
 std::vector<double> latencies_ms(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t from_ns,
                                  std::int64_t to_ns);
 
-// Seconds from `at_ns` until all that was pushed before was settled; infinity: it never was.
+// Seconds from `at_ns` until everything pushed before it was settled; infinity if it never was.
 double settled_after_s(const RobotDeeds& robot, std::int64_t at_ns);
 double settled_after_s(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t at_ns);
 
@@ -44,7 +45,8 @@ struct MapTally {
   std::uint64_t strange = 0;  // frames that nobody sent, or with another time than what was sent
 };
 
-// Asks for each frame. Throws StatusError. `sent`: keyframes of each robot; `flooder`: one whose frames do not matter.
+// Counts the frames of the map, asking for each. `sent`: number of keyframes of each robot; `flooder`: the robot whose
+// frames are counted apart. Throws StatusError.
 MapTally tally_map(client::Client& map, const std::vector<std::pair<FleetRobot, std::uint64_t>>& sent,
                    const FleetRobot& flooder);
 

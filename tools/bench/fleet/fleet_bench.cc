@@ -111,7 +111,7 @@ class FleetDaemon {
   std::size_t peak_resident_ = 0;
 };
 
-// Those to be killed are processes of their own; the others share one.
+// Robots to be killed are processes of their own; the others share one.
 class FleetProcesses {
  public:
   FleetProcesses(const Options& options, std::string folder, std::string lcm)
@@ -138,7 +138,7 @@ class FleetProcesses {
     for (const auto& process : processes_)
       if (!process->running()) throw std::runtime_error("robots ended: " + testing::read_text(folder_ + "/robots.log"));
   }
-  // No more keyframes; ends when all are settled, or after a minute.
+  // Makes no more keyframes, and ends when all are settled, or after a minute.
   void finish() {
     for (const auto& process : processes_) process->signal(SIGTERM);
     for (const auto& process : processes_)
@@ -214,7 +214,7 @@ void wait_until_all_are_heard(const FleetProcesses& processes, const Options& op
   }
 }
 
-// Until the map shows all that the daemon has acknowledged; places may still be looked up. The seconds it took.
+// Waits until the map has everything that the daemon has acknowledged (lookups may be left), and returns the seconds.
 double wait_until_applied(client::Client& client) {
   const auto begin = Clock::now();
   for (;; std::this_thread::sleep_for(milliseconds(20))) {
@@ -226,7 +226,7 @@ double wait_until_applied(client::Client& client) {
   }
 }
 
-// One run, from the start of the daemon to what the map shows.
+// One run, from the start of the daemon to the check of the map.
 class FleetRun {
  public:
   explicit FleetRun(const Options& options)
@@ -262,7 +262,7 @@ class FleetRun {
               << " % of a core; relay and trouble: " << (own_cpu_seconds() - own_cpu) * percent << " %\n";
   }
 
-  // Until robots and map have what there is to have.
+  // Waits until robots and map are up to date.
   void settle() {
     say_what_passed();
     processes_.finish();
@@ -388,7 +388,7 @@ class FleetRun {
   std::vector<std::pair<std::uint32_t, std::int64_t>> robot_restarts_ns_;
 };
 
-// A tenth as many with all that the daemon does of itself.
+// A tenth as many with all background work of the daemon.
 void report_batch(const Options& options, Report& report) {
   BatchSpeed journal, map, full;
   journal.durable_per_s = map.done_per_s = full.done_per_s = std::numeric_limits<double>::quiet_NaN();
@@ -432,9 +432,9 @@ Run declare_fleet(CLI::App& app) {
       "  relmap-bench fleet --seconds 30 --flood 100 --garbage 200        two who make trouble for the others\n\n"
       "A keyframe is sent when push() has returned: then it is in its robot's spool. Everything happens in a network\n"
       "namespace that is gone afterwards; where none may be made, in random multicast groups of this machine.");
-  app.add_option("--robots", options->robots, "robots, each with a spool of its own")->capture_default_str();
-  app.add_option("--rate", options->rate, "keyframes a second of each")->capture_default_str();
-  app.add_option("--seconds", options->seconds, "of keyframes")->capture_default_str();
+  app.add_option("--robots", options->robots, "number of robots, each with its own spool")->capture_default_str();
+  app.add_option("--rate", options->rate, "keyframes a second of each robot")->capture_default_str();
+  app.add_option("--seconds", options->seconds, "seconds during which robots make keyframes")->capture_default_str();
   app.add_option("--loss", options->faults.loss,
                  "share of 1,500-byte packets lost, either way; a datagram is lost "
                  "with any of its packets")
@@ -443,28 +443,30 @@ Run declare_fleet(CLI::App& app) {
   app.add_option("--reorder", options->faults.late, "share of datagrams held back for 2 to 10 ms")
       ->check(share)
       ->capture_default_str();
-  app.add_option("--double", options->faults.doubled, "share of datagrams that come twice")
+  app.add_option("--double", options->faults.doubled, "share of datagrams that are delivered twice")
       ->check(share)
       ->capture_default_str();
-  app.add_option("--keyframe-bytes", options->keyframe_bytes, "of each; a seventh is a picture")
+  app.add_option("--keyframe-bytes", options->keyframe_bytes, "bytes of each keyframe, a seventh of them a picture")
       ->check(CLI::Range(5'000, 150'000))
       ->capture_default_str();
-  app.add_option("--part-bytes", options->part_bytes, "of keyframes on their way")->capture_default_str();
-  app.add_option("--kill-daemon", options->kill_daemon, "times that relmapd is killed by kill -9, and started again")
+  app.add_option("--part-bytes", options->part_bytes, "bytes of the parts in which keyframes travel")
       ->capture_default_str();
-  app.add_option("--kill-robots", options->kill_robots, "robots that are killed by kill -9, and started again")
+  app.add_option("--kill-daemon", options->kill_daemon, "kill relmapd (kill -9) and start it again so many times")
       ->capture_default_str();
-  app.add_option("--kills-each", options->kills_each, "times that each of them is")->capture_default_str();
-  app.add_option("--flood", options->flood, "one more robot sends at so many times the rate, whatever its credits")
+  app.add_option("--kill-robots", options->kill_robots, "kill so many robots (kill -9) and start them again")
       ->capture_default_str();
-  app.add_option("--garbage", options->garbage_hz, "messages a second that mean nothing, or worse")
+  app.add_option("--kills-each", options->kills_each, "kill each of these robots so many times")->capture_default_str();
+  app.add_option("--flood", options->flood, "one more robot sends at so many times the rate, and ignores its credits")
       ->capture_default_str();
-  app.add_option("--budget-mb", options->memory_budget_mb, "of relmapd")->capture_default_str();
+  app.add_option("--garbage", options->garbage_hz, "send so many meaningless or harmful messages a second")
+      ->capture_default_str();
+  app.add_option("--budget-mb", options->memory_budget_mb, "memory budget of relmapd")->capture_default_str();
   app.add_flag("!--no-closures", options->closures, "relmapd recognises no places");
-  app.add_option("--batch", options->batch, "ready-made keyframes afterwards, as fast as they are taken; 0: none")
+  app.add_option("--batch", options->batch,
+                 "afterwards, send so many ready-made keyframes as fast as they are taken; 0: none")
       ->capture_default_str();
-  app.add_option("--seed", options->seed, "of faults and keyframes")->capture_default_str();
-  app.add_option("--folder", options->folder, "for the map and the spools, and kept; none: a temporary one");
+  app.add_option("--seed", options->seed, "seed of faults and keyframes")->capture_default_str();
+  app.add_option("--folder", options->folder, "folder for map and spools, which is kept (default: a temporary one)");
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -11,7 +11,7 @@
 
 namespace relmap::bench {
 
-// All that a robot's keyframes depend on but their odometry.
+// Everything that a robot's keyframes depend on, except their odometry.
 struct FleetRobot {
   std::uint32_t number = 0;
   std::uint64_t seed = 1;   // of the fleet

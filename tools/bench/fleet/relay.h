@@ -1,5 +1,5 @@
-// A bad network between two multicast groups of this machine: what is said in one is heard in the other, but for what
-// is lost, late or twice. Knows datagrams, not what is in them.
+// A bad network between two multicast groups of this machine: relays datagrams, without knowing their content, and
+// loses, delays or doubles some of them.
 #pragma once
 
 #include <array>
@@ -20,17 +20,17 @@ struct RelayFaults {
 
 struct RelayCounts {
   std::uint64_t datagrams = 0, lost = 0, late = 0, doubled = 0;
-  std::uint64_t overflowed = 0;  // dropped by the kernel before the relay saw them: more was said than it can carry
+  std::uint64_t overflowed = 0;  // dropped by the kernel before the relay read them, since too much was sent
 };
 
 class Relay {
  public:
-  // Of the groups of two LCM URLs. Without faults until begin_faults(). Throws.
+  // Relays between the groups of two LCM URLs, without faults until begin_faults(). Throws.
   Relay(const std::string& url_a, const std::string& url_b, std::uint64_t seed);
   ~Relay();
 
   void begin_faults(const RelayFaults& faults);
-  // What passed since then.
+  // The counts since begin_faults().
   RelayCounts counts() const;
 
  private:

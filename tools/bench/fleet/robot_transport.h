@@ -1,4 +1,4 @@
-// A robot's way to the daemon over a connection that it shares, which notes what passes.
+// The transport of a robot over a shared connection, which logs what is sent and heard.
 #pragma once
 
 #include <atomic>

@@ -120,16 +120,16 @@ void run(const Options& options) {
 
 Run declare_fleet_robots(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--folder", options->folder, "of the fleet: lap.bin, deeds, spools")->required();
-  app.add_option("--lcm", options->lcm, "URL")->required();
+  app.add_option("--folder", options->folder, "folder of the fleet: lap.bin, deeds, spools")->required();
+  app.add_option("--lcm", options->lcm, "LCM URL")->required();
   app.add_option("--first", options->first, "number of the first of these robots");
-  app.add_option("--count", options->count, "of these robots");
-  app.add_option("--robots", options->robots, "of the whole fleet");
-  app.add_option("--rate", options->rate, "keyframes a second of each");
+  app.add_option("--count", options->count, "number of these robots");
+  app.add_option("--robots", options->robots, "number of robots of the whole fleet");
+  app.add_option("--rate", options->rate, "keyframes a second of each robot");
   app.add_option("--start-us", options->start_us, "time stamp of keyframe 0");
-  app.add_option("--seed", options->seed, "of the fleet");
-  app.add_option("--part-bytes", options->part_bytes, "of keyframes on their way");
-  app.add_option("--patience", options->patience_s, "seconds for what is not settled at SIGTERM");
+  app.add_option("--seed", options->seed, "seed of the fleet");
+  app.add_option("--part-bytes", options->part_bytes, "bytes of the parts in which keyframes travel");
+  app.add_option("--patience", options->patience_s, "seconds to wait at SIGTERM for what is not settled yet");
   return [options](Report&) { run(*options); };
 }
 

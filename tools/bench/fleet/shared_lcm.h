@@ -1,4 +1,4 @@
-// One LCM connection for the publishers of many robots: as many of their own would each receive what all of them hear.
+// One LCM connection for the publishers of many robots, since each connection receives the messages for all of them.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@ class SharedLcm {
   static std::shared_ptr<SharedLcm> open(const std::string& url);  // throws
 
   void publish(const char* channel, const Bytes& message) { link_->publish(channel, message); }
-  // What the daemon says of one session, from now on. Empty: nothing more, once this has returned.
+  // Calls `listener` for messages about a session from now on. With an empty one, no call is running when this returns.
   void listen(const SessionUuid& session, publishing::PublishTransport::Listener listener);
 
  private:

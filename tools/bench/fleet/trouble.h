@@ -1,4 +1,4 @@
-// Who makes trouble for a fleet: a robot that sends far faster than it may, and somebody who sends what means nothing.
+// Trouble-makers for a fleet: a robot that sends far faster than it may, and a sender of garbage.
 #pragma once
 
 #include <atomic>
@@ -14,8 +14,7 @@
 
 namespace relmap::bench {
 
-// Sends parts of valid keyframes without a look at its credits: the 64 that the daemon would take next, again and
-// again.
+// Sends parts of valid keyframes regardless of its credits: the 64 that the daemon would take next, again and again.
 class Flooder {
  public:
   // Throws. `lap` outlives it.
