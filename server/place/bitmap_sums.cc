@@ -6,7 +6,7 @@
 
 #if defined(__x86_64__)
 #pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // GCC 12 sees some of undefined registers that are masked out
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"  // GCC 12 warns of undefined registers that are masked out
 #include <immintrin.h>
 #pragma GCC diagnostic pop
 #endif
@@ -16,7 +16,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-// Sums of the increments of a few words, for every choice among them.
+// Fills `sums` with the sum of the increments of every subset of a few words; bit k of the index selects word k.
 void fill(std::span<LogLikelihood> sums, const LogLikelihood* increments) {
   sums[0] = 0;
   for (std::size_t choice = 1; choice < sums.size(); ++choice)
@@ -25,7 +25,7 @@ void fill(std::span<LogLikelihood> sums, const LogLikelihood* increments) {
 
 using TwoWords [[gnu::vector_size(16)]] = std::uint64_t;
 
-// Eight bytes as a matrix of 8 x 8 bits, in each half (Warren, Hacker's Delight, 7-3).
+// Transposes the eight bytes of each half as a matrix of 8 x 8 bits (Warren, Hacker's Delight, 7-3).
 TwoWords transpose_bits(TwoWords x) {
   TwoWords t = (x ^ (x >> 7)) & 0x00AA00AA00AA00AAu;
   x ^= t ^ (t << 7);
@@ -35,7 +35,7 @@ TwoWords transpose_bits(TwoWords x) {
   return x ^ t ^ (t << 28);
 }
 
-// Rows `distance` apart exchange what stands right of the diagonal in one for what stands left of it in the other.
+// One step of a matrix transposition: swaps the off-diagonal blocks of rows that are `distance` apart.
 template <std::size_t distance>
 void exchange(TwoWords* rows, std::uint64_t mask) {
   for (std::size_t row = 0; row < 8; ++row) {
@@ -46,14 +46,14 @@ void exchange(TwoWords* rows, std::uint64_t mask) {
   }
 }
 
-// Eight rows as a matrix of 8 x 8 bytes, in each half.
+// Transposes eight rows as a matrix of 8 x 8 bytes, in each half.
 void transpose_bytes(TwoWords* rows) {
   exchange<1>(rows, 0x00FF00FF00FF00FFu);
   exchange<2>(rows, 0x0000FFFF0000FFFFu);
   exchange<4>(rows, 0x00000000FFFFFFFFu);
 }
 
-// Of 128 places a byte each: bit k is that of bitmaps[k].
+// Writes a byte for each of 128 places; bit k is the place's bit in bitmaps[k].
 void choices_of(const std::uint8_t* const* bitmaps, std::size_t at, std::uint8_t* choices) {
   TwoWords rows[8];
   for (std::size_t k = 0; k < 8; ++k) std::memcpy(&rows[k], bitmaps[k] + at, sizeof rows[k]);
@@ -70,12 +70,12 @@ void choices_of(const std::uint8_t* const* bitmaps, std::size_t at, std::uint8_t
 
 #define RELMAP_AVX512 __attribute__((target("avx512f,avx512bw,avx512vbmi,gfni")))
 
-// Of 64 places a byte each, in the order in which byte b of lane q is place 8 b + q.
+// Returns a byte for each of 64 places; byte b of lane q is that of place 8 b + q.
 RELMAP_AVX512 inline __m512i choices_of(const std::uint8_t* const* bitmaps, std::size_t at, __m512i transposed,
                                         __m512i identity) {
   long long rows[8];
   for (std::size_t k = 0; k < 8; ++k) std::memcpy(&rows[k], bitmaps[k] + at, 8);
-  // The product takes the last row first.
+  // The matrix product takes the last row first.
   const __m512i by_word = _mm512_set_epi64(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7]);
   const __m512i by_eight_places = _mm512_permutexvar_epi8(transposed, by_word);
   const __m512i by_place = _mm512_gf2p8affine_epi64_epi8(identity, by_eight_places, 0);
@@ -83,7 +83,7 @@ RELMAP_AVX512 inline __m512i choices_of(const std::uint8_t* const* bitmaps, std:
 }
 
 struct Nibble {
-  __m512i low, high;  // its 16 sums
+  __m512i low, high;  // the 16 sums of four words
 };
 
 RELMAP_AVX512 inline __m512i add(__m512i scores, const Nibble& nibble, __m512i choices) {

@@ -8,7 +8,7 @@
 namespace relmap::place {
 namespace {
 
-TEST(BitmapSums, AreThoseOfTheWordsEachPlaceShows) {
+TEST(BitmapSums, EqualTheSumsAddedWordByWord) {
   std::mt19937_64 random(1);
   for (const std::size_t places : {128u, 256u, 4096u}) {
     const std::size_t bytes = places / 8;

@@ -77,7 +77,7 @@ LogLikelihood BlockScores::of_words(LogLikelihood constant, std::span<const std:
 }
 
 std::size_t BlockScores::memory_bytes() const {
-  // Of a query that touches all words: another thread asks while one is under way.
+  // Counts what a query needs that touches all words, since another thread may ask while a query runs.
   const std::size_t words = increments_.size();
   return (words + padded_.size()) * sizeof(LogLikelihood) + words * (sizeof(Increment) + sizeof(Slots)) +
          (words / kBitmapWords + 1) * sizeof(BitmapWords);

@@ -1,5 +1,5 @@
-// The log-likelihoods of one query at all places of a block: words with bitmaps 32 at a time, those with lists of slots
-// one by one.
+// Computes the log-likelihood of a query at all places of a block. Words that are stored as bitmaps are added 32 at a
+// time, words that are stored as lists of slots one by one.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +12,17 @@
 
 namespace relmap::place {
 
-// One thread at a time; kept from query to query for its memory.
+// Not thread-safe. An object is reused from query to query, which saves allocations.
 class BlockScores {
  public:
   explicit BlockScores(const FabMapModel& model);
 
-  // `query` sorted and unique.
+  // Sets the query: words, sorted and unique.
   void ask(std::span<const std::uint32_t> query);
 
-  // For each place of the block.
+  // Writes the score of each place of the block.
   void of_block(const PlaceBlock& block, LogLikelihood* scores);
-  // Of a place that stands in no block yet; `constant` of FabMapModel::place().
+  // The score of a place that is in no block yet; `constant` is FabMapModel::place() of its words.
   LogLikelihood of_words(LogLikelihood constant, std::span<const std::uint32_t> words) const;
 
   std::size_t memory_bytes() const;
@@ -39,12 +39,12 @@ class BlockScores {
 
   const FabMapModel& model_;
   LogLikelihood empty_place_ = 0;
-  std::vector<Increment> touched_;         // by word
-  std::vector<LogLikelihood> increments_;  // of every word; 0 but for those touched
-  // Of a block:
+  std::vector<Increment> touched_;         // sorted by word
+  std::vector<LogLikelihood> increments_;  // by word; 0 for words that the query does not touch
+  // Scratch memory of of_block():
   std::vector<BitmapWords> bitmaps_;
   std::vector<Slots> slots_;
-  std::vector<LogLikelihood> padded_;  // scores, where the places are no multiple of kBitmapPlaces
+  std::vector<LogLikelihood> padded_;  // scores where the number of places is not a multiple of kBitmapPlaces
 };
 
 }  // namespace relmap::place

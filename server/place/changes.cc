@@ -10,7 +10,7 @@ namespace relmap::place {
 
 Changes changes(std::span<const SoughtLandmark> sought, const StereoCamera& camera) {
   constexpr double kMaxFound = 0.95;      // a share of 1 would compare cells with a single landmark
-  constexpr double kNoneByChance = 0.01;  // of a cell that shows what it showed
+  constexpr double kNoneByChance = 0.01;  // probability that nothing is found in a cell that has not changed
   constexpr int kMinCells = 8;
   struct Cell {
     int sought = 0, found = 0;

@@ -1,6 +1,6 @@
-// Does a picture show the place that it is taken for? Of two floors that look alike most is the same and something is
-// not: there old landmarks are not found by what they looked like, and all of them together, while elsewhere in the
-// picture most are (docs/method.md, 7).
+// Tells whether a picture shows the place that it is taken for. Two floors that look alike are the same in most parts
+// of the picture and differ in some: in those, no old landmark is found by its appearance, while elsewhere in the
+// picture most are found (docs/method.md, 7).
 #pragma once
 
 #include <cstdint>
@@ -11,25 +11,26 @@
 
 namespace relmap::place {
 
-// An old landmark that should be in the picture, seen from about as near as before.
+// An old landmark that should be in the picture at about the distance from which it was seen before.
 struct SoughtLandmark {
   Vector2 expected;    // pixels
-  bool found = false;  // by what it looked like (server/place/reobserve.h)
+  bool found = false;  // by its appearance (server/place/reobserve.h)
 };
 
 struct Changes {
-  std::uint16_t compared = 0;  // cells of the picture in which so many are sought that one would be found
-  std::uint16_t changed = 0;   // of them, those in which none is
+  std::uint16_t compared = 0;  // cells of the picture with enough landmarks that at least one should be found
+  std::uint16_t changed = 0;   // compared cells in which none is found
 
   bool operator==(const Changes&) const = default;
 };
 
-// How much is found of what is there depends on light, blur and camera. So it is taken from the picture itself: the
-// share that is found in cells where anything is. A cell is compared where by that share some would be found with 99 %;
-// nothing is where fewer than eight cells are.
+// Compares the cells of a picture. The share of visible landmarks that are found depends on light, blur and camera, so
+// it is estimated from the picture itself: from the cells in which any landmark is found. A cell is compared if at
+// that share at least one of its landmarks would be found with a probability of 99 %. If fewer than eight cells can be
+// compared, the result is all zeros.
 Changes changes(std::span<const SoughtLandmark> sought, const StereoCamera& camera);
 
-// Whether a picture is of the one place rather than of the other, which changed in significantly more cells (a sign
+// Whether a picture shows `place` rather than `other`, because `other` has changed in significantly more cells (a sign
 // test at about 6 %).
 inline bool told_apart(const Changes& place, const Changes& other) {
   return place.compared > 0 && other.changed >= 4 + 3 * place.changed;

@@ -25,18 +25,18 @@ std::vector<SoughtLandmark> look(int per_cell, double share, std::size_t changed
   return sought;
 }
 
-TEST(Changes, PartsOfAPictureInWhichNothingIsFoundWhileElsewhereMostIsHaveChanged) {
+TEST(Changes, CellsInWhichNothingIsFoundWhileElsewhereMostIsHaveChanged) {
   EXPECT_EQ(changes(look(6, 0.85, 0), kCamera), (Changes{48, 0}));
   EXPECT_EQ(changes(look(6, 0.85, 7), kCamera), (Changes{48, 7}));
 }
 
-TEST(Changes, WhereLittleIsFoundAnywhereACellOfNothingTellsNothing) {
+TEST(Changes, CellsAreNotComparedWhereLittleIsFoundAnywhere) {
   EXPECT_EQ(changes(look(6, 0.3, 7), kCamera), Changes()) << "0.7^6 is a tenth";
   const Changes dim = changes(look(20, 0.3, 7), kCamera);
   EXPECT_EQ(dim, (Changes{48, 7})) << "0.7^20 is a thousandth";
 }
 
-TEST(Changes, TooFewPartsTellNothing) {
+TEST(Changes, TooFewCellsAreNotCompared) {
   EXPECT_EQ(changes({}, kCamera), Changes());
   EXPECT_EQ(changes(look(6, 0.9, 2, 7), kCamera), Changes());
   EXPECT_EQ(changes(look(6, 0.9, 2, 8), kCamera), (Changes{8, 2}));
@@ -44,7 +44,7 @@ TEST(Changes, TooFewPartsTellNothing) {
   EXPECT_EQ(changes(look(1, 1, 0), kCamera), Changes()) << "one landmark is no part of a picture";
 }
 
-TEST(Changes, WhatIsNotInThePictureCountsAtItsEdge) {
+TEST(Changes, PointsOutsideThePictureCountInTheCellAtItsEdge) {
   std::vector<SoughtLandmark> sought = look(6, 1, 0);
   for (int n = 0; n < 6; ++n) sought.push_back({{700, -5}, false});
   EXPECT_EQ(changes(sought, kCamera), (Changes{48, 0}));

@@ -9,7 +9,7 @@
 namespace relmap::place {
 namespace {
 
-// Documents of each word as bits.
+// The documents that show each word, as bitmaps.
 class Presence {
  public:
   Presence(std::span<const std::vector<std::uint32_t>> documents, std::uint32_t words)
@@ -55,7 +55,7 @@ ChowLiuTree learn_chow_liu(std::span<const std::vector<std::uint32_t>> documents
   ChowLiuTree tree;
   tree.parent.assign(words, 0);
 
-  // Prim's algorithm on the complete graph: the weights are computed as they are needed.
+  // Prim's algorithm on the complete graph, whose weights are computed as they are needed.
   std::vector<double> weight(words, -1);
   std::vector<bool> inside(words);
   std::uint32_t newest = 0;
@@ -76,7 +76,7 @@ ChowLiuTree learn_chow_liu(std::span<const std::vector<std::uint32_t>> documents
     if (progress && step % 64 == 0) progress(static_cast<double>(step) / words);
   }
 
-  // Frequencies, drawn towards the marginal by the weight of one document, so that what was seen once is not certain.
+  // Frequencies, drawn towards the marginal with the weight of one document: what was seen once is not certain.
   const auto total = static_cast<double>(documents.size());
   for (std::uint32_t w = 0; w < words; ++w) {
     const auto present = static_cast<double>(presence.count(w));

@@ -9,7 +9,7 @@
 namespace relmap::place {
 namespace {
 
-TEST(MutualInformation, IsThatOfTheDefinition) {
+TEST(MutualInformation, EqualsItsDefinition) {
   EXPECT_NEAR(mutual_information(5, 5, 5, 10), std::log(2), 1e-12) << "the same fair coin";
   EXPECT_NEAR(mutual_information(0, 5, 5, 10), std::log(2), 1e-12) << "its opposite";
   EXPECT_NEAR(mutual_information(25, 50, 50, 100), 0, 1e-12) << "two coins";
@@ -19,7 +19,7 @@ TEST(MutualInformation, IsThatOfTheDefinition) {
   EXPECT_NEAR(mutual_information(3, 4, 5, 10), direct, 1e-12);
 }
 
-// Documents drawn from a known tree: word 0 alone, 1 and 2 copy 0, 3 copies 2, each wrong one time in eight.
+// Documents drawn from a known tree: word 0 is the root, 1 and 2 copy 0, 3 copies 2, each with an error rate of 1/8.
 std::vector<std::vector<std::uint32_t>> documents_of_a_tree(std::size_t count) {
   std::mt19937_64 random(1);
   std::vector<std::vector<std::uint32_t>> documents;
@@ -67,7 +67,7 @@ TEST(ChowLiu, NoOtherTreeHoldsMoreInformation) {
   const ChowLiuTree tree = learn_chow_liu(documents, 5);
   double found = 0;
   for (std::uint32_t w = 1; w < 5; ++w) found += information(w, tree.parent[w]);
-  // All parent tables in which words reach word 0.
+  // Every parent table in which each word reaches word 0.
   for (std::uint32_t code = 0; code < 5 * 5 * 5 * 5; ++code) {
     const std::uint32_t parent[5] = {0, code % 5, code / 5 % 5, code / 25 % 5, code / 125 % 5};
     bool is_tree = true;
@@ -83,7 +83,7 @@ TEST(ChowLiu, NoOtherTreeHoldsMoreInformation) {
   }
 }
 
-TEST(ChowLiu, AWordNeverSeenHasAProbabilityAllTheSame) {
+TEST(ChowLiu, AWordThatWasNeverSeenHasAPositiveProbability) {
   const std::vector<std::vector<std::uint32_t>> documents(50, {0});
   const ChowLiuTree tree = learn_chow_liu(documents, 3);
   for (const auto* table : {&tree.marginal, &tree.given_parent_absent, &tree.given_parent_present})

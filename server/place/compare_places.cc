@@ -12,7 +12,7 @@
 namespace relmap::place {
 namespace {
 
-// Null: lost, or there are none.
+// Null if the features are lost or there are none.
 std::shared_ptr<const storage::FrameCold> features_of(const storage::Graph& graph, FrameId frame) {
   try {
     auto cold = graph.cold(frame);
@@ -35,8 +35,8 @@ std::vector<double> likeness_of(const DescribedWords& query, const Shortlist& sh
   return likeness(query, places, groups);
 }
 
-// The posterior of each, and in `new_place` that the map holds none of them. Places that are not on the list are no
-// more like the query than any.
+// Returns the posterior of each shortlisted place and sets `new_place` to the probability that the map does not hold
+// the place. Places that are not on the list have likeness 0.
 std::vector<double> posterior_of(const Shortlist& shortlist, const std::vector<double>& likeness, double& new_place) {
   const PlacePriors priors(shortlist.candidates, shortlist.expected);
   const auto weight = [](double prior, double like) { return prior * std::exp(log_likelihood_ratio(like)); };
@@ -63,7 +63,7 @@ PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortli
   const std::vector<double> likeness = likeness_of(query, shortlist, graph);
   const std::vector<double> masses = posterior_of(shortlist, likeness, answer.new_place);
 
-  // Greedy, the best frame first; a frame belongs to the first place that reaches it.
+  // Greedy grouping, best frame first: a frame belongs to the first place that reaches it.
   std::vector<std::size_t> order(masses.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) {

@@ -1,4 +1,4 @@
-// Which of the shortlisted places does a picture show? By likeness.h, and Bayes' rule.
+// Decides by descriptors (likeness.h) and Bayes' rule which of the shortlisted places a picture shows.
 #pragma once
 
 #include "server/place/likeness.h"
@@ -7,10 +7,11 @@
 
 namespace relmap::place {
 
-// What is common can be told from what is distinct among so many groups of places at least; of fewer, words tell.
+// The least number of groups of places among which common features can be told from distinctive ones. With fewer
+// groups, words alone decide.
 inline constexpr std::uint32_t kMinGroups = 4;
 
-// Reads the features of the places from the graph; of one whose features are lost nothing is like the query. Throws
+// Reads the features of the places from the graph. A place whose features are lost (DATA_LOSS) has likeness 0. Throws
 // StatusError where other reads of the graph do.
 PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortlist, const storage::Graph& graph);
 

@@ -1,5 +1,5 @@
-// The index with features: places of the same words are told apart by their descriptors, and the answer is a function
-// of the places alone.
+// The index with features: places with the same words are told apart by their descriptors, and the answer depends on
+// the places alone.
 #include "server/place/compare_places.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace relmap::place {
 namespace {
 
 constexpr StereoCamera kMono{400, 256, 192, 0, 512, 384};
-constexpr std::uint32_t kPlaces = 60, kFar = 20;  // frames apart: no place is another's neighbour
+constexpr std::uint32_t kPlaces = 60, kFar = 20;  // kFar frames apart, so that no place is another's neighbour
 
 class ComparePlaces : public ::testing::Test {
  protected:
@@ -23,7 +23,7 @@ class ComparePlaces : public ::testing::Test {
     graph_.add_session(1, kMono);
     for (std::uint32_t i = 0; i < kPlaces; ++i) pictures_.push_back(picture(i));
   }
-  // All places show nearly the same words; their descriptors are their own.
+  // All places show nearly the same words but with different descriptors.
   storage::FrameCold picture(std::uint32_t number) {
     std::mt19937_64 random(number + 1);
     storage::FrameCold cold;
@@ -42,7 +42,7 @@ class ComparePlaces : public ::testing::Test {
     graph_.add_frame(frame(place), {}, {}, std::move(cold));
     ASSERT_TRUE(index.add(frame(place), pictures_[place].words).ok());
   }
-  // The picture of a place, every second feature of which has changed.
+  // The picture of a place with every second feature changed.
   storage::FrameCold seen_again(std::uint32_t place) {
     storage::FrameCold cold = pictures_[place];
     for (std::size_t i = 0; i < cold.words.size(); i += 2)
@@ -69,13 +69,13 @@ TEST_F(ComparePlaces, PlacesOfTheSameWordsAreToldApart) {
     double sum = answer.new_place;
     for (const PlaceCandidate& candidate : answer.candidates) sum += candidate.probability;
     EXPECT_LE(sum, 1 + 1e-12);
-    // What words alone say of it.
+    // The answer by words alone.
     EXPECT_LT(index.query(seen_again(place).words, graph_).candidates.at(0).probability, 0.9);
   }
   EXPECT_GT(ask(index, picture(1000)).new_place, 0.5) << "the same words, and nothing like any of them";
 }
 
-TEST_F(ComparePlaces, OfFewPlacesWordsTell) {
+TEST_F(ComparePlaces, WordsAloneDecideAmongFewPlaces) {
   PlaceIndex index(vocabulary_);
   for (std::uint32_t i = 0; i + 1 < kMinGroups; ++i) add(index, i);
   const storage::FrameCold query = seen_again(1);

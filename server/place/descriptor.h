@@ -10,15 +10,15 @@ namespace relmap::place {
 inline constexpr std::size_t kDescriptorBytes = 128;
 using Descriptor = std::array<std::uint8_t, kDescriptorBytes>;
 
-// The thread sanitizer looks at each byte that is read by itself, which takes a hundred times as long. Descriptors
-// never change: what compares them is left out there.
+// The thread sanitizer checks each byte that is read, which makes comparisons a hundred times slower. Descriptors never
+// change, so functions that compare them are not instrumented.
 #ifdef __SANITIZE_THREAD__
 #define RELMAP_READS_DESCRIPTORS [[gnu::no_sanitize("thread")]]
 #else
 #define RELMAP_READS_DESCRIPTORS
 #endif
 
-// Squared L2 distance, at most 128 * 255^2. Written so that the compiler makes 16-bit multiply-adds of it.
+// Squared L2 distance, at most 128 * 255^2. Written so that the compiler turns it into 16-bit multiply-adds.
 RELMAP_READS_DESCRIPTORS inline std::uint32_t squared_distance(const std::uint8_t* a, const std::uint8_t* b) {
   std::int32_t sum = 0;
   for (std::size_t i = 0; i < kDescriptorBytes; ++i) {

@@ -23,7 +23,7 @@ std::uint32_t nearest(const std::uint32_t* distances, std::size_t count, std::si
   return best;
 }
 
-// At most one match a landmark: two features may have found it through two of its views.
+// Keeps the best match of each landmark, since two features may have matched two views of it.
 std::vector<DescriptorMatch> nearest_of_each_landmark(const std::vector<DescriptorMatch>& matches,
                                                       std::span<const MapPoint> points) {
   std::unordered_map<LandmarkId, std::size_t> best;

@@ -1,4 +1,4 @@
-// Which feature of a query is which point of the map, by descriptor alone.
+// Matches the features of a query to points of the map by their descriptors.
 #pragma once
 
 #include <cstdint>
@@ -17,20 +17,22 @@ struct DescriptorMatch {
   std::uint32_t distance;  // squared
 };
 
-// Lowe's ratio of distances, nearest to second nearest; and the distance beyond which nothing is alike.
+// Lowe's ratio test: the largest ratio of the nearest distance to the second nearest; and the largest distance of a
+// match.
 inline constexpr double kDescriptorRatio = 0.8;
 inline constexpr std::uint32_t kMaxDescriptorDistance = 270 * 270;  // squared; a descriptor's norm is 512
 
-// Mutual nearest neighbours that pass the ratio test. `same(p, q)`: two of the points are one, and do not compete.
-// `possible(f, p)`: feature f could be point p; empty: each could. Ascending by feature.
+// Returns mutual nearest neighbours that pass the ratio test, ascending by feature. `same(p, q)` says that points p and
+// q are one point of the world, so that they do not compete in the ratio test. `possible(f, p)` says that feature f may
+// be point p; if empty, every pair is possible.
 using PossiblePairs = std::function<bool(std::uint32_t, std::uint32_t)>;
 std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature> features,
                                                std::span<const Descriptor* const> points,
                                                const std::function<bool(std::uint32_t, std::uint32_t)>& same,
                                                const PossiblePairs& possible = {});
 
-// A point of the world stands in the map once for each frame that saw it: points with one landmark, or within each
-// other's covariance, are one. A landmark is matched at most once.
+// The same for map points. A point of the world is in the map once for each frame that saw it, so points that share a
+// landmark, or that coincide within their covariances, count as one. A landmark is matched at most once.
 std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
                                           const PossiblePairs& possible = {});
 

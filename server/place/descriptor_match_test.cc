@@ -5,7 +5,7 @@
 namespace relmap::place {
 namespace {
 
-// Two points that look alike, metres apart, and a feature that looks like both.
+// Two points that look alike but are metres apart, and a feature that looks like both.
 struct Twins {
   Twins() {
     feature.descriptor.fill(40);
@@ -23,7 +23,7 @@ struct Twins {
   std::vector<MapPoint> points;
 };
 
-TEST(MatchPoints, WhatCouldBeEitherOfTwoIsNone) {
+TEST(MatchPoints, AFeatureThatLooksLikeTwoPointsIsNotMatched) {
   const Twins twins;
   EXPECT_TRUE(match_points({&twins.feature, 1}, twins.points).empty());
 }

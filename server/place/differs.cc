@@ -13,8 +13,8 @@ namespace {
 constexpr int kMinPerCell = 3;
 constexpr int kMinCells = 8;
 constexpr double kNearRadius = 0.02;     // of the picture's width
-constexpr double kMaxNearer = 1.5;       // than it was seen from: beyond, a feature looks different
-constexpr double kOnePointPixels = 1.5;  // of a cell's points those nearer than this count once
+constexpr double kMaxNearer = 1.5;       // ratio of viewing distances beyond which a feature looks different
+constexpr double kOnePointPixels = 1.5;  // points of a cell that are closer together than this count once
 
 struct Cell {
   std::vector<Vector2> expected;

@@ -1,13 +1,14 @@
-// What two views that geometry takes for one place show differently.
+// Measures how much two views differ that geometry takes for one place.
 #pragma once
 
 #include "server/place/verify.h"
 
 namespace relmap::place {
 
-// The picture in 8 x 6 cells: of those in which both the query shows features and the map says that points should be
-// seen, three of each at least and from about as near, the share in which not one is found again. Negative: there are
-// fewer than eight such cells, or no pose.
+// Returns the share (0..1) of cells of the query's picture that differ from the map. The picture is divided into 8 x 6
+// cells; a cell is compared if the query has at least three features in it and the map expects at least three points
+// there that were seen from about the same distance. A compared cell differs if none of these points is found again.
+// Returns -1 if fewer than eight cells can be compared, the pose is not metric or the focal length is unknown.
 float differing_share(const storage::Graph& graph, const QueryPicture& query, const VerifiedPlace& place);
 
 }  // namespace relmap::place

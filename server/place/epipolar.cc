@@ -15,18 +15,18 @@ namespace {
 
 constexpr double kGatePixels = 2;
 constexpr double kConfidence = 0.999;
-constexpr double kOnePlane = 0.9;     // share of a fundamental matrix' inliers that a homography explains as well
-constexpr std::size_t kToBegin = 12;  // inliers that matching near by can begin with
-constexpr double kNear = 0.04;        // of the width over which the query's features lie
-constexpr std::size_t kAround = 3;    // inliers that say where a feature should be
-constexpr double kTogether = 5;       // pixels: inliers nearer than this count alike
+constexpr double kOnePlane = 0.9;     // share of a fundamental matrix's inliers from which a homography is preferred
+constexpr std::size_t kToBegin = 12;  // least number of inliers with which features are matched again near by
+constexpr double kNear = 0.04;        // search radius, as a share of the width over which the query's features lie
+constexpr std::size_t kAround = 3;    // nearest inliers that predict the position of a feature
+constexpr double kTogether = 5;       // pixels: inliers closer than this have about the same weight
 
 struct Geometry {
   std::vector<DescriptorMatch> inliers;
   bool homography = false;
 };
 
-// The matches that `estimate` sets in its mask; none where the configuration is degenerate.
+// The matches that `estimate` sets in its mask; none if the configuration is degenerate.
 template <typename Estimate>
 std::vector<DescriptorMatch> agreeing(const std::vector<DescriptorMatch>& matches, Estimate estimate) {
   std::vector<DescriptorMatch> agree;
@@ -41,7 +41,7 @@ std::vector<DescriptorMatch> agreeing(const std::vector<DescriptorMatch>& matche
   return agree;
 }
 
-// Of one pair of views.
+// A pair of views.
 class Views {
  public:
   Views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map) : query_(query), map_(map) {
@@ -71,13 +71,13 @@ class Views {
     return best;
   }
 
-  // Matches within kNear of where the nearest inliers say that a feature of the map should be seen.
+  // Matches within kNear of the position that the nearest inliers predict for a feature of the map.
   std::vector<DescriptorMatch> match_near(const std::vector<DescriptorMatch>& inliers) const {
     const auto [left_most, right_most] =
         std::minmax_element(query_.begin(), query_.end(), [](const auto& l, const auto& r) { return l.u < r.u; });
     const double radius = kNear * (right_most->u - left_most->u);
     const auto from = [&](const DescriptorMatch& match) { return at(map_[match.point]); };
-    Eigen::MatrixXd A(inliers.size(), 3), B(inliers.size(), 2);  // an affine map, roughly, and what is left of it
+    Eigen::MatrixXd A(inliers.size(), 3), B(inliers.size(), 2);  // a rough affine map, and below its residuals
     for (std::size_t i = 0; i < inliers.size(); ++i) {
       A.row(static_cast<Eigen::Index>(i)) = from(inliers[i]).homogeneous().transpose();
       B.row(static_cast<Eigen::Index>(i)) = at(query_[inliers[i].feature]).transpose();
@@ -114,20 +114,20 @@ class Views {
 }  // namespace
 
 Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map,
-                                  int fewest) {
+                                  int min_inliers) {
   const Views views(query, map);
   const auto matches = views.match();
   if (matches.size() < kToBegin)
     return Status(Reason::TOO_FEW_INLIERS, std::to_string(matches.size()) + " matches, of which at least " +
-                                               std::to_string(fewest) + " must agree on one geometry");
+                                               std::to_string(min_inliers) + " must agree on one geometry");
   Geometry best = views.geometry_of(matches);
   if (best.inliers.size() >= kToBegin)
     if (auto near = views.geometry_of(views.match_near(best.inliers)); near.inliers.size() > best.inliers.size())
       best = std::move(near);
-  if (best.inliers.size() < static_cast<std::size_t>(fewest))
+  if (best.inliers.size() < static_cast<std::size_t>(min_inliers))
     return Status(Reason::TOO_FEW_INLIERS,
                   std::to_string(best.inliers.size()) + " of " + std::to_string(matches.size()) +
-                      " matches agree on one geometry; at least " + std::to_string(fewest) + " must");
+                      " matches agree on one geometry; at least " + std::to_string(min_inliers) + " must");
   EpipolarMatch result{{}, best.homography};
   for (const DescriptorMatch& match : best.inliers) result.inliers.push_back(match.feature);
   return result;

@@ -1,4 +1,4 @@
-// Two views of one place without any depth: do their matches agree on a fundamental matrix or a homography?
+// Verifies two views of one place without depth: their matches must agree on a fundamental matrix or a homography.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,15 @@ inline constexpr int kMinEpipolarInliers = 30;
 
 struct EpipolarMatch {
   std::vector<std::uint32_t> inliers;  // features of the query, ascending
-  bool homography = false;             // else a fundamental matrix
+  bool homography = false;             // whether the model is a homography rather than a fundamental matrix
 };
 
-// Whichever more matches agree with; where they show one plane, which any of many fundamental matrices explains, the
-// homography (Hartley and Zisserman 2003, 13 and 22.4). What lies near where the inliers around it say that it should
-// is matched again, as among so little few look alike: of one place more agree then, by chance hardly more.
-// TOO_FEW_INLIERS: fewer than `fewest` agree. Deterministic.
+// Matches the features of two views and fits a fundamental matrix, or a homography if that explains nearly as many
+// matches: points of one plane agree with many fundamental matrices (Hartley and Zisserman 2003, 13 and 22.4). Features
+// are then matched again near the position that the surrounding inliers predict, where few features look alike: views
+// of one place gain inliers by this, unrelated views hardly any. TOO_FEW_INLIERS if fewer than `min_inliers` agree.
+// Deterministic.
 Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map,
-                                  int fewest = kMinEpipolarInliers);
+                                  int min_inliers = kMinEpipolarInliers);
 
 }  // namespace relmap::place

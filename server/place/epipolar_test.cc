@@ -16,7 +16,7 @@ struct TwoViews {
   std::vector<AppearanceFeature> a, b;
 };
 
-// `points` seen from two places; the first `wrong` of them somewhere else in the second view.
+// `points` seen from two places; the first `wrong` of them are at a wrong position in the second view.
 TwoViews views_of(const std::vector<Vector3>& points, std::size_t wrong) {
   std::mt19937_64 random(7);
   const SE3 T_ba = SE3::exp((Vector6() << -0.5, 0.1, 0.2, 0.02, 0.06, -0.03).finished());
@@ -37,7 +37,7 @@ TwoViews views_of(const std::vector<Vector3>& points, std::size_t wrong) {
   return views;
 }
 
-// In the cone of the camera; `depth` of each.
+// Points within the field of view; `depth` gives the depth of each.
 template <typename Depth>
 std::vector<Vector3> points(std::size_t count, Depth depth) {
   std::mt19937_64 random(3);
@@ -52,7 +52,7 @@ std::vector<Vector3> points(std::size_t count, Depth depth) {
   return result;
 }
 
-TEST(MatchViews, OfThingsInDepthAgreeOnAFundamentalMatrix) {
+TEST(MatchViews, ViewsOfThingsInDepthAgreeOnAFundamentalMatrix) {
   const auto views = views_of(points(120, [](double, double, double u) { return 3 + 12 * u; }), 30);
   const auto match = match_views(views.b, views.a);
   ASSERT_TRUE(match.ok()) << match.status().to_string();
@@ -61,7 +61,7 @@ TEST(MatchViews, OfThingsInDepthAgreeOnAFundamentalMatrix) {
   EXPECT_TRUE(std::is_sorted(match->inliers.begin(), match->inliers.end()));
 }
 
-TEST(MatchViews, OfOnePlaneAgreeOnAHomography) {
+TEST(MatchViews, ViewsOfOnePlaneAgreeOnAHomography) {
   const auto views = views_of(points(120, [](double x, double, double) { return 5 / (1 - 0.6 * x); }), 30);
   const auto match = match_views(views.b, views.a);
   ASSERT_TRUE(match.ok()) << match.status().to_string();
@@ -70,7 +70,7 @@ TEST(MatchViews, OfOnePlaneAgreeOnAHomography) {
   EXPECT_LE(match->inliers.size(), 95u);
 }
 
-TEST(MatchViews, WithoutAGeometryAreRefused) {
+TEST(MatchViews, ViewsWithoutACommonGeometryAreRefused) {
   const auto scene = points(120, [](double, double, double u) { return 3 + 12 * u; });
   const auto wrong = views_of(scene, 120);
   EXPECT_EQ(match_views(wrong.b, wrong.a).reason(), Reason::TOO_FEW_INLIERS);

@@ -1,16 +1,16 @@
-// The likelihood of FAB-MAP, word by word: Cummins and Newman, IJRR 27(6) 2008, section 4, and IJRR 30(9) 2011,
-// section 3, for the inverted lists.
+// The likelihood of FAB-MAP, word by word (Cummins and Newman, IJRR 27(6) 2008, section 4), in the form that suits
+// inverted lists (IJRR 30(9) 2011, section 3).
 //
 // z: the query shows the word; zp: it shows the word's parent in the Chow-Liu tree (the root is its own parent);
 // s: the word was seen at the place; e: it exists there.
 //   f(z, zp, s) = sum_e p(z | e, zp) p(e | s)
 //   p(z = S | e, zp) = beta / (alpha + beta),  alpha = p(z = S) p(z = not S | e) p(z = not S | zp),
 //                                              beta = p(z = not S) p(z = S | e) p(z = S | zp)
-// A place's log-likelihood is the sum over all words of log f. Relative to the pair (z, zp) = (0, 0) only words that
-// the query shows, or whose parent it shows, differ, so a query costs their lists and not the vocabulary.
+// A place's log-likelihood is the sum of log f over all words. Only words that the query shows, or whose parent it
+// shows, differ from the case (z, zp) = (0, 0), so a query reads their lists and not those of the whole vocabulary.
 //
-// Terms are integers, in steps of 2^-36 nats: sums are exact, whatever their order, and so a function of place, query
-// and vocabulary alone. Each term is off by 7e-12 at most.
+// Terms are integers in steps of 2^-36 nats. Sums are therefore exact in any order, and depend only on place, query and
+// vocabulary. The error of a term is at most 7e-12.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct DetectorModel {
 // f(z, zp, s) of one word with p(z = 1) = marginal and p(z = 1 | zp) = given_parent.
 double word_likelihood(const DetectorModel& detector, double marginal, double given_parent, bool z, bool s);
 
-// How a query sees a word; (0, 0) is the rest of the vocabulary.
+// Whether a query shows a word, its parent or both. All other words, which show neither, need no case.
 enum class WordCase : std::uint8_t { kOnlyParent = 0, kOnlyWord = 1, kBoth = 2 };
 
 struct TouchedWord {
@@ -39,7 +39,7 @@ struct TouchedWord {
   WordCase seen;
 };
 
-// In steps of 2^-36 nats; the widest sum, over 2^20 words, is below 2^61.
+// In steps of 2^-36 nats. The largest sum, over 2^20 words, is below 2^61.
 using LogLikelihood = std::int64_t;
 inline constexpr double kNat = 0x1p36;
 inline double in_nats(LogLikelihood value) { return static_cast<double>(value) / kNat; }
@@ -49,16 +49,17 @@ class FabMapModel {
  public:
   explicit FabMapModel(const Vocabulary& vocabulary, const DetectorModel& detector = {});
 
-  std::uint32_t size() const { return static_cast<std::uint32_t>(terms_.size()); }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(terms_.size()); }  // words
 
-  // The constant of a place that holds these words: the sum of their log f(0, 0, 1) / f(0, 0, 0).
+  // The constant of a place that shows these words: the sum of their log f(0, 0, 1) / f(0, 0, 0).
   LogLikelihood place(std::span<const std::uint32_t> words) const;
-  // log f(z, zp, 1) / f(z, zp, 0) - log f(0, 0, 1) / f(0, 0, 0): added to the places of the word's list.
+  // What a query that touches this word adds to the score of each place that shows the word:
+  // log f(z, zp, 1) / f(z, zp, 0) - log f(0, 0, 1) / f(0, 0, 0).
   LogLikelihood increment(TouchedWord touched) const {
     return terms_[touched.word].increment[static_cast<std::size_t>(touched.seen)];
   }
 
-  // Words that the query shows or whose parent it shows; `query` is sorted and unique.
+  // The words that the query shows or whose parent it shows. `query` is sorted and unique.
   std::vector<TouchedWord> touched_by(std::span<const std::uint32_t> query) const;
   // Log-likelihood of the query at a place without words.
   LogLikelihood empty_place(std::span<const TouchedWord> touched) const;

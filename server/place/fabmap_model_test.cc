@@ -11,7 +11,8 @@
 namespace relmap::place {
 namespace {
 
-// FAB-MAP as it is written: every word of every place, nothing shared with the index but the formula's inputs.
+// A dense evaluation of FAB-MAP, every word of every place, which shares nothing with the index but the formula's
+// inputs.
 double dense_log_likelihood(const Vocabulary& v, const std::vector<bool>& query, const std::vector<bool>& place) {
   const double seen[2] = {0.1, 0.5};
   const auto clip = [](double p) { return std::min(std::max(p, 1e-4), 1 - 1e-4); };
@@ -46,7 +47,7 @@ std::vector<bool> as_bits(const std::vector<std::uint32_t>& words, std::uint32_t
   return bits;
 }
 
-// What the index says of these places, by blocks and word by word.
+// The likelihoods by the index at these places, computed by blocks and word by word.
 class Indexed {
  public:
   explicit Indexed(const Vocabulary& vocabulary) : model_(vocabulary) {}
@@ -73,7 +74,7 @@ class Indexed {
   BlockScores scores_{model_};
 };
 
-// Of places and queries from nearly empty to full, of words with bits and words with lists.
+// Compares places and queries from nearly empty to full, and words with bitmaps and with lists.
 void expect_as_dense(int queries, std::uint64_t seed) {
   constexpr int kPlaces = 20;
   const auto vocabulary = random_vocabulary(600, 1, seed);
@@ -103,7 +104,7 @@ TEST(LongFabMap, IndexedLikelihoodEqualsTheDenseOne) {
 }
 
 TEST(FabMap, LikelihoodsOfAllQueriesSumToOne) {
-  // p(Z | L) is a distribution over what the query may show where f is one over z given zp: tree-structured.
+  // p(Z | L) is a distribution over all queries, since f is one over z given zp, and the dependence is a tree.
   const auto vocabulary = random_vocabulary(10, 1, 7);
   Indexed index(*vocabulary);
   index.add({1, 4, 5});

@@ -1,4 +1,4 @@
-// Which frame stands at which place: by runs of consecutive frames at consecutive places, 32 bytes each.
+// Maps frames to places and back. Stored as runs of consecutive frames at consecutive places, 32 bytes each.
 #pragma once
 
 #include <algorithm>
@@ -9,15 +9,15 @@
 
 namespace relmap::place {
 
-// Not thread-safe, but for what is const.
+// Const members are thread-safe, the others are not.
 class FrameTable {
  public:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
   std::uint32_t places() const { return by_place_.empty() ? 0 : by_place_.back().place + by_place_.back().count; }
 
-  // The frames of the places that follow, ascending, numbered from 0. False: one of them stands at a place already, and
-  // nothing has changed.
+  // Appends places after the last one. `runs` are ascending and number the new places from 0. If one of the frames has
+  // a place already, returns false and changes nothing.
   bool append(const std::vector<FrameRun>& runs) {
     const std::uint32_t base = places();
     std::vector<FrameRun> both = by_frame_;
@@ -38,13 +38,14 @@ class FrameTable {
     return true;
   }
 
-  // What was appended from this place on goes.
+  // Removes all places from number `places` on.
   void truncate(std::uint32_t places) {
     const auto goes = [places](const FrameRun& run) { return run.place >= places; };
     std::erase_if(by_place_, goes);
     std::erase_if(by_frame_, goes);
   }
 
+  // The place of a frame, or kNone.
   std::uint32_t find(FrameId frame) const {
     const auto after = std::upper_bound(by_frame_.begin(), by_frame_.end(), FrameRun{frame, 0, 0}, before);
     if (after == by_frame_.begin() || !std::prev(after)->contains(frame)) return kNone;

@@ -5,12 +5,12 @@
 namespace relmap::place {
 namespace {
 
-constexpr std::uint32_t kTail = 256;          // places that are looked at word by word
-constexpr std::size_t kAddBytes = 32 * 1024;  // of one place, at most
-constexpr std::size_t kQueryBytes = 9;        // of a place: its score, and an eighth to grow
-constexpr std::uint32_t kPatience = 256;      // places refused before a disk that took nothing is tried again
+constexpr std::uint32_t kTail = 256;          // places that may be in no block; they are scored word by word
+constexpr std::size_t kAddBytes = 32 * 1024;  // memory of one new place, at most
+constexpr std::size_t kQueryBytes = 9;        // memory of a query for each place: its score, and an eighth for growth
+constexpr std::uint32_t kPatience = 256;      // places that are refused before a full disk is tried again
 
-// Places of frames that are masked, [first, last).
+// Consecutive masked places, [first, last).
 struct PlaceRange {
   std::uint32_t first, last;
 };
@@ -82,7 +82,7 @@ Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
   return {};
 }
 
-// The tail joins the last block; when that is full, it goes to the file.
+// Moves the tail into the last block, and writes the block to the file once it is full.
 void InvertedIndex::pack() {
   if (tail_.empty()) return;
   PackedPlaces packed = *packed_;
@@ -110,7 +110,8 @@ void InvertedIndex::pack() {
   }
   tail_bytes_ = 0;
   memory_ = memory_now();
-  if (unfilled() == 0) (void)write_blocks();  // else when memory is short, or the next one is full
+  // If this fails, make_room() or the next full block tries again.
+  if (unfilled() == 0) (void)write_blocks();
 }
 
 void InvertedIndex::publish(PackedPlaces packed) {
@@ -133,7 +134,7 @@ Status InvertedIndex::open_file(Status* emptied) {
   return {};
 }
 
-// Those that are full and stand in memory only.
+// Writes the full blocks that are in memory only.
 Status InvertedIndex::write_blocks() {
   if (options_.folder.empty()) return {};
   Status emptied;
@@ -179,12 +180,12 @@ Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map
       break;
     }
     const auto block = PlaceBlock::parse(bytes, model_.size());
-    why =
-        block.ok() && last ? Status(Reason::CORRUPT, file_->path() + " goes on behind its last block") : block.status();
+    why = block.ok() && last ? Status(Reason::CORRUPT, file_->path() + " continues after its last block")
+                             : block.status();
     if (!why.ok()) break;
     const std::vector<FrameRun> frames = block->frames();
     if (!std::all_of(frames.begin(), frames.end(), in_map) || !packed.frames.append(frames)) {
-      why = {Reason::NO_SUCH_FRAME, file_->path() + " holds frames that the map does not hold, or holds them twice"};
+      why = {Reason::NO_SUCH_FRAME, file_->path() + " holds frames that the map does not hold, or a frame twice"};
       break;
     }
     last = block->places() < kPlacesPerBlock;
@@ -201,7 +202,7 @@ Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map
   return why;
 }
 
-// Blocks leave memory, the oldest first.
+// Drops blocks that are in the file from memory, oldest first, until a new place has room.
 Status InvertedIndex::make_room() {
   const auto fits = [&] { return memory_ + kAddBytes <= options_.allowance; };
   if (fits()) return {};
@@ -275,7 +276,8 @@ std::uint32_t InvertedIndex::size() const {
 
 std::size_t InvertedIndex::memory_bytes() const { return memory_; }
 
-// Beside what stands there: the scores of a query, the tail joining a block, and a block that a query reads.
+// Memory in use, plus what may be needed besides: the scores of a query, a block that is being made from the tail, and
+// a block that a query reads.
 std::size_t InvertedIndex::memory_now() const {
   const std::size_t places = packed_->frames.places() + tail_.size();
   return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * max_block_ + 2 * packed_->frames.memory_bytes() +

@@ -1,5 +1,6 @@
-// The places of the map by the words seen there: blocks of 4,096 that do not change any more, in memory as far as there
-// is room and else in a file; one that is not full yet; and the last few places as they came.
+// Stores the places of the map by the words seen there: full blocks of 4,096 places, which never change and are in
+// memory or, where memory is short, only in a file; one block that is not full yet; and the newest places, in no block
+// yet (the tail).
 #pragma once
 
 #include <algorithm>
@@ -21,24 +22,24 @@
 
 namespace relmap::place {
 
-// What stands in blocks. Immutable.
+// The places that are in blocks. Immutable.
 struct PackedPlaces {
   struct Block {
-    PlaceFile::Extent extent;            // of no size: it stands in memory only
-    std::shared_ptr<const Bytes> bytes;  // null: it stands in the file only
+    PlaceFile::Extent extent;            // size 0 if the block is in memory only
+    std::shared_ptr<const Bytes> bytes;  // null if the block is in the file only
   };
-  std::vector<Block> blocks;  // all full, but for the last
+  std::vector<Block> blocks;  // all full except the last
   FrameTable frames;
   std::shared_ptr<const PlaceFile> file;
 };
 
-// A place that is no candidate and no part of the sum.
+// The value of a masked place: it is no candidate and no part of the sum.
 inline constexpr LogLikelihood kLeftOut = std::numeric_limits<LogLikelihood>::min();
 
-// One query's log-likelihoods at the places that the index held when it was asked. Kept from query to query for its
-// memory.
+// The log-likelihoods of one query at the places that the index held when it was asked. An object is reused from query
+// to query, which saves allocations.
 struct PlaceScores {
-  std::uint32_t find(FrameId frame) const;  // FrameTable::kNone
+  std::uint32_t find(FrameId frame) const;  // FrameTable::kNone if the frame has no place
   FrameId frame(std::uint32_t place) const;
   std::span<const LogLikelihood> of_block(std::size_t block) const {
     const std::size_t begin = block * kPlacesPerBlock;
@@ -46,39 +47,41 @@ struct PlaceScores {
   }
 
   std::vector<LogLikelihood> values;   // by place; kLeftOut where masked
-  std::vector<LogLikelihood> highest;  // by block
+  std::vector<LogLikelihood> highest;  // the highest value of each block
   std::size_t candidates = 0;          // places that are not masked
 
   std::shared_ptr<const PackedPlaces> packed;
-  std::vector<FrameId> tail;  // of the places beyond
-  Bytes page;                 // a block read from the file
+  std::vector<FrameId> tail;  // the frames of the places that are in no block yet
+  Bytes page;                 // scratch memory for a block that is read from the file
 };
 
-// One writer, any number of readers.
+// One thread may write while any number read.
 class InvertedIndex {
  public:
   struct Options {
-    std::size_t allowance = std::numeric_limits<std::size_t>::max();  // bytes of memory, a query's scores among them
+    std::size_t allowance = std::numeric_limits<std::size_t>::max();  // bytes of memory, including a query's scores
     std::string folder;                                               // the data folder; empty: in memory only
     std::uint32_t vocabulary_crc = 0;
   };
   InvertedIndex(const FabMapModel& model, Options options);
 
-  // The writer's. `words` sorted and unique; the frame is not there yet. IO_ERROR, DISK_FULL (the file takes nothing),
-  // BUDGET_EXCEEDED: it is left out.
+  // These four are for the writer only.
+  // Adds a place. `words` are sorted and unique, and the index does not hold the frame yet. IO_ERROR, DISK_FULL (the
+  // file cannot be written) and BUDGET_EXCEEDED: the place is left out.
   Status add(FrameId frame, std::vector<std::uint32_t> words);
   bool contains(FrameId frame) const;
-  // Takes over what stands in the file, of an index without places. Not ok: why not all of it could be used; the rest
-  // is cut off.
+  // Loads the places of the file into an empty index. If some of them cannot be used, the file is cut off at the first
+  // such block, and the status says why. `in_map` says whether the map holds all frames of a run.
   Status restore(const std::function<bool(const FrameRun&)>& in_map);
-  // All places into the file. IO_ERROR, DISK_FULL.
+  // Writes all places to the file. IO_ERROR, DISK_FULL.
   Status save();
 
-  // `query` has been asked. Throws StatusError where a block cannot be read (IO_ERROR, DATA_LOSS).
+  // Computes the scores of the query that was given to BlockScores::ask(). Throws StatusError where a block cannot be
+  // read (IO_ERROR, DATA_LOSS).
   void score(BlockScores& query, std::span<const storage::FrameRange> masked, PlaceScores& scores) const;
 
   std::uint32_t size() const;
-  std::size_t memory_bytes() const;  // with a query under way
+  std::size_t memory_bytes() const;  // including that of a running query
 
  private:
   Status make_room();
@@ -87,11 +90,12 @@ class InvertedIndex {
   void pack();
   void publish(PackedPlaces packed);
   std::size_t memory_now() const;
-  std::uint32_t unfilled() const { return packed_->frames.places() % kPlacesPerBlock; }  // places of the last block
+  // Places in the last block if it is not full, or else 0.
+  std::uint32_t unfilled() const { return packed_->frames.places() % kPlacesPerBlock; }
 
   const FabMapModel& model_;
   const Options options_;
-  std::shared_ptr<PlaceFile> file_;  // null: it could not be opened, or there is to be none
+  std::shared_ptr<PlaceFile> file_;  // null if it could not be opened or there is no folder
 
   mutable std::shared_mutex mutex_;  // guards what follows; the writer, who alone changes it, reads without
   std::shared_ptr<const PackedPlaces> packed_ = std::make_shared<const PackedPlaces>();
@@ -100,10 +104,10 @@ class InvertedIndex {
 
   std::atomic<std::size_t> memory_ = 0;
   std::size_t resident_bytes_ = 0, max_block_ = 0, tail_bytes_ = 0;
-  std::uint32_t refused_ = 0;  // places, since the disk was tried
+  std::uint32_t refused_ = 0;  // places that were left out since the last one that had room
 };
 
-// `words` sorted, each once.
+// Sorts `words` and removes duplicates.
 std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words);
 
 }  // namespace relmap::place

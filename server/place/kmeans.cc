@@ -10,8 +10,8 @@ namespace {
 
 using Sums = std::array<std::uint64_t, kDescriptorBytes>;
 
-// Centres drawn with probability in proportion to the squared distance from those before; all points coincide with a
-// centre: no more.
+// k-means++: draws each centre with a probability in proportion to the squared distance from the centres before. Stops
+// early if every point coincides with a centre.
 std::vector<Descriptor> plus_plus(std::span<const Descriptor> points, std::size_t k, std::mt19937_64& random) {
   std::vector<Descriptor> centres{points[random() % points.size()]};
   std::vector<std::uint32_t> distance(points.size(), std::numeric_limits<std::uint32_t>::max());
@@ -30,7 +30,7 @@ std::vector<Descriptor> plus_plus(std::span<const Descriptor> points, std::size_
   return centres;
 }
 
-// Returns how many points changed hands.
+// Returns how many points moved to another centroid.
 std::size_t assign(std::span<const Descriptor> points, std::span<const Descriptor> centroids,
                    std::vector<std::uint32_t>& assignment) {
   std::size_t moved = 0;
@@ -65,7 +65,7 @@ void move_centroids(std::span<const Descriptor> points, std::span<const std::uin
         centroids[c][d] = static_cast<std::uint8_t>((sums[c][d] + counts[c] / 2) / counts[c]);
 }
 
-// Shares `words` out in proportion to `sizes` (largest remainder), at least one each.
+// Distributes `words` in proportion to `sizes` (largest remainder method), at least one each.
 std::vector<std::size_t> share_out(const std::vector<std::size_t>& sizes, std::size_t words) {
   std::size_t total = 0;
   for (const std::size_t size : sizes) total += size;

@@ -8,7 +8,7 @@
 namespace relmap::place {
 namespace {
 
-// `clusters` centres far apart, `each` points close round every one.
+// `clusters` centres that are far apart, with `each` points close to every one.
 std::vector<Descriptor> clustered(std::size_t clusters, std::size_t each, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Descriptor> points;

@@ -1,4 +1,4 @@
-// Which two places does appearance make the likeliest, and does one of them stand out?
+// Finds the two places that are likeliest by appearance, and whether one of them stands out.
 #pragma once
 
 #include <cstddef>
@@ -11,12 +11,13 @@ namespace relmap::place {
 
 struct Likeliest {
   std::size_t places = 0;
-  double best = 0, other = 0;  // probabilities of the likeliest, and of the one behind it
+  double best = 0, other = 0;  // probabilities of the likeliest place and the second likeliest
 
-  bool ambiguous() const { return best < 2 * other; }  // none stands out
+  bool ambiguous() const { return best < 2 * other; }  // no place stands out
 };
 
-// A place that was taken in several times, as photographs, is one, and as likely as all of them together.
+// Candidates that are one photograph, added to the map several times, count as one place, with the sum of their
+// probabilities.
 Likeliest likeliest(const storage::Graph& graph, std::span<const PlaceCandidate> candidates);
 
 }  // namespace relmap::place

@@ -7,7 +7,7 @@
 namespace relmap::place {
 namespace {
 
-// Sessions 1 and 2 are of the same photographs, and 3 of others.
+// Sessions 1 and 2 are of the same photographs, session 3 is of others.
 class LikeliestPlaces : public ::testing::Test {
  protected:
   LikeliestPlaces() {
@@ -27,7 +27,7 @@ class LikeliestPlaces : public ::testing::Test {
   HandMadeGraph graph_;
 };
 
-TEST_F(LikeliestPlaces, AreTheSameHoweverOftenTheirPhotographsWereTakenIn) {
+TEST_F(LikeliestPlaces, DoNotDependOnHowOftenTheirPhotographsWereAdded) {
   const std::vector<PlaceCandidate> once{{{1, 0}, 0.5}, {{1, 4}, 0.3}, {{3, 2}, 0.1}};
   const std::vector<PlaceCandidate> twice{
       {{1, 0}, 0.25}, {{2, 0}, 0.25}, {{1, 4}, 0.15}, {{2, 4}, 0.15}, {{3, 2}, 0.1}};
@@ -47,7 +47,7 @@ TEST_F(LikeliestPlaces, TheBestMayBeTheSumOfLessLikelyOnes) {
   EXPECT_DOUBLE_EQ(found.other, 0.4);
 }
 
-TEST_F(LikeliestPlaces, OneAloneStandsOut) {
+TEST_F(LikeliestPlaces, ASinglePlaceStandsOut) {
   EXPECT_FALSE(likeliest(graph_, std::vector<PlaceCandidate>{{{3, 2}, 0.2}}).ambiguous());
 }
 

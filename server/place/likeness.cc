@@ -11,7 +11,7 @@ namespace relmap::place {
 namespace {
 
 constexpr double kSigma = 170;  // of the distance between two descriptors of one point; their length is 512
-// The logarithm of the ratio: at a likeness of 0, and with its root.
+// log_likelihood_ratio(): its value at likeness 0, and its slope over the square root of the likeness.
 constexpr double kUnlike = -0.4, kPerRoot = 2.6;
 
 using Order = std::vector<std::uint32_t>;
@@ -32,7 +32,7 @@ struct Pair {
   }
 };
 
-// Each feature of the query with the nearest of the place that shows its word.
+// Pairs each feature of the query with the place's nearest feature of the same word.
 std::vector<Pair> nearest_of_word(const DescribedWords& query, const Order& query_order, const DescribedWords& place) {
   const Order order = by_word(place);
   std::vector<Pair> pairs;
@@ -50,7 +50,7 @@ std::vector<Pair> nearest_of_word(const DescribedWords& query, const Order& quer
   return pairs;
 }
 
-// Of each feature of the query, 0 .. 1.
+// How well the place agrees with each feature of the query, 0 .. 1.
 std::vector<double> agreement(const DescribedWords& query, const Order& query_order, const DescribedWords& place) {
   std::vector<double> agrees(query.words.size());
   std::vector<bool> taken(place.words.size());
@@ -64,7 +64,7 @@ std::vector<double> agreement(const DescribedWords& query, const Order& query_or
   return agrees;
 }
 
-// What is above the mean of the best of all other groups.
+// Subtracts from each sum the mean of the best sums of all other groups.
 std::vector<double> above_other_groups(std::vector<double> sums, std::span<const std::uint32_t> groups,
                                        std::size_t group_count) {
   if (group_count < 2) return std::vector<double>(sums.size());

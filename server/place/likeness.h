@@ -1,7 +1,7 @@
-// How much a picture looks like each of a few places, by the descriptors behind the words that they share: what a word
-// says at 4 bits a feature, its descriptor says at 1,024. Features of one word are compared by the distance of their
-// descriptors, as Hamming embedding does with signatures (Jegou, Douze and Schmid, ECCV 2008), and what many of the
-// places show counts little, as a word that is common: which of a few places it is, only what differs can tell.
+// Measures how much a picture looks like each of a few places by comparing the descriptors of features that share a
+// word: a word carries about 4 bits a feature, a descriptor 1,024. Descriptors are compared by their distance, as
+// Hamming embedding does with signatures (Jegou, Douze and Schmid, ECCV 2008). Features that many of the places show
+// count little, like a common word, since only what differs can tell the places apart.
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,25 @@
 
 namespace relmap::place {
 
-// Features with their words, one each.
+// Features, and the word of each.
 struct DescribedWords {
   std::span<const AppearanceFeature> features;
   std::span<const std::uint32_t> words;
 };
 
-// Of each of `places`. A feature of the query takes the nearest of the place with its word, and each of the place's is
-// taken once, by the nearest. The two agree by exp(-d^2 / 2 s^2); that counts log (N + 1) / (n + 1), where N groups of
-// places were asked, of which n agree as well. Of the sum over features the mean of the other groups' best is taken:
-// what a picture has in common with any place says nothing, and may leave less than 0. `groups`: of each place,
-// 0 .. N - 1, all of them there; of one group nothing can be told. The order of places matters to nothing but the last
-// bits.
+// Returns the likeness of the query to each of `places`. `groups` holds the group of each place; each of the groups
+// 0 .. N - 1 has a place.
+//
+// Each feature of the query is matched to the place's nearest feature with the same word, and each feature of the place
+// is matched at most once, to the nearest. A match at distance d agrees by exp(-d^2 / 2 s^2), and this is weighted by
+// log (N + 1) / (n + 1), where n is the number of groups that agree with the feature. The sum over features is reduced
+// by the mean of the other groups' best sums, since what a picture has in common with every place says nothing; it may
+// be negative. With a single group all are 0. The order of places changes only the last bits.
 std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
                              std::span<const std::uint32_t> groups);
 
-// log p(likeness | the query shows the place) / p(likeness | it does not). Fitted (docs/decisions/recognition.md).
+// log p(likeness | the query shows the place) / p(likeness | it does not), a fitted function
+// (docs/decisions/recognition.md).
 double log_likelihood_ratio(double likeness);
 
 }  // namespace relmap::place

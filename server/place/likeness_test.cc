@@ -14,7 +14,7 @@ struct Picture {
   operator DescribedWords() const { return {features, words}; }
 };
 
-// One feature of each word, all of other descriptors.
+// One feature of each word, all with different descriptors.
 Picture picture(std::vector<std::uint32_t> words, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   Picture result{std::vector<AppearanceFeature>(words.size()), std::move(words)};
@@ -36,7 +36,7 @@ TEST(Likeness, DescriptorsTellPlacesOfTheSameWordsApart) {
   EXPECT_LT(likes[2], likes[1]);
 }
 
-TEST(Likeness, WhatManyPlacesShowCountsLittle) {
+TEST(Likeness, FeaturesThatManyPlacesShowCountLittle) {
   const Picture query = picture({1, 2, 3, 4}, 1);
   const auto part = [&](std::vector<std::size_t> which) {
     Picture result;
@@ -46,7 +46,7 @@ TEST(Likeness, WhatManyPlacesShowCountsLittle) {
     }
     return result;
   };
-  // The first feature is everywhere; the last only at the last place.
+  // The first feature is at every place, the last one only at the last place.
   const Picture common = part({0}), distinct = part({3}), both = part({0, 1});
   const auto likes = likeness_of(query, {common, both, common, common, distinct}, {0, 1, 2, 3, 4});
   EXPECT_GT(likes[4], 0.5);
@@ -58,7 +58,7 @@ TEST(Likeness, WhatManyPlacesShowCountsLittle) {
   EXPECT_EQ(views[0], views[2]);
 }
 
-TEST(Likeness, AFeatureOfAPlaceIsTakenOnce) {
+TEST(Likeness, AFeatureOfAPlaceIsMatchedOnce) {
   Picture query = picture({1, 1, 1}, 1);
   query.features[1] = query.features[2] = query.features[0];
   const Picture place = picture({1}, 1);  // the first of them
@@ -67,13 +67,13 @@ TEST(Likeness, AFeatureOfAPlaceIsTakenOnce) {
   EXPECT_NEAR(likes[0], std::log(3.0 / 2.0), 1e-12);
 }
 
-TEST(Likeness, WhatIsCommonToAllPlacesSaysNothing) {
+TEST(Likeness, FeaturesThatAllPlacesShowCountForNothing) {
   const Picture query = picture({1, 2, 3, 4}, 1);
   for (const double like : likeness_of(query, {query, query, query}, {0, 1, 2})) EXPECT_NEAR(like, 0, 1e-12);
   EXPECT_EQ(likeness_of(query, {query}, {0})[0], 0) << "of one place nothing can be told";
 }
 
-TEST(Likeness, MoreIsLikelier) {
+TEST(Likeness, AHigherLikenessHasAHigherLikelihoodRatio) {
   EXPECT_LT(log_likelihood_ratio(0), 0);
   EXPECT_EQ(log_likelihood_ratio(-1), log_likelihood_ratio(0));
   EXPECT_LT(log_likelihood_ratio(4), log_likelihood_ratio(9));

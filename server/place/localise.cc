@@ -17,13 +17,13 @@ namespace relmap::place {
 
 namespace {
 
-constexpr std::size_t kVerified = 6;       // candidates of the place index that geometry is tried on
+constexpr std::size_t kVerified = 6;       // candidates of the place index on which geometry is tried
 constexpr std::uint32_t kPriorDepth = 12;  // edges around a prior frame
-constexpr std::uint32_t kPriorStride = 4;  // every so many edges one candidate: a verification covers its neighbours
+constexpr std::uint32_t kPriorStride = 4;  // edges between candidates, since a verification covers the neighbours too
 constexpr std::size_t kPriorCandidates = 8;
-constexpr std::uint32_t kSure = 2 * kMinInliers;  // inliers with which no further candidate is tried
+constexpr std::uint32_t kSure = 2 * kMinInliers;  // inliers from which no further candidate is tried
 
-// The same picture asks RANSAC for the same numbers.
+// Seeds RANSAC by the picture, so that the same picture gets the same answer.
 std::uint64_t seed_of(std::span<const AppearanceFeature> features) {
   std::uint32_t crc = 0;
   for (const AppearanceFeature& feature : features) crc = crc32c(feature.descriptor, crc);
@@ -75,7 +75,7 @@ Status ambiguous(std::span<const PlaceTrial> trials, const Standing& standing) {
                                        place_text(trials[*standing.runner_up]) + " explain the picture about as well"};
 }
 
-// What contradicts the question itself, with what to do.
+// The refusal of a contradicted trial (contradiction()), with what to do about it; ok if there is none.
 Status contradiction_of(std::span<const PlaceTrial> trials) {
   const PlaceTrial* trial = contradiction(trials);
   if (!trial) return {};
@@ -86,7 +86,7 @@ Status contradiction_of(std::span<const PlaceTrial> trials) {
               "; name the camera that took it, or ask for one picture without a camera: then its lens is estimated"};
 }
 
-// Localises one picture: geometry over candidates until one is beyond doubt.
+// Tries geometry on one candidate after another, and knows which of them explains the picture best.
 class Search {
  public:
   Search(const PlaceKnowledge& map, const PlaceQuestion& question, const Proceed& proceed)
@@ -95,16 +95,17 @@ class Search {
         seed_(seed_of(question.features)),
         trials_(map.graph, query_, seed_, proceed) {}
 
-  // Until one is beyond doubt. DEADLINE, while none has been confirmed.
+  // Tries candidates until one has kSure inliers. If `proceed` refuses to go on, its status is returned unless a
+  // candidate has been confirmed.
   Status run(std::span<const PlaceCandidate> candidates) {
     Status status = trials_.run(candidates, {.sure_inliers = kSure, .needs_metres = true});
     return trials_.best() ? Status() : status;
   }
 
-  // WRONG_CALIBRATION or NOT_STEREO: more fits where the camera is contradicted than where anything is confirmed.
+  // WRONG_CALIBRATION or NOT_STEREO if more features fit at a contradicted place than at any confirmed one.
   Status contradiction() const { return contradiction_of(trials_.all()); }
 
-  // The place where most fits, of those that are confirmed.
+  // The confirmed place with the most inliers.
   std::optional<Localisation> best() const {
     const auto best = trials_.best();
     if (!best) return std::nullopt;
@@ -124,7 +125,7 @@ class Search {
     return place::check_not_mirrored(map_.graph, query_, found.place, seed_);
   }
 
-  // Whether what looks like the place elsewhere explains the picture about as well. DEADLINE.
+  // AMBIGUOUS_PLACE if a look-alike of the place explains the picture about as well; or what `proceed` returns.
   Status check_unique(const Localisation& found) {
     trials_.keep_confirmed();
     const std::size_t answers = trials_.size();
@@ -154,14 +155,14 @@ std::vector<PlaceCandidate> worth_verifying(const PlaceKnowledge& map, const Pla
   return candidates;
 }
 
-// A camera that says nothing of the picture's size says nothing of where its inliers lie.
+// NO_CALIBRATION without a camera: geometry needs the picture's size at least.
 Status check_named(const PlaceQuestion& question) {
   if (question.camera) return {};
-  return {Reason::NO_CALIBRATION, "geometry needs the camera that the features are of"};
+  return {Reason::NO_CALIBRATION, "geometry needs the camera that took the picture"};
 }
 
-// What geometry says of candidates, and of what looks like the best of them elsewhere; and which of those that it
-// confirms is the place.
+// Tries geometry on the candidates and on look-alikes of the best of them, and decides which of the confirmed ones is
+// the place.
 Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
                            std::span<const PlaceCandidate> candidates, const Proceed& proceed) {
   const QueryPicture query = question.picture();
@@ -205,8 +206,8 @@ Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& quest
   return matches;
 }
 
-// Geometry may tell several candidates from one frame: then it is listed once, as the first of them, and by the sum of
-// their probabilities, since the picture shows one candidate or another and each of them says the same.
+// Lists a frame once to which geometry led from several candidates: as the first of them, with the sum of their
+// probabilities, since each of them gives the same answer.
 void list_frames_once(std::vector<PlaceMatch>& places) {
   std::vector<PlaceMatch> once;
   for (PlaceMatch& match : places) {
@@ -252,13 +253,13 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
   return *std::move(found);
 }
 
-Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
+Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t max_verified,
                                     const Proceed& proceed) {
   if (Status status = check_question(map, question); !status.ok()) return status;
   const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked,
                                               question.prior, question.features);
   const Status camera = check_named(question);
-  const std::size_t tried = camera.ok() ? std::min(verify, answer.candidates.size()) : 0;
+  const std::size_t tried = camera.ok() ? std::min(max_verified, answer.candidates.size()) : 0;
 
   PlaceMatches matches;
   matches.new_place = answer.new_place;
@@ -272,7 +273,7 @@ Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuesti
     matches.nothing_verified = camera;
   }
   for (const PlaceCandidate& candidate : std::span(untried, answer.candidates.end())) {
-    const std::string before = "geometry was tried on the " + std::to_string(verify) + " before it";
+    const std::string before = "geometry was tried on the " + std::to_string(max_verified) + " before it";
     matches.places.push_back(
         {candidate.frame, candidate.probability, {}, {}, camera.ok() ? Status(Reason::OUT_OF_REACH, before) : camera});
   }

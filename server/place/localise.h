@@ -1,4 +1,4 @@
-// Where in the map was this seen? Appearance proposes places, geometry decides (docs/method.md, 7).
+// Localises a picture in the map: appearance proposes places, geometry verifies them (docs/method.md, 7).
 #pragma once
 
 #include <optional>
@@ -23,57 +23,63 @@ struct PlaceKnowledge {
 
 struct PlaceQuestion {
   std::span<const AppearanceFeature> features;
-  std::optional<StereoCamera> camera;           // needed for geometry; f 0: unknown
-  std::span<const storage::FrameRange> masked;  // no answers
-  std::optional<FrameId> prior;                 // somewhere near it: tried first (localise), or likelier (match)
-  bool pair = false;                            // QueryPicture::pair
+  std::optional<StereoCamera> camera;           // geometry needs one; f is 0 where unknown
+  std::span<const storage::FrameRange> masked;  // frames that are no answers
+  // A frame near which the picture is thought to be taken: localise_features() tries the frames around it first,
+  // match_features() takes them to be likelier.
+  std::optional<FrameId> prior;
+  bool pair = false;  // QueryPicture::pair
   CameraKnown known = CameraKnown::kMeasuredWith;
   Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
 
-  QueryPicture picture() const { return {features, *camera, masked, pair, known, eye_turn}; }  // with a camera
+  QueryPicture picture() const { return {features, *camera, masked, pair, known, eye_turn}; }  // needs a camera
 };
 
 struct Localisation {
   VerifiedPlace place;
   double probability = 0;                 // of the place, by appearance
-  double new_place = 1;                   // that the map does not hold what is seen, by appearance
-  bool near_prior = false;                // then both are unknown: the map was not searched
-  std::uint32_t verified_candidates = 0;  // candidates that geometry was tried on
+  double new_place = 1;                   // probability, by appearance, that the map does not hold the place
+  bool near_prior = false;                // found around the prior; both probabilities are unknown then
+  std::uint32_t verified_candidates = 0;  // candidates on which geometry was tried
 };
 
-// Around the prior first; the rest of the map only if geometry confirms nothing there (a look-alike elsewhere is not
-// asked for then). NO_CALIBRATION, NO_SUCH_FRAME (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said
-// no (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD, WRONG_CALIBRATION), NOT_STEREO (recognised in a mono session: no
-// metres), what `proceed` says.
+// Returns the pose of the question's picture. Tries the frames around the prior first, and the rest of the map only if
+// geometry confirms none of them; a place found around the prior is not compared with look-alikes elsewhere.
+//
+// NO_CALIBRATION (no camera, an unknown lens that cannot be estimated, or a mirrored picture), NO_SUCH_FRAME (the
+// prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, NOT_STEREO (recognised in a mono session, which has no metres, or a
+// pair that is none), geometry's refusals (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD, WRONG_CALIBRATION), and what
+// `proceed` returns.
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Proceed& proceed);
 
 struct PlaceMatch {
   FrameId frame;
   double probability = 0;
-  // Where geometry was tried and agreed.
+  // Set if geometry confirms the place.
   std::optional<VerifiedPlace> verified;
-  // Where geometry agreed, and another place explains the picture as well, or better.
+  // Set if geometry confirms the place but another one explains the picture as well or better.
   std::optional<VerifiedPlace> doubted;
-  // Why it is not verified: geometry's reasons, NO_CALIBRATION, OUT_OF_REACH (not tried), AMBIGUOUS_PLACE (doubted).
+  // Why the place is not verified: geometry's refusals, NO_CALIBRATION, OUT_OF_REACH (geometry was not tried),
+  // AMBIGUOUS_PLACE (doubted).
   Status unverified;
 
-  // The frame where geometry agreed, or the most probable one.
+  // The frame in which geometry confirmed the place, or else the most probable frame of the place.
   FrameId shown() const { return verified ? verified->match : doubted ? doubted->match : frame; }
 };
 
 struct PlaceMatches {
-  // Verified ones first, then doubted ones, by inliers; the others descending by probability.
+  // Verified places first, then doubted ones, each descending by inliers; then the others, descending by probability.
   std::vector<PlaceMatch> places;
-  double new_place = 1;
-  Status nothing_verified;  // why: NEW_PLACE, AMBIGUOUS_PLACE, what geometry said of the best
+  double new_place = 1;     // probability, by appearance, that the map does not hold the place
+  Status nothing_verified;  // why no place is verified: NEW_PLACE, AMBIGUOUS_PLACE, geometry's refusal of the best
 };
 
-// Every candidate of appearance with its probability, a frame once, the most probable `verify` of them with what
-// geometry says (none without a camera), and those that it confirms before the others: what it says of one picture
-// against another is worth more than which words they share. Frames of one place only are verified: where another place
-// explains the picture about as well, none is. EMPTY_MAP, TOO_FEW_FEATURES, what `proceed` says.
-Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
+// Returns every candidate of appearance with its probability, each frame once, and tries geometry on the `max_verified`
+// most probable ones (on none without a camera). Candidates that geometry confirms come first, since geometry is the
+// better evidence. Only frames of one place are reported as verified, and none if another place explains the picture
+// about as well. EMPTY_MAP, TOO_FEW_FEATURES, and what `proceed` returns.
+Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t max_verified,
                                     const Proceed& proceed);
 
 }  // namespace relmap::place

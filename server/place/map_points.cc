@@ -15,10 +15,11 @@ constexpr double kMaxWayMetres = 0.3;  // one sigma
 
 constexpr double kMinDisparitySigmas = 2;
 constexpr std::size_t kMaxIndependent = 4;  // observations of a landmark
-// Diameter of the region described at level 0: twice SIFT's sigma of 2.5 (frontend/vision/appearance.h).
+// Diameter (pixels) of the region that is described at level 0: twice SIFT's sigma of 2.5
+// (frontend/vision/appearance.h).
 constexpr float kLevelZeroScale = 5;
 
-// One step of the way along a session's odometry.
+// Walks along a session's odometry, step by step.
 class OdometryWalk {
  public:
   OdometryWalk(const storage::Graph& graph, FrameId at, const AcrossCarried& across)
@@ -51,7 +52,7 @@ class OdometryWalk {
       return go(edge, forward);
     }
     const std::optional<storage::Edge> stretch = across_ ? across_(edge) : std::nullopt;
-    // Who stands in the middle of it does not know how far he was carried.
+    // From a frame within the stretch it is not known how far the robot was carried.
     if (!stretch || (forward ? stretch->a : stretch->b) != placed_.frame) return false;
     return go(*stretch, forward);
   }
@@ -71,7 +72,7 @@ class OdometryWalk {
   std::shared_ptr<const storage::FrameHot> hot_;
 };
 
-// Points of one frame.
+// Makes the map points of one frame.
 class FramePoints {
  public:
   FramePoints(const storage::Graph& graph, const std::unordered_map<FrameId, SE3>& T_centre_base,

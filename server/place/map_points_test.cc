@@ -33,7 +33,7 @@ TEST(AlongOdometry, FollowsNeitherLoopsNorUnsensedMotion) {
   EXPECT_EQ(along_odometry(street.graph, {1, 3}, 0, 5).size(), 2u);
 }
 
-TEST(GatherPoints, APointStandsWhereItIsWhicheverFrameSawIt) {
+TEST(GatherPoints, PointsHaveTheSamePositionWhicheverFrameSawThem) {
   SyntheticStreet street(3, 12, 0);
   const MapPoints map = gather_points(street.graph, {1, 6}, 3);
   EXPECT_EQ(map.frames.size(), 7u);
@@ -50,14 +50,14 @@ TEST(GatherPoints, APointStandsWhereItIsWhicheverFrameSawIt) {
   EXPECT_LT(landmarks, map.points.size());
 }
 
-TEST(GatherPoints, LeavesOutWhatItIsTold) {
+TEST(GatherPoints, SkipsFramesThatAreLeftOut) {
   SyntheticStreet street(4, 12, 0);
   const MapPoints map = gather_points(street.graph, {1, 6}, 3, [](FrameId frame) { return frame.index > 6; });
   for (const MapPoint& p : map.points) EXPECT_LE(map.frames[p.placed].frame.index, 6u);
   EXPECT_FALSE(map.points.empty());
 }
 
-TEST(GatherPoints, LeavesOutFramesWhoseWayIsNotKnown) {
+TEST(GatherPoints, SkipsFramesWhosePoseIsUncertain) {
   SyntheticStreet street(4, 12, 0);
   street.graph.edit_hot({1, 8}).edges.front().covariance.diagonal().setConstant(1);
   const MapPoints map = gather_points(street.graph, {1, 6}, 3);
@@ -65,7 +65,7 @@ TEST(GatherPoints, LeavesOutFramesWhoseWayIsNotKnown) {
   EXPECT_FALSE(map.points.empty());
 }
 
-TEST(StereoCovariance, IsThatOfRepeatedMeasurements) {
+TEST(StereoCovariance, EqualsThatOfRepeatedMeasurements) {
   const Vector3 truth(1.2, -0.4, 5);
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 0.2);

@@ -1,4 +1,5 @@
-// Which places in metres could a picture show? Photographs of the same places compete for nothing here.
+// The answer of the place index without mono sessions, for callers that need a metric pose: photographs of the same
+// places do not compete with them.
 #pragma once
 
 #include <span>
@@ -7,8 +8,8 @@
 
 namespace relmap::place {
 
-// `answer`, of PlaceIndex::query() with the same question; asked once more without mono sessions if any are among its
-// candidates: their frames take no probability from others, and no room.
+// Returns `answer`, which PlaceIndex::query() gave to the same question, if no candidate is of a mono session.
+// Otherwise asks again without mono sessions, so that their frames take no probability and no room from the others.
 PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
                           const storage::Graph& graph, std::span<const storage::FrameRange> masked,
                           std::span<const AppearanceFeature> features);

@@ -7,8 +7,8 @@ namespace relmap::place {
 
 namespace {
 
-constexpr std::size_t kCells = 4, kDirections = 8;  // of SIFT: cells a side, directions a cell
-// So many do not agree on the geometry of a mirror image, whatever it shows.
+constexpr std::size_t kCells = 4, kDirections = 8;  // of a SIFT descriptor: cells a side, directions a cell
+// A mirrored picture never has so many inliers, whatever it shows.
 constexpr std::uint32_t kBeyondDoubt = 4 * kMinInliers;
 
 }  // namespace
@@ -37,13 +37,13 @@ Status check_not_mirrored(const storage::Graph& graph, const QueryPicture& query
   other.features = features;
   other.camera.cx = query.camera.width - 1 - query.camera.cx;
   other.camera.baseline = 0;
-  // What contradicts the camera fits nevertheless.
+  // Counts features even if the camera is contradicted there.
   const std::size_t fits = try_place(graph, other, place.match, seed).features.size();
   if (fits <= place.inliers) return {};
   return {Reason::NO_CALIBRATION, "the picture seems to be mirrored: at " + place.match.to_string() + " " +
-                                      std::to_string(place.inliers) + " of its features fit, and " +
+                                      std::to_string(place.inliers) + " of its features fit, but " +
                                       std::to_string(fits) +
-                                      " of its mirror image's: ask with it as the camera took it"};
+                                      " of its mirror image; ask with the picture as the camera took it"};
 }
 
 }  // namespace relmap::place

@@ -1,5 +1,5 @@
-// Pictures that were mirrored, as telephones mirror those of their front cameras: where a pattern is symmetric their
-// geometry fits, metres off.
+// Recognises mirrored pictures, such as telephones make with their front cameras. Where a pattern is symmetric, the
+// geometry of a mirrored picture fits with a pose that is metres off.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@
 
 namespace relmap::place {
 
-// The features that the mirror image, left for right, of a picture of that width would have. Of SIFT the rows of cells
-// across the keypoint's direction change places, and directions turn the other way.
+// Returns the features that the mirror image (left and right exchanged) of a picture of this width would have. In a
+// SIFT descriptor this reverses the order of the rows of cells and the sense of the gradient directions.
 std::vector<AppearanceFeature> mirrored(std::span<const AppearanceFeature> features, int width);
 
-// NO_CALIBRATION: of the mirror image more fits at `place`, which the picture was found at, than of the picture itself.
-// A pair is not asked: its disparities tell.
+// NO_CALIBRATION if more features of the mirror image than of the picture fit at `place`, where the picture was found.
+// Stereo pairs are not checked, since their disparities exclude it.
 Status check_not_mirrored(const storage::Graph& graph, const QueryPicture& query, const VerifiedPlace& place,
                           std::uint64_t seed);
 

@@ -19,7 +19,7 @@ int difference(const AppearanceFeature& a, const AppearanceFeature& b) {
   return sum;
 }
 
-// What the detector finds in the mirror image of a picture.
+// The features that the detector finds in the mirror image of a picture.
 TEST(Mirrored, FeaturesAreThoseOfTheMirrorImage) {
   constexpr int kWidth = 320, kHeight = 240;
   const vision::testing_textures::Waves waves(3);
@@ -48,14 +48,14 @@ TEST(Mirrored, FeaturesAreThoseOfTheMirrorImage) {
   EXPECT_GE(unlike_unmirrored, there * 9 / 10);
 }
 
-TEST(Mirrored, APictureIsToldFromItsMirrorImage) {
+TEST(Mirrored, AMirroredPictureIsRefused) {
   constexpr FrameId kPlace{1, 6};
   SyntheticStreet street(2, 12, 0);
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6), false, points);
   QueryPicture plain{features, kStreetCamera};
   plain.camera.baseline = 0;
-  VerifiedPlace place;  // as if a symmetric pattern had given it
+  VerifiedPlace place;  // as a symmetric pattern may give it
   place.match = kPlace;
   place.inliers = 25;
   place.verification = storage::Verification::kPnP;
@@ -69,7 +69,7 @@ TEST(Mirrored, APictureIsToldFromItsMirrorImage) {
   EXPECT_EQ(refused.reason(), Reason::NO_CALIBRATION) << refused.to_string();
   EXPECT_NE(refused.message().find("mirrored"), std::string::npos) << refused.message();
   place.inliers = 200;
-  EXPECT_TRUE(check_not_mirrored(street.graph, mirror, place, 7).ok()) << "so many are no accident";
+  EXPECT_TRUE(check_not_mirrored(street.graph, mirror, place, 7).ok()) << "so many inliers do not occur by chance";
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ std::vector<OlderView> older_views(const storage::Graph& graph, FrameId match, c
   }
   std::sort(views.begin(), views.end(), [](const View& l, const View& r) { return l.age < r.age; });
 
-  std::vector<View> nearest;  // of each pass
+  std::vector<View> nearest;  // the nearest view of each pass
   for (const View& view : views) {
     const auto pass = std::find_if(nearest.begin(), nearest.end(),
                                    [&](const View& other) { return storage::in_one_pass(view.frame, other.frame); });

@@ -1,5 +1,6 @@
-// In a place that has been passed many times a closure is made with the oldest pass that saw it: so every later pass is
-// one loop edge away from where the place's landmarks are based, however many have come between (docs/method.md, 2).
+// Finds the older passes of a place. Where a place has been passed many times, a closure is made with the oldest pass
+// that saw it, so that every later pass is one loop edge away from the frames in which the place's landmarks are based,
+// however many passes have come between (docs/method.md, 2).
 #pragma once
 
 #include <cstddef>
@@ -11,21 +12,21 @@
 
 namespace relmap::place {
 
-// Of frames that may share landmarks with another: metres and radians between them at most.
+// Frames that are further apart than this (metres, radians) are not taken to share landmarks.
 inline constexpr double kMaxViewDistance = 4.0;
 inline constexpr double kMaxViewAngle = 0.8;
 
 struct OlderView {
   FrameId frame;
-  SE3 T_frame_query;  // as the map has it
+  SE3 T_frame_query;  // compounded along the map's edges
 };
 
-// A query has been found to stand at `T_match_query` from `match`. Of each older pass that leads up from `match` (over
-// loop edges, storage/graph/local_graph.h) the frame nearest to the query, if it is near enough to share landmarks with
-// it: the oldest pass first, kMaxOlderViews at most, all taken in before `match`. Whether they do share enough is for
-// the caller to verify.
+// For a query that was found at `T_match_query` from `match`, returns the nearest frame of each older pass that can be
+// reached from `match` by walking up loop edges (storage/graph/local_graph.h), if it is near enough to share landmarks
+// with the query. The oldest pass comes first; at most kMaxOlderViews are returned, all of them added to the map before
+// `match`. Frames for which `left_out(frame)` is true, such as the query's own recent past, are skipped. The caller
+// must verify that the frames do share enough landmarks.
 inline constexpr std::size_t kMaxOlderViews = 3;
-// `left_out(frame)`: not looked at, as what the query has just seen itself.
 std::vector<OlderView> older_views(const storage::Graph& graph, FrameId match, const SE3& T_match_query,
                                    const std::function<bool(FrameId)>& left_out);
 

@@ -24,7 +24,8 @@ std::vector<FrameId> views(const storage::Graph& graph, FrameId match, const SE3
   return frames;
 }
 
-// Passes 1 .. count over the same 20 m, a frame each metre; frame 10 of each is tied to frame 10 of the one before.
+// Passes 1 .. count over the same 20 m, with a frame each metre. A loop edge joins frame 10 of each pass to frame 10 of
+// the pass before.
 storage::SmallGraph passes(SessionNumber count) {
   storage::SmallGraph graph;
   std::uint64_t sequence = 0;
@@ -45,7 +46,7 @@ TEST(OlderViews, AreTheNearestFramesOfOlderPassesTheOldestFirst) {
   EXPECT_THAT(views(graph, {7, 8}, ahead(0)), IsEmpty());
 }
 
-TEST(OlderViews, TellWhereTheMapHasTheQuery) {
+TEST(OlderViews, HaveTheirPoseFromTheMap) {
   const auto found = older_views(passes(3), {3, 8}, ahead(0.9), [](FrameId) { return false; });
   ASSERT_EQ(found.size(), 2u);
   for (const OlderView& view : found) EXPECT_NEAR(view.T_frame_query.t.z(), -0.1, 1e-9) << "of frame 9, from 8.9 m";
@@ -53,17 +54,17 @@ TEST(OlderViews, TellWhereTheMapHasTheQuery) {
 
 TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(views(passes(9), {9, 10}, ahead(0)).size(), kMaxOlderViews); }
 
-TEST(OlderViews, SeeWhatTheQuerySees) {
+TEST(OlderViews, AreNearTheQueryAndLookTheSameWay) {
   const storage::SmallGraph graph = passes(2);
-  EXPECT_THAT(views(graph, {2, 10}, ahead(-30)), IsEmpty()) << "nobody was there";
+  EXPECT_THAT(views(graph, {2, 10}, ahead(-30)), IsEmpty()) << "no pass was there";
   SE3 turned;
   turned.R = SE3::exp((Vector6() << 0, 0, 0, 0, 2, 0).finished()).R;
-  EXPECT_THAT(views(graph, {2, 10}, turned), IsEmpty()) << "nobody looked there";
+  EXPECT_THAT(views(graph, {2, 10}, turned), IsEmpty()) << "no pass looked that way";
 }
 
-TEST(OlderViews, AreNotTheQuerysOwnNorOfThoseWhoComeLater) {
-  // Robots 1 and 2 in convoy: frame 10 of the one was tied to frame 10 of the other; then frame 14 of robot 1 is
-  // recognised by frame 13 of robot 2, from which the walk up leads back to robot 1 itself.
+TEST(OlderViews, AreNeitherLaterFramesNorFramesLeftOut) {
+  // Robots 1 and 2 drive in convoy, and a loop edge joins their frames 10. Then frame 14 of robot 1 recognises frame 13
+  // of robot 2, from which the walk up leads back to robot 1 itself.
   storage::SmallGraph graph;
   for (std::uint32_t i = 0; i < 16; ++i)
     for (SessionNumber robot = 1; robot <= 2; ++robot) {
@@ -76,7 +77,7 @@ TEST(OlderViews, AreNotTheQuerysOwnNorOfThoseWhoComeLater) {
   EXPECT_THAT(older_views(graph, {2, 13}, ahead(1), [](FrameId frame) { return frame.session == 1; }), IsEmpty());
 }
 
-TEST(OlderViews, OfRobotsThatPassedTogetherAreOneEach) {
+TEST(OlderViews, IncludeOneOfEachRobotThatPassedTogether) {
   storage::SmallGraph graph;
   std::uint64_t sequence = 0;
   for (std::uint32_t i = 0; i < 20; ++i)
@@ -92,8 +93,8 @@ TEST(OlderViews, OfRobotsThatPassedTogetherAreOneEach) {
   EXPECT_THAT(views(graph, {3, 11}, ahead(0)), ElementsAre(FrameId{1, 11}, FrameId{2, 11}));
 }
 
-TEST(OlderViews, OfOneSessionThatComesBackAreItsEarlierPasses) {
-  // Sixty frames there, sixty where it began.
+TEST(OlderViews, IncludeEarlierPassesOfTheSameSession) {
+  // Sixty frames, and then sixty from where the session began.
   storage::SmallGraph graph;
   for (std::uint32_t i = 0; i < 120; ++i) {
     graph.frame({1, i}).journal_sequence = i + 1;

@@ -11,7 +11,7 @@ namespace relmap::place {
 namespace {
 
 constexpr std::size_t kMaxBytes = 16 << 20;
-constexpr std::size_t kMaxEntries = 128;  // those without a picture among them
+constexpr std::size_t kMaxEntries = 128;  // including frames without a picture
 
 std::size_t bytes_of(const FramePicture* picture) {
   if (!picture) return 0;
@@ -23,7 +23,7 @@ std::shared_ptr<const FramePicture> decode(const storage::Graph& graph, FrameId 
   const auto cold = graph.cold(frame);
   const auto session = graph.session(frame.session);
   if (!cold || cold->picture.empty() || !session) return nullptr;
-  const auto size = vision::picture_size(cold->picture);  // before it is decoded: it may say that it is huge
+  const auto size = vision::picture_size(cold->picture);  // checked before it is decoded, since it may be huge
   if (!size.ok() || size->png || size->width <= vision::kThumbnailWidth ||
       double{1} * size->width * size->height > vision::kMaxKeyframePixels)
     return nullptr;

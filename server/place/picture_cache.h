@@ -1,4 +1,4 @@
-// Pictures of the map's frames, decoded: landmarks are measured in them (server/place/reobserve.h).
+// A cache of the decoded pictures of the map's frames, in which landmarks are measured (server/place/reobserve.h).
 #pragma once
 
 #include <list>
@@ -10,18 +10,19 @@
 namespace relmap::place {
 
 struct FramePicture {
-  vision::Pyramid pyramid;  // from level `first` of the camera's picture on
-  int first = 0;
+  vision::Pyramid pyramid;  // its levels are those of the camera's picture from `first` on
+  int first = 0;            // how many times the stored picture has been halved
 
   int last() const { return first + pyramid.levels() - 1; }
   vision::ImageView level(int of_camera) const { return pyramid.level(of_camera - first); }
 };
 
-// Of one map. Keeps what was used last, 16 MB of it: the next frame of a robot needs nearly the same. Not thread safe.
+// A cache for one map. Keeps the 16 MB of pictures that were used last, since the next frame of a robot needs nearly
+// the same ones. Not thread-safe.
 class PictureCache {
  public:
-  // Null where the frame has no picture, a thumbnail, one that cannot be decoded, of more than a megapixel, or of
-  // another size than the camera's, halved once or twice perhaps.
+  // Returns the picture of a frame. Null if there is none, if it is a thumbnail or a PNG, cannot be decoded or has more
+  // than a megapixel, or if its size is not that of the camera, halved at most vision::kMaxHalvings times.
   std::shared_ptr<const FramePicture> find(const storage::Graph& graph, FrameId frame);
 
  private:
@@ -29,7 +30,7 @@ class PictureCache {
     FrameId frame;
     std::shared_ptr<const FramePicture> picture;
   };
-  std::list<Entry> entries_;  // the last used first
+  std::list<Entry> entries_;  // most recently used first
   std::size_t bytes_ = 0;
 };
 

@@ -13,7 +13,7 @@ constexpr LogLikelihood kMaxConstant = LogLikelihood{1} << 61;
 
 std::size_t padded(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
 
-Status corrupt(const std::string& what) { return {Reason::CORRUPT, "a block of places: " + what}; }
+Status corrupt(const std::string& what) { return {Reason::CORRUPT, "a block of places has " + what}; }
 
 bool is_bitmap(std::size_t slots, std::size_t places) {
   return slots * sizeof(std::uint16_t) > PlaceBlock::bitmap_bytes(static_cast<std::uint32_t>(places));
@@ -32,7 +32,7 @@ bool is_list(const PlaceBlock::List& list, std::uint32_t places) {
   return good && list.bitmap == is_bitmap(count, places);
 }
 
-// The frames of both, in order, and where each goes.
+// The runs of the older and newer frames in order, and the slot of each frame.
 struct Order {
   Order(const PlaceBlock* older, std::span<const PlaceWords> newer)
       : of_older(older ? older->places() : 0), of_newer(newer.size()) {
@@ -62,7 +62,7 @@ struct Order {
   std::vector<FrameRun> runs;
 };
 
-// Lists by word of places that have none yet.
+// The lists of slots by word of the newer places.
 class NewLists {
  public:
   NewLists(std::uint32_t vocabulary_size, std::span<const PlaceWords> places, const std::vector<std::uint32_t>& slots)
@@ -117,37 +117,38 @@ PlaceBlock PlaceBlock::trusted(ByteSpan bytes) {
 }
 
 Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, std::uint32_t vocabulary_size) {
-  if (bytes.size() < kHeaderBytes) return corrupt("cut short");
+  if (bytes.size() < kHeaderBytes) return corrupt("a truncated header");
   const auto field = [&](std::size_t i) { return load<std::uint32_t>(bytes.data() + 4 * i); };
   const std::uint32_t places = field(0), runs = field(2), list_bytes = field(3);
   if (places == 0 || places > kPlacesPerBlock || field(1) != vocabulary_size || runs == 0 || runs > places ||
       (list_bytes & kBitmap) != 0)
-    return corrupt("its header");
+    return corrupt("an invalid header");
   const std::size_t size = kHeaderBytes + padded(runs * kRunBytes) + std::size_t{places} * 8 +
                            (std::size_t{vocabulary_size} + 1) * 4 + list_bytes;
-  if (bytes.size() != size) return corrupt("its size");
+  if (bytes.size() != size) return corrupt("the wrong size");
 
   const PlaceBlock block = trusted(bytes);
   std::uint32_t place = 0;
-  std::uint64_t next = 0;  // the first frame that may follow
+  std::uint64_t next = 0;  // the lowest frame that may come next, packed
   for (const FrameRun& run : block.frames()) {
     if (run.first.packed() < next || !run.first.valid() || run.count == 0 || run.count > places - place ||
         std::uint64_t{run.first.index} + run.count > std::uint64_t{1} << 32)
-      return corrupt("its frames");
+      return corrupt("invalid frames");
     place += run.count;
     next = run.first.packed() + run.count;
   }
-  if (place != places) return corrupt("its frames");
+  if (place != places) return corrupt("the wrong number of frames");
   for (std::uint32_t slot = 0; slot < places; ++slot)
-    if (block.constant(slot) < -kMaxConstant || block.constant(slot) > kMaxConstant) return corrupt("its constants");
+    if (block.constant(slot) < -kMaxConstant || block.constant(slot) > kMaxConstant)
+      return corrupt("invalid constants");
   for (std::uint32_t word = 0; word < block.words_; ++word) {
     const auto from = load<std::uint32_t>(block.offsets_ + 4 * std::size_t{word}) & ~kBitmap;
     const auto to = load<std::uint32_t>(block.offsets_ + 4 * (std::size_t{word} + 1)) & ~kBitmap;
     if (from > to || to > list_bytes || !is_list(block.list(word), places))
-      return corrupt("the list of word " + std::to_string(word));
+      return corrupt("an invalid list of word " + std::to_string(word));
   }
   if (load<std::uint32_t>(block.offsets_ + 4 * std::size_t{block.words_}) != list_bytes)
-    return corrupt("its lists' end");
+    return corrupt("lists that end at the wrong offset");
   return block;
 }
 

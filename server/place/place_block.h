@@ -1,16 +1,16 @@
-// Up to 4,096 places as bytes, in memory as on disk: which frames they are, their constants, and which words they show.
-// Places stand in the order of their frames; a place's number within its block is its slot.
+// A block of up to 4,096 places, in one format for memory and disk: the frames of the places, their constants and the
+// words that they show. Places are in the order of their frames; a place's number within its block is its slot.
 //
 //    0  u32            P, places: 1 .. 4096
 //    4  u32            V, words of the vocabulary
 //    8  u32            R, runs of frames
 //   12  u32            L, bytes of lists, below 2^31
-//       u32[R][3]      session, index of the first frame, frames: ascending, P together; zeros to a multiple of 8
-//       i64[P]         constants, 2^-36 nats
-//       u32[V + 1]     where the list of each word begins, and the last ends; bit 31: it is a bitmap
-//       u8[L]          lists, as what is shorter: slots, ascending, a u16 each; or a bitmap (bitmap_sums.h) of P bits
-//       and
-//                      zeros to a multiple of 128
+//       u32[R][3]      runs: session, index of the first frame, number of frames; ascending, P frames in total; then
+//                      zeros to a multiple of 8
+//       i64[P]         constants, in steps of 2^-36 nats
+//       u32[V + 1]     offset of the list of each word, and the end of the last; bit 31 is set for a bitmap
+//       u8[L]          lists, each in the shorter form: slots, ascending, a u16 each; or a bitmap (bitmap_sums.h) of P
+//                      bits and zeros to a multiple of 128 bits
 #pragma once
 
 #include <bit>
@@ -33,26 +33,26 @@ inline constexpr std::uint32_t kPlacesPerBlock = 4096;
 struct FrameRun {
   FrameId first;
   std::uint32_t count = 0;
-  std::uint32_t place = 0;  // of the first
+  std::uint32_t place = 0;  // the place of the first frame
 
   bool contains(FrameId frame) const {
     return frame.session == first.session && frame.index - first.index < count && frame.index >= first.index;
   }
 };
 
-// A view into its bytes, which must outlive it. Thread-safe.
+// A view of a block's bytes, which must outlive it. Thread-safe.
 class PlaceBlock {
  public:
-  // CORRUPT: not a block of this vocabulary. Every list is read.
+  // Checks the bytes, all lists included. CORRUPT if they are not a block for a vocabulary of this size.
   static Result<PlaceBlock> parse(ByteSpan bytes, std::uint32_t vocabulary_size);
-  // Of bytes that encode_place_block() made or parse() has accepted.
+  // Does not check the bytes: encode_place_block() must have made them, or parse() accepted them.
   static PlaceBlock trusted(ByteSpan bytes);
 
   std::uint32_t places() const { return places_; }
   std::vector<FrameRun> frames() const;
   LogLikelihood constant(std::uint32_t slot) const { return load<LogLikelihood>(constants_ + 8 * std::size_t{slot}); }
 
-  // The slots of a word, as they are written.
+  // The slots of a word, as they are stored.
   struct List {
     const std::uint8_t* bytes;
     std::uint32_t size;
@@ -85,7 +85,7 @@ class PlaceBlock {
   const std::uint8_t *frames_ = nullptr, *constants_ = nullptr, *offsets_ = nullptr, *lists_ = nullptr;
 };
 
-// `visit(slot)` for each, ascending.
+// Calls `visit(slot)` for each slot of the list, ascending.
 template <typename Visit>
 void for_each_slot(const PlaceBlock::List& list, Visit visit) {
   if (!list.bitmap) {
@@ -102,8 +102,8 @@ struct PlaceWords {
   std::vector<std::uint32_t> words;  // ascending, each once
 };
 
-// The places of `older`, if there is one, and `newer`: at most kPlacesPerBlock, all of different frames. The same bytes
-// however they are divided between the two.
+// Encodes the places of `older`, which may be null, and `newer` as one block. They must be 1 to kPlacesPerBlock places
+// of different frames. The bytes do not depend on how the places are divided between the two.
 Bytes encode_place_block(const FabMapModel& model, const PlaceBlock* older, std::span<const PlaceWords> newer);
 
 }  // namespace relmap::place

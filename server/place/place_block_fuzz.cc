@@ -1,4 +1,4 @@
-// Any bytes as a block of places: what is accepted can be evaluated.
+// Parses any bytes as a block of places; a block that is accepted must be usable.
 #include "server/place/block_scores.h"
 #include "server/place/testing/random_vocabulary.h"
 
@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!block.ok()) return 0;
   std::vector<relmap::place::LogLikelihood> values(block->places());
   model.scores.of_block(*block, values.data());
-  // As the older part of a block that grows.
+  // The block must also serve as the older part of a block that grows.
   if (block->places() == relmap::place::kPlacesPerBlock) return 0;
   std::uint64_t last = 0;
   for (const relmap::place::FrameRun& run : block->frames()) last = run.first.packed() + run.count - 1;

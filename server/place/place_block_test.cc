@@ -11,7 +11,7 @@ namespace {
 
 class PlaceBlockTest : public ::testing::Test {
  protected:
-  // Of two sessions by turns; word 599 at one place in 700.
+  // Frames of two sessions alternate; word 599 is at one place in 700.
   std::vector<PlaceWords> places(std::uint32_t count) {
     std::vector<PlaceWords> result;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -56,7 +56,7 @@ TEST_F(PlaceBlockTest, HoldsWhatWasPutIn) {
   EXPECT_EQ(block.frames().size(), 4u) << "of two sessions, each with one gap";
 }
 
-TEST_F(PlaceBlockTest, IsTheSameBytesHoweverItGrew) {
+TEST_F(PlaceBlockTest, HasTheSameBytesHoweverItGrew) {
   auto all = places(2000);
   const Bytes at_once = encode(all);
   std::shuffle(all.begin(), all.end(), random_);
@@ -86,7 +86,7 @@ TEST_F(PlaceBlockTest, DamagedBytesAreRefusedOrHarmless) {
     EXPECT_EQ(PlaceBlock::parse(ByteSpan(good).first(size), 600).reason(), Reason::CORRUPT) << size << " bytes";
 }
 
-TEST_F(PlaceBlockTest, OfAnotherVocabularyIsRefused) {
+TEST_F(PlaceBlockTest, ABlockOfAnotherVocabularyIsRefused) {
   const Bytes bytes = encode(places(10));
   EXPECT_EQ(PlaceBlock::parse(bytes, 601).reason(), Reason::CORRUPT);
 }

@@ -9,17 +9,18 @@ namespace relmap::place {
 namespace {
 
 constexpr char kMagic[] = "RELMAPPL";
-constexpr std::uint32_t kFrameBytes = 8;       // before a block
-constexpr std::uint32_t kMaxBytes = 1u << 30;  // of a block, by far
+constexpr std::uint32_t kFrameBytes = 8;       // length and checksum before a block
+constexpr std::uint32_t kMaxBytes = 1u << 30;  // far more than any block has
 
 Status check_header(const Bytes& header, std::uint32_t vocabulary_crc, const std::string& path) {
   ByteReader r(header);
   const ByteSpan magic = r.get_bytes(8);
   const auto version = r.get<std::uint32_t>();
   const auto crc = r.get<std::uint32_t>();
-  if (std::memcmp(magic.data(), kMagic, 8) != 0) return {Reason::CORRUPT, path + " is no place index"};
+  if (std::memcmp(magic.data(), kMagic, 8) != 0) return {Reason::CORRUPT, path + " is not a place index"};
   if (version != PlaceFile::kVersion)
-    return {Reason::UNKNOWN_FORMAT_VERSION, path + " is of version " + std::to_string(version)};
+    return {Reason::UNKNOWN_FORMAT_VERSION,
+            path + " has version " + std::to_string(version) + ", known: " + std::to_string(PlaceFile::kVersion)};
   if (crc != vocabulary_crc)
     return {Reason::WRONG_VOCABULARY, path + " was made with another vocabulary (crc " + std::to_string(crc) +
                                           ", given " + std::to_string(vocabulary_crc) + ")"};
@@ -70,7 +71,7 @@ Status PlaceFile::read(const Extent& extent, Bytes& bytes) const {
   if (Status read = file_->read(extent.offset, bytes.data(), bytes.size()); !read.ok()) return read;
   if (crc32c(bytes) != extent.crc)
     return {Reason::DATA_LOSS, "the block of places at byte " + std::to_string(extent.offset) + " of " + path() +
-                                   " is damaged; a start makes it again from the map"};
+                                   " is damaged; the next start makes it again from the map"};
   return {};
 }
 

@@ -20,17 +20,17 @@ namespace {
 
 constexpr std::size_t kMaxSeeds = 64;
 
-// All places but those within so many edges of the best ones stand for the unknown world. Of those there are two, since
-// a place may have been passed twice and nothing joins the passes yet.
+// All places stand for the unknown world except those within kNear edges of the kPasses best ones. There are two best
+// ones, since a place may have been passed twice without an edge between the passes yet.
 constexpr std::uint32_t kNear = 2 * kPlaceRadius;
 constexpr int kPasses = 2;
 
 struct Group {
   std::uint32_t best;
-  std::vector<std::uint32_t> members;  // best among them
+  std::vector<std::uint32_t> members;  // including `best`
 };
 
-// The places shipped with the vocabulary.
+// The sample places of the vocabulary, as blocks.
 std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel& model) {
   std::vector<Bytes> blocks;
   std::vector<PlaceWords> places;
@@ -62,7 +62,7 @@ class PlaceMasses {
   const std::unordered_set<std::uint32_t> expected_;
 };
 
-// Places of the frames up to `radius` steps from `centre`. Those added since the query began have no likelihood.
+// Places of the frames up to `radius` steps from `centre`, without those that were added since the query began.
 std::vector<std::uint32_t> places_around(const PlaceScores& scores, const storage::Graph& graph, FrameId centre,
                                          std::uint32_t radius) {
   std::vector<std::uint32_t> places;
@@ -71,7 +71,7 @@ std::vector<std::uint32_t> places_around(const PlaceScores& scores, const storag
   return places;
 }
 
-// Greedy, best frame first; a frame belongs to the first place that reaches it.
+// Groups frames to places greedily, best frame first: a frame belongs to the first place that reaches it.
 std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, const PlaceMasses& masses,
                          std::span<const std::uint32_t> expected, const storage::Graph& graph) {
   struct Seed {
@@ -113,7 +113,7 @@ std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, 
   return groups;
 }
 
-// The best place that is not among `taken`, of equals that of the first frame; kNone.
+// The best place that is not among `taken`; of equally good ones, that of the lowest frame. kNone if there is none.
 std::uint32_t best_place(const PlaceScores& scores, const std::unordered_set<std::uint32_t>& taken) {
   std::uint32_t best = FrameTable::kNone;
   for (std::size_t block = 0; block < scores.highest.size(); ++block) {
@@ -130,7 +130,8 @@ std::uint32_t best_place(const PlaceScores& scores, const std::unordered_set<std
   return best;
 }
 
-// What the query may well show: a sample of the unknown world that shows it too would speak for a new place.
+// The places that the query may well show. They must not stand for the unknown world: if they did, they would raise the
+// likelihood of a new place.
 std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const storage::Graph& graph) {
   std::unordered_set<std::uint32_t> near;
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -197,7 +198,7 @@ std::vector<LogLikelihood> PlaceIndex::Impl::at_samples() {
   return values;
 }
 
-// Of the query that has been asked.
+// Answers the query that was given to query.ask() by its words alone.
 PlaceAnswer PlaceIndex::Impl::by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph) {
   const Posterior posterior(scores, at_samples(), places_near_the_best(scores, graph), expected);
   const PlaceMasses masses(scores, posterior, expected);

@@ -1,4 +1,5 @@
-// Which places of the map could a picture show? FAB-MAP over inverted lists (docs/method.md, 7), and then descriptors.
+// Finds the places of the map that a picture may show: by FAB-MAP over inverted lists (docs/method.md, 7), and then by
+// descriptors.
 #pragma once
 
 #include <cstdint>
@@ -20,66 +21,72 @@ inline constexpr std::uint32_t kExpectedRadius = 12;
 
 struct PlaceCandidate {
   FrameId frame;           // the best frame of the place
-  double probability = 0;  // mass of the place: summed over its graph neighbours (5 edges)
+  double probability = 0;  // of the place: the sum over the frames within 5 edges (kPlaceRadius)
 };
 
 inline constexpr std::size_t kMaxCandidates = 20;
 inline constexpr double kMinProbability = 1e-3;
-// A place whose best frame holds less than this cannot reach kMinProbability with its neighbours.
+// Frames below this probability are not tried as the best frame of a place: with its neighbours such a place would not
+// reach kMinProbability.
 inline constexpr double kMinSeed = kMinProbability / 100;
 
 struct PlaceAnswer {
-  std::vector<PlaceCandidate> candidates;  // descending; at least kMinProbability each, at most kMaxCandidates
+  std::vector<PlaceCandidate> candidates;  // at most kMaxCandidates, descending, each at least kMinProbability
   double new_place = 1;                    // probability that the map does not hold the place
 };
 
 struct PlaceIndexOptions {
-  // Bytes of memory. Blocks of places beyond it stand in the folder only, and are read by each query; some 9 bytes a
-  // place stay.
+  // Bytes of memory. Blocks of places for which it has no room are kept in the folder only, and are read by each query;
+  // about 9 bytes a place stay in memory.
   std::size_t allowance = std::numeric_limits<std::size_t>::max();
-  // The data folder, where DIR/places keeps the index from one start to the next. Empty: it stands in memory only.
+  // The data folder, where DIR/places keeps the index from one start to the next. Empty: the index is in memory only.
   std::string folder;
 };
 
-// The best kMaxCandidates, of equals that of the first frame.
+// Sorts by descending probability (equal ones by frame) and keeps the first kMaxCandidates.
 void most_probable_first(std::vector<PlaceCandidate>& candidates);
 
-// Thread-safe: one writer, any number of readers. Queries are answered one at a time, beside the writer: each holds
-// memory in proportion to the number of places.
+// Thread-safe for one writer and any number of readers. Queries are answered one at a time, while the writer goes on,
+// since a query needs memory in proportion to the number of places.
 class PlaceIndex {
  public:
   explicit PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options = {});
   ~PlaceIndex();
 
-  // Before the first add(): the places that the folder keeps and `map` holds, or held in sessions being deleted. Not
-  // ok: why some could not be used and are to be added again (IO_ERROR, DATA_LOSS, TRUNCATED, CORRUPT,
-  // WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, NO_SUCH_FRAME: the map has lost some).
+  // Loads the places in the folder that `map` holds, or that belong to sessions being deleted. Call it before the first
+  // add(). If the status is not ok, it says why some places could not be used, and the caller must add them again:
+  // IO_ERROR, DATA_LOSS, TRUNCATED, CORRUPT, WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, NO_SUCH_FRAME (the map has lost
+  // some of the frames).
   Status restore(const storage::Graph& map);
-  // All places into the folder. IO_ERROR, DISK_FULL: those that are missing there are to be added at the next start.
+  // Writes all places to the folder. IO_ERROR, DISK_FULL: the places that are missing there must be added again after
+  // the next start.
   Status save();
 
-  // Places are added in any order; one that is there already stays as it is. `words` need not be sorted or unique;
-  // without any it is no place, since nothing could be recognised there.
-  // IO_ERROR, DISK_FULL (the disk takes nothing), BUDGET_EXCEEDED: the place is left out, and counted by left_out().
+  // Adds a place; places may come in any order. Does nothing if the index has the frame already, or if there are no
+  // words, since nothing could be recognised there. `words` need not be sorted or unique. IO_ERROR, DISK_FULL and
+  // BUDGET_EXCEEDED: the place is left out and counted by left_out().
   Status add(FrameId frame, std::span<const std::uint32_t> words);
-  bool contains(FrameId frame) const;  // for the writer
+  bool contains(FrameId frame) const;  // may be called by the writer only
 
-  // No place of this session is recognised any more. What the index holds of it stays until it is made anew.
+  // Excludes all places of a session from answers. They stay in the index until it is made anew.
   void leave_out(SessionNumber session);
 
-  // `masked`: left out as candidates and from the sum (the query's own recent past). `near`: where the query is thought
-  // to be; places up to kExpectedRadius edges around it share half of the prior. `graph` gives neighbours. `features`:
-  // of the words, one each. The places that words make likeliest are compared with them feature by feature, which needs
-  // what the graph knows of these places (shortlist.h, compare_places.h); without features, and among a few places,
-  // words alone tell. The same places and the same query give the same answer bit for bit, in whatever order they came
-  // and wherever they stand. Throws StatusError where reads of the graph do, or of what is on disk.
+  // Returns the places that a picture with these words may show. Frames within `masked` (the query's own recent past)
+  // are no candidates and do not count in the normalisation. `near` is a frame near which the query is thought to be:
+  // places up to kExpectedRadius edges around it share half of the prior. `graph` gives the neighbours of places.
+  // `features` are empty, or the features of the words, one each: the places that are likeliest by words are then
+  // compared feature by feature (shortlist.h, compare_places.h). Without features, and among few places, words alone
+  // decide.
+  //
+  // The answer depends only on the places and the query, bit for bit, not on the order in which places were added or on
+  // where they are stored. Throws StatusError where reads of the graph or the disk do.
   PlaceAnswer query(std::span<const std::uint32_t> words, const storage::Graph& graph,
                     std::span<const storage::FrameRange> masked = {}, std::optional<FrameId> near = {},
                     std::span<const AppearanceFeature> features = {}) const;
 
-  std::size_t size() const;
-  std::size_t left_out() const;
-  std::size_t memory_bytes() const;  // with a query under way
+  std::size_t size() const;          // places
+  std::size_t left_out() const;      // places for which there was no room
+  std::size_t memory_bytes() const;  // including that of a running query
 
  private:
   struct Impl;

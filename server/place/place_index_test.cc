@@ -20,7 +20,7 @@ namespace {
 constexpr StereoCamera kStereo{400, 256, 192, 0.12, 512, 384};
 constexpr StereoCamera kMono{400, 256, 192, 0, 512, 384};
 
-// Words that do not depend on each other, so that pictures are easily drawn.
+// Words that do not depend on each other, so that pictures are easy to draw.
 VocabularyModel independent_words(std::uint32_t words) {
   VocabularyModel model = random_vocabulary_model(words, 200, 1);
   model.given_parent_absent = model.given_parent_present = model.marginal;
@@ -45,7 +45,7 @@ class Chain {
     }
   }
   std::vector<std::uint32_t> draw() { return changed({}, 1); }
-  // What a camera sees that comes back to frame i: half of the same, half something else.
+  // The words that a camera sees when it returns to frame i: half the same, half others.
   std::vector<std::uint32_t> seen_again(std::uint32_t i) { return changed(words_of[i], 0.5); }
 
   std::shared_ptr<const Vocabulary> vocabulary;
@@ -55,7 +55,7 @@ class Chain {
 
  private:
   double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
-  // Every word of the vocabulary is drawn anew with probability `share`.
+  // Draws every word of the vocabulary anew with probability `share`.
   std::vector<std::uint32_t> changed(const std::vector<std::uint32_t>& words, double share) {
     std::vector<std::uint32_t> result;
     for (std::uint32_t w = 0; w < vocabulary->size(); ++w) {
@@ -129,7 +129,7 @@ TEST(PlaceIndex, ProbabilitiesSumToAtMostOneAndDescend) {
 
 TEST(PlaceIndex, WhereTheQueryIsThoughtToBeIsLikelier) {
   Chain chain(200);
-  // Frame 150 once more, far away: two places that look the same.
+  // Frame 150 again but far away, so that two places look the same.
   for (std::uint32_t i = 300; i < 340; ++i) {
     chain.graph.add_frame({1, i});
     if (i > 300) chain.graph.add_edge({1, i - 1}, {1, i}, 0);
@@ -155,13 +155,13 @@ TEST(PlaceIndex, WhereTheQueryIsThoughtToBeIsLikelier) {
     EXPECT_NEAR(sum, 1, 0.03) << "of the rest each has less than 1e-3";
     EXPECT_LE(sum, 1 + 1e-12);
   }
-  // A likeness is needed all the same.
+  // The expectation alone is not enough: the place must look similar, too.
   EXPECT_GT(probability(ask(FrameId{1, 20}), 150) + probability(ask(FrameId{1, 20}), 320), 0.9);
   EXPECT_TRUE(same(ask(FrameId{7, 0}), anywhere)) << "near a frame that is no place";
 }
 
 TEST(PlaceIndex, MassIsSummedOverGraphNeighbours) {
-  // The same words at every frame: each is as likely as the next, and only together are they one place.
+  // All frames have the same words, so each is as likely as the next, and only together do they stand for a place.
   const auto vocabulary = random_vocabulary(500, 50, 1);
   PlaceIndex index(vocabulary);
   HandMadeGraph graph;
@@ -200,7 +200,7 @@ TEST(PlaceIndex, MaskedFramesAreLeftOutOfTheSum) {
       << "no frame of these is a place";
 }
 
-TEST(PlaceIndex, AFrameIsAPlaceOnce) {
+TEST(PlaceIndex, AFrameIsAddedOnce) {
   Chain chain(10);
   (void)chain.index.add({1, 3}, chain.words_of[3]);
   EXPECT_EQ(chain.index.size(), 10u);
@@ -217,7 +217,7 @@ TEST(PlaceIndex, AnswersDoNotDependOnTheOrderOfAdding) {
 }
 
 TEST(PlaceIndex, TheMapsOwnPlacesStandForTheUnknownWorld) {
-  // Words that no shipped place holds but that this map shows everywhere: only its own places know them as common.
+  // These words are at no shipped place but everywhere in this map, so only its own places show that they are common.
   VocabularyModel model = independent_words(100);
   for (auto& place : model.sample_places) std::erase_if(place, [](std::uint32_t w) { return w < 30; });
   const auto vocabulary = Vocabulary::from_bytes(encode_vocabulary(model)).or_throw();
@@ -243,7 +243,7 @@ TEST(PlaceIndex, TheMapsOwnPlacesStandForTheUnknownWorld) {
   }
 }
 
-TEST(PlaceIndex, APlacePassedTwiceIsNoNewOneThoughNothingJoinsThePasses) {
+TEST(PlaceIndex, APlacePassedTwiceIsNotNewEvenIfNoEdgeJoinsThePasses) {
   Chain chain(200);
   for (std::uint32_t i = 0; i < 200; ++i) {
     chain.graph.add_frame({1, 1000 + i});
@@ -256,7 +256,7 @@ TEST(PlaceIndex, APlacePassedTwiceIsNoNewOneThoughNothingJoinsThePasses) {
   EXPECT_NEAR(answer.candidates[0].probability, answer.candidates[1].probability, 1e-9);
 }
 
-TEST(PlaceIndex, WhereNothingWasSeenIsNoPlace) {
+TEST(PlaceIndex, AFrameWithoutWordsIsNotAdded) {
   Chain chain(50);
   chain.graph.add_frame({1, 50});
   ASSERT_TRUE(chain.index.add({1, 50}, {}).ok());
@@ -288,10 +288,10 @@ TEST(PlaceIndex, ReadersAndTheWriterMayWorkAtOnce) {
   EXPECT_EQ(index.size(), 300u);
 }
 
-// Of an index that lives through several starts in one folder.
+// An index that is opened several times in one folder.
 class KeptPlaceIndex : public ::testing::Test {
  protected:
-  static constexpr std::uint32_t kPlaces = 10000;  // two full blocks, and one that is not
+  static constexpr std::uint32_t kPlaces = 10000;  // two full blocks, and one that is not full
 
   std::unique_ptr<PlaceIndex> start(Status* restored, const storage::Graph& map,
                                     std::size_t allowance = std::numeric_limits<std::size_t>::max()) {
@@ -334,7 +334,7 @@ class KeptPlaceIndex : public ::testing::Test {
   Chain chain_{kPlaces};
 };
 
-TEST_F(KeptPlaceIndex, StandsAsItWasSaved) {
+TEST_F(KeptPlaceIndex, IsRestoredAsItWasSaved) {
   keep();
   Status restored;
   const auto index = start(&restored);
@@ -356,7 +356,7 @@ TEST_F(KeptPlaceIndex, GoesOnGrowing) {
   expect_same_answers(*start(&restored));
 }
 
-TEST_F(KeptPlaceIndex, FullBlocksOutliveACrash) {
+TEST_F(KeptPlaceIndex, FullBlocksSurviveACrash) {
   {
     Status restored;
     add_missing(*start(&restored));  // not saved
@@ -369,14 +369,14 @@ TEST_F(KeptPlaceIndex, FullBlocksOutliveACrash) {
   expect_same_answers(*index);
 }
 
-TEST_F(KeptPlaceIndex, DamageIsNamedAndMadeGoodFromTheMap) {
+TEST_F(KeptPlaceIndex, DamageIsReportedAndRepairedFromTheMap) {
   keep();
   const auto size = std::filesystem::file_size(path());
   struct Damage {
     std::uint64_t at;
     Reason reason;
   };
-  // The partial block, the first one, its length, the vocabulary's CRC, the version, and the magic.
+  // Damages the partial block, the first block, its length, the vocabulary's CRC, the version and the magic.
   for (const Damage& damage :
        {Damage{size - 100, Reason::DATA_LOSS}, Damage{5000, Reason::DATA_LOSS}, Damage{18, Reason::TRUNCATED},
         Damage{12, Reason::WRONG_VOCABULARY}, Damage{8, Reason::UNKNOWN_FORMAT_VERSION}, Damage{0, Reason::CORRUPT}}) {
@@ -394,7 +394,7 @@ TEST_F(KeptPlaceIndex, DamageIsNamedAndMadeGoodFromTheMap) {
   EXPECT_TRUE(restored.ok());
 }
 
-TEST_F(KeptPlaceIndex, ACutFileIsMadeGood) {
+TEST_F(KeptPlaceIndex, ATruncatedFileIsRepaired) {
   keep();
   for (const double part : {0.999, 0.5, 1e-4, 0.0}) {
     const auto size = static_cast<double>(std::filesystem::file_size(path()));
@@ -407,7 +407,7 @@ TEST_F(KeptPlaceIndex, ACutFileIsMadeGood) {
   }
 }
 
-TEST_F(KeptPlaceIndex, FramesThatTheMapHasLostAreNoPlaces) {
+TEST_F(KeptPlaceIndex, FramesThatTheMapHasLostAreNotRestored) {
   keep();
   HandMadeGraph shorter;
   shorter.add_session(1, kStereo);
@@ -420,7 +420,7 @@ TEST_F(KeptPlaceIndex, FramesThatTheMapHasLostAreNoPlaces) {
   expect_same_answers(*index);
 }
 
-TEST_F(KeptPlaceIndex, ASessionThatIsLeftOutIsRecognisedNoMore) {
+TEST_F(KeptPlaceIndex, ASessionThatIsLeftOutIsNoLongerRecognised) {
   keep();
   HandMadeGraph going;
   going.add_session(1, kStereo);
@@ -440,7 +440,7 @@ TEST_F(KeptPlaceIndex, ASessionThatIsLeftOutIsRecognisedNoMore) {
   EXPECT_EQ(answer.candidates[0].frame, (FrameId{2, 0}));
 }
 
-TEST_F(KeptPlaceIndex, OfAnotherVocabularyIsNotUsed) {
+TEST_F(KeptPlaceIndex, IsNotRestoredWithAnotherVocabulary) {
   keep();
   VocabularyModel other = independent_words(500);
   other.source = "another";
@@ -449,10 +449,10 @@ TEST_F(KeptPlaceIndex, OfAnotherVocabularyIsNotUsed) {
   EXPECT_EQ(index.size(), 0u);
 }
 
-TEST_F(KeptPlaceIndex, AnswersTheSameBitForBitWhereItsBlocksStandOnDisk) {
+TEST_F(KeptPlaceIndex, AnswersAreIdenticalWhereBlocksAreOnDisk) {
   const std::size_t empty = PlaceIndex(chain_.vocabulary).memory_bytes();
   const std::size_t whole = chain_.index.memory_bytes() - empty;
-  // A block in the making and one being read always have room.
+  // There is always room for a block being made and a block being read.
   const std::size_t allowance = empty + whole * 7 / 8;
   Status restored;
   const auto index = start(&restored, chain_.graph, allowance);
@@ -468,7 +468,7 @@ TEST_F(KeptPlaceIndex, AnswersTheSameBitForBitWhereItsBlocksStandOnDisk) {
   expect_same_answers(*again);
 }
 
-TEST_F(KeptPlaceIndex, ABlockThatIsDamagedWhileItIsNeededIsAnErrorAndNoWrongAnswer) {
+TEST_F(KeptPlaceIndex, ABlockThatIsDamagedWhileInUseIsAnErrorAndNotAWrongAnswer) {
   const std::size_t empty = PlaceIndex(chain_.vocabulary).memory_bytes();
   Status restored;
   const auto index = start(&restored, chain_.graph, empty + (chain_.index.memory_bytes() - empty) * 7 / 8);
@@ -482,7 +482,7 @@ TEST_F(KeptPlaceIndex, ABlockThatIsDamagedWhileItIsNeededIsAnErrorAndNoWrongAnsw
   }
 }
 
-TEST_F(KeptPlaceIndex, WhereTheDiskTakesNothingItSaysSoAndDoesNotGrow) {
+TEST_F(KeptPlaceIndex, ReportsAFailingDiskAndDoesNotGrow) {
   const std::size_t empty = PlaceIndex(chain_.vocabulary).memory_bytes();
   const std::size_t allowance = empty + (chain_.index.memory_bytes() - empty) * 7 / 8;
   PlaceIndex index(chain_.vocabulary, {allowance, folder_ / "not there"});
@@ -502,7 +502,7 @@ TEST_F(KeptPlaceIndex, WhereTheDiskTakesNothingItSaysSoAndDoesNotGrow) {
 
   std::filesystem::create_directory(folder_ / "not there");
   for (std::uint32_t i = 0; i < kPlaces; ++i) (void)index.add({1, i}, chain_.words_of[i]);
-  EXPECT_GT(index.size(), kPlaces - 300) << "and goes on when there is room again";
+  EXPECT_GT(index.size(), kPlaces - 300) << "it goes on once the disk can be written";
 }
 
 TEST(PlaceIndex, CountsItsMemory) {

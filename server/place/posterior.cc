@@ -15,7 +15,7 @@ double relative(LogLikelihood value, LogLikelihood highest) {
   return value <= highest - kNothing ? 0 : std::exp(in_nats(value - highest));
 }
 
-// Of likelihoods relative to the highest.
+// An exact sum of likelihoods relative to the highest.
 class LikelihoodSum {
  public:
   explicit LikelihoodSum(LogLikelihood highest) : highest_(highest) {}
@@ -24,7 +24,7 @@ class LikelihoodSum {
     low_ += term;
     high_ += low_ < term;
   }
-  // What has been added.
+  // `value` must have been added before.
   void subtract(LogLikelihood value) {
     const std::uint64_t term = term_of(value);
     high_ -= low_ < term;
@@ -72,7 +72,7 @@ Posterior::Posterior(const PlaceScores& scores, std::span<const LogLikelihood> s
   prior_expected_ = priors.expected;
   const double prior_new = priors.new_place;
   mean_ = prior_new * unknown + prior_ * places.value() + prior_expected_ * at_expected.value();
-  // With that mean the smoothed likelihoods, weighted by the prior, sum to the mean again.
+  // With this mean, the smoothed likelihoods, weighted by the prior, sum to the mean again.
   floor_ = (1 - kSmoothing) * mean_;
   new_place_ = prior_new * (kSmoothing * unknown + floor_) / mean_;
 }

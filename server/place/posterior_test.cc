@@ -12,7 +12,7 @@ namespace {
 
 LogLikelihood nats(double value) { return static_cast<LogLikelihood>(value * kNat); }
 
-// Of a query at so many places, a few of them masked, one of them perhaps the right one.
+// The scores of a query at so many places, of which a few are masked and one may be the right one.
 PlaceScores random_scores(std::mt19937& random, std::size_t places) {
   std::normal_distribution<double> likelihood(-400, 6);
   std::bernoulli_distribution masked(0.05), revisit(0.5);
@@ -29,7 +29,7 @@ PlaceScores random_scores(std::mt19937& random, std::size_t places) {
   return scores;
 }
 
-// All places of the map and a new one, whatever the likelihoods, and however few places there are.
+// The masses of all places of the map and a new one sum to one for any likelihoods and any number of places.
 TEST(Posterior, SumsToOne) {
   std::mt19937 random(1);
   for (const std::size_t places : {1, 2, 9, 49, 50, 51, 1000, 4096, 4097, 20000})
@@ -57,13 +57,13 @@ TEST(Posterior, SumsToOne) {
     }
 }
 
-TEST(Posterior, OfAMapWithoutPlacesIsANewPlace) {
+TEST(Posterior, IsANewPlaceForAMapWithoutPlaces) {
   const Posterior posterior(PlaceScores{}, std::vector<LogLikelihood>{nats(-400)}, {}, {});
   EXPECT_EQ(posterior.new_place(), 1);
   EXPECT_EQ(posterior.mass(nats(-300)), 0);
 }
 
-// What a search by mass passes over has no more than that mass.
+// A place that a search by mass skips has less than that mass.
 TEST(Posterior, NoPlaceBelowTheLowestHasTheMass) {
   std::mt19937 random(2);
   for (int query = 0; query < 200; ++query) {

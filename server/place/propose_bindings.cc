@@ -57,14 +57,14 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
   for (const MapPoint& point : map.points) {
     if (!point.landmark.valid() || recent(point.landmark.base) || seen.landmarks.contains(point.landmark)) continue;
     const auto [entry, fresh] = targets.try_emplace(point.landmark);
-    // Frames come nearest first, so the first view of a landmark places it best.
+    // Frames come nearest first, so the first view of a landmark predicts its position best.
     if (fresh)
       if (const auto expected = expect(point.point, point.covariance, query.camera, T_frame_match, covariance))
         entry->second = Target{{}, *expected};
     if (entry->second) entry->second->views.push_back(point.descriptor);
   }
 
-  // A track that means an old landmark already is bound.
+  // A track that continues an old landmark is bound already.
   const auto free = [&](const AppearanceFeature& feature) {
     return feature.track < 0 || static_cast<std::size_t>(feature.track) >= seen.of_track.size() ||
            recent(seen.of_track[static_cast<std::size_t>(feature.track)].base);
@@ -77,7 +77,7 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
   std::vector<Best> of_feature(query.features.size());
   for (const auto& [landmark, target] : targets) {
     if (!target) continue;
-    std::size_t nearest = 0;
+    std::size_t best = 0;
     std::uint32_t first = std::numeric_limits<std::uint32_t>::max(), second = first;
     for (std::size_t f = 0; f < query.features.size(); ++f) {
       if (!free(query.features[f]) || !inside_gate(query.features[f], query.camera, *target)) continue;
@@ -85,13 +85,13 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
       if (d < first) {
         second = first;
         first = d;
-        nearest = f;
+        best = f;
       } else {
         second = std::min(second, d);
       }
     }
     if (first > kMaxDescriptorDistance || first > kDescriptorRatio * kDescriptorRatio * second) continue;
-    if (first < of_feature[nearest].distance) of_feature[nearest] = {landmark, first};
+    if (first < of_feature[best].distance) of_feature[best] = {landmark, first};
   }
 
   std::vector<storage::ProposedBinding> bindings;

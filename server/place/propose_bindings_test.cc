@@ -10,7 +10,7 @@ namespace relmap::place {
 namespace {
 
 constexpr FrameId kMatch{1, 6};
-constexpr FrameId kFrame{2, 0};  // another session comes by
+constexpr FrameId kFrame{2, 0};  // another session that passes the street
 
 class ProposeBindings : public testing::Test {
  protected:
@@ -62,7 +62,7 @@ TEST_F(ProposeBindings, AWrongPoseBindsNothing) {
   EXPECT_LT(propose(wrong, 0.003).size(), 3u);
 }
 
-TEST_F(ProposeBindings, ATrackThatMeansAnOldLandmarkIsNotBoundAgain) {
+TEST_F(ProposeBindings, ATrackThatContinuesAnOldLandmarkIsNotBoundAgain) {
   const auto before = propose(view_, 0.01);
   ASSERT_FALSE(before.empty());
   const storage::ProposedBinding& known = before.front();
@@ -75,7 +75,7 @@ TEST_F(ProposeBindings, ATrackThatMeansAnOldLandmarkIsNotBoundAgain) {
 }
 
 TEST_F(ProposeBindings, ATrackIsNamed) {
-  // A track whose landmark is the frame's own: exactly what is to be merged.
+  // A track whose landmark is based in the frame itself, which is what binding is to merge.
   storage::FrameHot hot;
   storage::Landmark own;
   own.track = {0, 0};

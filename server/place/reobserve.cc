@@ -21,35 +21,36 @@
 namespace relmap::place {
 namespace {
 
-constexpr int kMinSearch = 2, kMaxSearch = 8;  // pixels of the level, each way
+constexpr int kMinSearch = 2, kMaxSearch = 8;  // search radius, in pixels of the pyramid level
 constexpr float kMinCorrelation = 0.8F;
-constexpr double kAgreementSigma = 0.5;   // pixels of the level; what is aligned agrees to three of them
-constexpr double kBeside = 0.03;          // of the picture's width: so far round a landmark all is known
-constexpr double kSameSurfacePixels = 2;  // so near one another the right eye sees two points by the same disparity
-constexpr double kSameDepth = 0.15;       // share of the disparity by which points of one surface differ
-constexpr double kMaxNearer = 1.5;        // than a landmark was seen from: beyond, it may look different
+constexpr double kAgreementSigma = 0.5;   // pixels of the level; alignments agree within three of these
+constexpr double kBeside = 0.03;          // of the picture's width: tracks this near a landmark may be superfluous
+constexpr double kSameSurfacePixels = 2;  // points this close together have the same disparity
+constexpr double kSameDepth = 0.15;       // share of the disparity by which points of one surface may differ
+constexpr double kMaxNearer = 1.5;        // ratio of viewing distances beyond which a landmark may look different
 
-// A landmark, and where it stands out in the picture of a frame.
+// A landmark as it appears in the picture of an older frame.
 struct View {
   LandmarkId landmark;
   Vector3 point;       // in the match's frame
-  Matrix3 covariance;  // there
+  Matrix3 covariance;  // in the match's frame
   std::shared_ptr<const FramePicture> picture;
   SE3 T_match_frame;
   StereoPixel pixel;
   int level = 0;
 };
 
-// A landmark measured in the picture of the frame that is looked at.
+// A landmark that was measured in the picture of the new frame.
 struct Aligned {
   const View* view;
   LandmarkId landmark;
   Vector2 pixel;
-  double disparity;  // expected
+  double disparity;  // the predicted one
   int level = 0;
 };
 
-// Poses of the frames in which landmarks seen round `match` may be based: beside it along the motion, and up the graph.
+// The poses of frames in which landmarks seen around `match` may be based: frames along its session's motion, and those
+// that are reached by walking up the graph.
 std::unordered_map<FrameId, SE3> poses_round(const storage::Graph& graph, FrameId match) {
   std::unordered_map<FrameId, SE3> T_match_frame;
   for (const PlacedFrame& placed : along_odometry(graph, match, kBindingReach + kBaseReach, kBindingReach))
@@ -64,16 +65,16 @@ std::unordered_map<FrameId, SE3> poses_round(const storage::Graph& graph, FrameI
   return T_match_frame;
 }
 
-// The landmark that is what the picture shows at the observation; invalid where it is only near by: what was given to
-// another landmark lies beside it, and so does a keypoint.
+// The landmark that the picture shows at exactly the observation's pixel. Invalid if the pixel may lie beside the
+// landmark: if the landmark was claimed to be another one, or if the observation is a keypoint's.
 LandmarkId shown_by(const storage::Graph& graph, const storage::Observation& z) {
   if (!z.is_tracked() && (!z.aligned || !storage::closure_holds(graph, z.origin))) return {};
   const LandmarkId landmark = storage::resolve(graph, z.landmark);
   return landmark == z.landmark ? landmark : LandmarkId();
 }
 
-// Of each landmark that stands out round the match the view from nearest by, by its own track if there is one: an
-// alignment may be a little off, and what is aligned with it more.
+// For each landmark seen around the match, the view from the frame nearest to the standpoint. Views by tracks are
+// preferred to views by alignment, since errors of alignments would add up.
 std::vector<View> views_round(const storage::Graph& graph, const Standpoint& standpoint, const StereoCamera& camera,
                               const std::function<std::shared_ptr<const FramePicture>(FrameId)>& picture_of,
                               const std::function<bool(LandmarkId)>& wanted) {
@@ -111,7 +112,7 @@ std::vector<View> views_round(const storage::Graph& graph, const Standpoint& sta
   return views;
 }
 
-// From the frame's picture to an older one, for a patch that faces the camera where `p` is.
+// The warp from the new frame's picture to an older one, for a patch at `p` that is parallel to the image plane.
 std::optional<vision::Warp> warp_to(const SE3& T_view_frame, const StereoCamera& view, const Vector3& p,
                                     const StereoCamera& camera) {
   constexpr double kStep = 4;  // pixels
@@ -127,38 +128,39 @@ std::optional<vision::Warp> warp_to(const SE3& T_view_frame, const StereoCamera&
                       static_cast<float>(y.y())};
 }
 
-// Where the picture is most like the patch, to a pixel; nothing if it fits nowhere.
+// The pixel around which the picture is most similar to the patch; nullopt if the patch fits nowhere into the picture.
 std::optional<std::pair<int, int>> most_like(const vision::Template& patch, vision::ImageView image, float x, float y,
                                              int reach) {
   const vision::SadPatch sad = patch.sad();
   const int x0 = static_cast<int>(std::lround(x)), y0 = static_cast<int>(std::lround(y));
-  int least = std::numeric_limits<int>::max();
+  int min_difference = std::numeric_limits<int>::max();
   std::optional<std::pair<int, int>> best;
   for (int v = y0 - reach; v <= y0 + reach; ++v)
     for (int u = x0 - reach; u <= x0 + reach; ++u) {
       if (!vision::patch_fits(image, u, v, 1)) continue;
       const int difference = sad.compare(image, u, v);
-      if (difference >= least) continue;
-      least = difference;
+      if (difference >= min_difference) continue;
+      min_difference = difference;
       best = {u, v};
     }
   return best;
 }
 
-// The picture that is looked at, and from where it was taken.
+// The picture of the new frame, and its pose.
 struct Look {
   const FramePicture& picture;
   const StereoCamera &camera, &view_camera;
   const SE3 T_frame_match;
   const Matrix6& pose_covariance;
 
-  // What came of looking for a landmark where its patch may be looked for at all.
+  // A landmark that was searched for, and the result.
   struct Sought {
     Vector2 expected;
-    bool as_near;  // as it was seen from, about
+    bool as_near;  // seen from about the same distance as before
     std::optional<Aligned> aligned;
   };
 
+  // nullopt if the landmark is out of sight, its position too uncertain, or its patch unusable.
   std::optional<Sought> seek(const View& view) const {
     const FramePicture& shown = *view.picture;
     const auto expected = expect(view.point, view.covariance, camera, T_frame_match, pose_covariance);
@@ -191,7 +193,7 @@ struct Look {
   }
 };
 
-// Those that agree on one pose; none if they are too few.
+// The landmarks that agree on one pose; empty if they are fewer than kMinAligned.
 std::vector<Aligned> agreeing(const std::vector<Aligned>& all, const StereoCamera& camera, const SE3& T_match_frame) {
   std::vector<vision::Correspondence> correspondences;
   for (const Aligned& aligned : all)
@@ -212,20 +214,21 @@ bool same_depth(double disparity, double expected) {
   return std::abs(disparity - expected) <= std::max(1.0, kSameDepth * expected);
 }
 
-// Whether a track began on what is known.
+// Whether a track lies so close to an aligned landmark of about the same depth that it is not needed.
 bool beside(const storage::Observation& track, const Aligned& aligned, double radius) {
   if ((aligned.pixel - Vector2(track.u_left, track.v)).squaredNorm() > radius * radius) return false;
   return is_mono(track.pixel()) || same_depth(double{track.u_left} - track.u_right, aligned.disparity);
 }
 
-// What the right eye measured as good as there. NaN: nothing.
+// The disparity of the feature nearest to an aligned landmark and of about its depth; NaN if there is none within
+// kSameSurfacePixels.
 double disparity_at(const Aligned& aligned, std::span<const AppearanceFeature> features) {
-  double least = kSameSurfacePixels * kSameSurfacePixels, disparity = kNoRight;
+  double min_distance = kSameSurfacePixels * kSameSurfacePixels, disparity = kNoRight;
   for (const AppearanceFeature& feature : features) {
     if (!(feature.disparity > 0) || !same_depth(feature.disparity, aligned.disparity)) continue;
     const double distance = (aligned.pixel - Vector2(feature.u, feature.v)).squaredNorm();
-    if (distance >= least) continue;
-    least = distance;
+    if (distance >= min_distance) continue;
+    min_distance = distance;
     disparity = feature.disparity;
   }
   return disparity;
@@ -244,7 +247,7 @@ Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, Fra
   const auto recent = [&](FrameId id) { return id.session == frame.session && id.index >= first_maskable; };
 
   SeenLandmarks seen = seen_by(graph, frame);
-  std::vector<Aligned> found;  // their views are gone
+  std::vector<Aligned> found;  // `view` is null: the views do not outlive the loop
   Reobservation result;
   for (const Standpoint& standpoint : standpoints) {
     const auto match_session = graph.session(standpoint.match.session);
@@ -255,7 +258,7 @@ Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, Fra
         [&](LandmarkId landmark) { return !recent(landmark.base) && !seen.landmarks.contains(landmark); });
     const Look look{*picture, camera, view_camera, standpoint.T_match_frame.inverse(), standpoint.covariance};
     std::vector<Aligned> aligned;
-    std::vector<std::pair<LandmarkId, Vector2>> expected;  // of what is as near as it was
+    std::vector<std::pair<LandmarkId, Vector2>> expected;  // landmarks seen from about the same distance as before
     for (const View& view : views) {
       const auto sought = look.seek(view);
       if (sought && sought->as_near) expected.emplace_back(view.landmark, sought->expected);
@@ -281,14 +284,14 @@ Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, Fra
     binding.level = static_cast<std::uint8_t>(aligned.level);
     binding.aligned = true;
   }
-  const auto settled = std::count_if(found.begin(), found.end(), [&](const Aligned& aligned) {
+  const auto fixed = std::count_if(found.begin(), found.end(), [&](const Aligned& aligned) {
     return storage::is_settled(graph.hot(aligned.landmark.base)->landmarks[aligned.landmark.slot].observers);
   });
   const double radius = kBeside * camera.width;
   for (std::size_t t = 0; t < warm->observations.size(); ++t) {
     const storage::Observation& track = warm->observations[t];
     if (!track.is_tracked() || !recent(seen.of_track[t].base)) continue;
-    if (settled >= kEnoughSettled ||
+    if (fixed >= kEnoughFixed ||
         std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
       bindings.emplace_back().track = static_cast<std::int32_t>(t);
   }

@@ -1,7 +1,7 @@
-// Old landmarks found again in a keyframe's picture by what they looked like in an older one: the patch round a
-// landmark's track is warped to where the frame stands and aligned to a fraction of a pixel. Descriptors tell which
-// corner a corner is; the new one was chosen a pixel beside the old one, or not at all. Here every old landmark in view
-// is measured, as exactly as by tracking.
+// Finds old landmarks again in a keyframe's picture by their appearance in older pictures: the patch around a landmark
+// is warped to the frame's viewpoint and aligned to a fraction of a pixel. Matching by descriptors is less exact, since
+// the new keypoint may lie a pixel beside the old one or may not have been detected; here every old landmark in view is
+// measured as exactly as by tracking.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace relmap::place {
 
-// Where a frame stands, by another.
+// The pose of a frame relative to another frame, `match`.
 struct Standpoint {
   FrameId match;
   SE3 T_match_frame;
@@ -22,21 +22,24 @@ struct Standpoint {
 };
 
 inline constexpr int kMinAligned = 20;
-inline constexpr int kEnoughSettled = 60;  // they locate a frame better than what it could add
+// With so many fixed landmarks aligned, a frame is located better than its own new landmarks could improve.
+inline constexpr int kEnoughFixed = 60;
 
 struct Reobservation {
   std::vector<storage::ProposedBinding> bindings;
-  // From the first standpoint: landmarks that should be in the picture, seen from about as near; empty where nothing
-  // there agrees on a pose.
+  // The landmarks around the first standpoint that should be in the picture at about the distance from which they were
+  // seen before; empty if those that are aligned do not agree on a pose.
   std::vector<SoughtLandmark> sought;
 };
 
-// Of the landmarks that were seen around the matches (kBindingReach steps along their sessions' motion, both ways).
-// Bindings of two kinds: landmarks aligned in the picture, and tracks of the frame's session, begun since
-// `first_maskable`, that are not needed since an aligned landmark of about the same depth lies beside them
-// (AliasClaim); all such tracks where kEnoughSettled of what is aligned is settled (storage/graph/observers.h): what a
-// place adds to the map is bounded. All that is aligned from one standpoint agrees on a pose; a standpoint from which
-// fewer than kMinAligned do gives none. Empty where the frame has no picture.
+// Re-observes the landmarks that were seen around the matches, up to kBindingReach steps along their sessions' motion
+// in both directions. Returns two kinds of bindings: landmarks that are aligned in the picture, and tracks of the
+// frame's own session that began since frame `first_maskable` and are not needed (AliasClaim), since an aligned
+// landmark of about the same depth lies beside them. If kEnoughFixed of the aligned landmarks are fixed
+// (storage/graph/observers.h), no such track is needed, so that what a place adds to the map is bounded.
+//
+// The landmarks that are aligned from one standpoint agree on a pose; a standpoint from which fewer than kMinAligned
+// agree gives no bindings. The result is empty if the frame has no picture.
 Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, FrameId frame,
                         std::span<const Standpoint> standpoints, std::uint32_t first_maskable);
 

@@ -18,7 +18,7 @@ constexpr StereoCamera kCamera{400, 255.5, 191.5, 0.12, 512, 384};
 constexpr double kDepth = 4;  // of the wall
 constexpr FrameId kMatch{1, 1}, kFrame{2, 0};
 
-// Three frames of session 1 look at a textured wall, and have landmarks on it; session 2 comes by in other light.
+// Three frames of session 1 look at a textured wall and have landmarks on it; session 2 sees it in other light.
 class Reobserve : public testing::Test {
  protected:
   Reobserve() {
@@ -37,7 +37,7 @@ class Reobserve : public testing::Test {
   void add_landmark(FrameId base, double u, double v, storage::FrameHot& hot, storage::FrameWarm& warm) const {
     storage::Landmark landmark;
     landmark.abr = {(u - kCamera.cx) / kCamera.f, (v - kCamera.cy) / kCamera.f, 1 / kDepth};
-    landmark.observers.assign(4, base);  // so well is it known
+    landmark.observers.assign(4, base);  // as many as reduce its covariance
     const LandmarkId id{base, static_cast<std::uint32_t>(hot.landmarks.size())};
     hot.landmarks.push_back(landmark);
     warm.observations.push_back(
@@ -49,7 +49,7 @@ class Reobserve : public testing::Test {
     cold.picture = vision::encode_picture(paint(T_wall_camera, brighter, contrast));
     graph_.add_frame(id, std::move(hot), std::move(warm), std::move(cold));
   }
-  // The wall is at z = kDepth, the cameras face it.
+  // The wall is at z = kDepth and the cameras face it.
   vision::Image paint(const SE3& T_wall_camera, double brighter, double contrast) {
     return vision::testing_textures::paint(kCamera.width, kCamera.height, [&](int u, int v) {
       const Vector3 ray((u - kCamera.cx) / kCamera.f, (v - kCamera.cy) / kCamera.f, 1);
@@ -57,7 +57,7 @@ class Reobserve : public testing::Test {
       return brighter + contrast * wall_.at(100 * on_wall.x(), 100 * on_wall.y()) + noise_(random_);
     });
   }
-  // Where the frame really sees a landmark.
+  // The true pixel of a landmark in the frame.
   StereoPixel seen(LandmarkId id) const {
     const Vector3 on_wall = T_wall_[id.base.index] * graph_.hot(id.base)->landmarks[id.slot].point();
     return kCamera.project(T_wall_frame_.inverse() * on_wall);
@@ -104,7 +104,7 @@ TEST_F(Reobserve, MeasuresLandmarksToAFractionOfAPixelInOtherLight) {
   EXPECT_LT(std::sqrt(squares / static_cast<double>(bindings.size())), 0.2);
 }
 
-TEST_F(Reobserve, NothingWithoutWholePicturesOnBothSides) {
+TEST_F(Reobserve, FindsNothingWithoutFullPicturesOfBothFrames) {
   const Bytes picture = graph_.edit_cold(kFrame).picture;
   graph_.edit_cold(kFrame).picture = vision::thumbnail_of(picture);
   EXPECT_TRUE(find(T_match_frame()).empty());
@@ -117,7 +117,7 @@ TEST_F(Reobserve, NothingWithoutWholePicturesOnBothSides) {
   EXPECT_TRUE(find(T_match_frame()).empty());
 }
 
-TEST_F(Reobserve, WhatHangsThereNowIsAChangeAndOtherLightIsNone) {
+TEST_F(Reobserve, ANewObjectIsAChangeAndOtherLightIsNot) {
   EXPECT_GE(changes_seen().compared, 20);
   EXPECT_EQ(changes_seen().changed, 0) << "25 grey levels brighter, at four fifths of the contrast";
   vision::Image picture = paint(T_wall_frame_, 25, 0.8);
@@ -148,7 +148,7 @@ TEST_F(Reobserve, AWrongPlaceShowsNothing) {
   EXPECT_TRUE(find(wrong).empty());
 }
 
-TEST_F(Reobserve, WhatTheFrameSeesAlreadyIsLeftOut) {
+TEST_F(Reobserve, LandmarksThatTheFrameSeesAlreadyAreLeftOut) {
   const LandmarkId known{kMatch, 20};
   ASSERT_TRUE(std::ranges::any_of(find(T_match_frame()), [&](const auto& b) { return b.landmark == known; }));
   const StereoPixel z = seen(known);
@@ -178,8 +178,8 @@ TEST_F(Reobserve, ATrackBesideALandmarkIsNotNeededUnlessItIsOfAnotherDepth) {
   EXPECT_EQ(not_needed, (std::vector<std::int32_t>{0, 2}));
 }
 
-// A place that was passed often enough has its landmarks.
-TEST_F(Reobserve, WhereMostIsSettledNoTrackIsNeeded) {
+// A place that was passed often enough needs no new landmarks.
+TEST_F(Reobserve, NoTrackIsNeededWhereEnoughLandmarksAreFixed) {
   storage::FrameHot& hot = graph_.edit_hot(kFrame);
   hot.landmarks.resize(1);
   const StereoPixel z = seen({kMatch, 20});
@@ -196,8 +196,8 @@ TEST_F(Reobserve, WhereMostIsSettledNoTrackIsNeeded) {
   EXPECT_EQ(not_needed(), 1);
 }
 
-// What the right eye measured at a feature holds for a landmark that lies there.
-TEST_F(Reobserve, TakesTheDisparityOfAFeatureOnTheSameSpot) {
+// The disparity of a feature holds for a landmark at the same pixel.
+TEST_F(Reobserve, TakesTheDisparityOfAFeatureAtTheSamePixel) {
   const LandmarkId landmark{kMatch, 20};
   const StereoPixel z = seen(landmark);
   AppearanceFeature feature;
@@ -215,8 +215,8 @@ TEST_F(Reobserve, TakesTheDisparityOfAFeatureOnTheSameSpot) {
   EXPECT_EQ(stereo, 1);
 }
 
-// A second pass may have hardly a track of its own: what was aligned in it shows the first one's landmarks.
-TEST_F(Reobserve, LooksThroughThePicturesOfAPassThatOnlyAligned) {
+// A second pass may have hardly any tracks of its own, but its pictures show the landmarks that were aligned in them.
+TEST_F(Reobserve, UsesPicturesInWhichLandmarksWereOnlyAligned) {
   for (const storage::ProposedBinding& binding : find(T_match_frame()))
     graph_.edit_warm(kFrame).observations.push_back(
         {binding.landmark, {{2, 0}, 1}, binding.u_left, binding.v, binding.u_right, binding.level, binding.aligned});

@@ -1,4 +1,4 @@
-// A recording of photographs that was taken in twice: two mono sessions of the same pictures, which no metres join.
+// Recognises photographs that were added to the map twice: two mono sessions of the same pictures, which no edges join.
 #pragma once
 
 #include <span>
@@ -8,11 +8,11 @@
 
 namespace relmap::place {
 
-// Frames of two mono sessions that are of one picture: they have the same features. Their indices may differ, since
-// photographs may have been added to the folder before it was taken in again.
+// Whether two frames of different mono sessions are of one picture, that is, have the same features. Their indices may
+// differ, since photographs may have been added to the folder between the two imports.
 bool same_photograph(const storage::Graph& graph, FrameId a, FrameId b);
 
-// Whether one of these frames, a range each, is of the same photograph.
+// Whether any frame in these ranges is of the same photograph as `frame`.
 bool has_photograph(const storage::Graph& graph, std::span<const storage::FrameRange> frames, FrameId frame);
 
 }  // namespace relmap::place

@@ -16,7 +16,7 @@ struct Ranked {
   std::uint32_t place;
 };
 
-// The best kShortlisted of those offered.
+// Keeps the best kShortlisted of the places that it is offered.
 class Best {
  public:
   explicit Best(const PlaceScores& scores) : scores_(scores) {}
@@ -42,10 +42,11 @@ class Best {
     return x.value != y.value ? x.value > y.value : scores_.frame(x.place) < scores_.frame(y.place);
   }
   const PlaceScores& scores_;
-  std::vector<Ranked> heap_;  // the worst in front
+  std::vector<Ranked> heap_;  // the worst is in front
 };
 
-// The likeliest that is in no group yet makes one, of all that are near it.
+// Divides places into groups: the likeliest place that is in no group yet forms one with all places near it. Returns
+// the number of groups.
 std::uint32_t divide(std::vector<ShortlistedPlace>& places, const storage::Graph& graph) {
   constexpr std::uint32_t kNone = ~std::uint32_t{0};
   std::unordered_map<FrameId, ShortlistedPlace*> by_frame;

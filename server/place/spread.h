@@ -1,4 +1,4 @@
-// How much of a picture a set of features covers.
+// Measures how much of a picture a set of features covers.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace relmap::place {
 
-// Share, 0..1, of the picture's 16 x 12 cells in which at least one of the features at `chosen` lies.
+// The share (0..1) of the picture's 16 x 12 cells that hold at least one of the features whose indices are in `chosen`.
 double picture_spread(std::span<const AppearanceFeature> features, std::span<const std::uint32_t> chosen,
                       const StereoCamera& camera);
 

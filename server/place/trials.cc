@@ -18,7 +18,8 @@ Status Trials::run(std::span<const PlaceCandidate> candidates, const TrialLimits
     if (Status status = proceed_(); !status.ok()) return status;
     PlaceTrial trial = try_place(graph_, query_, candidate.frame, seed_);
     if (limits.needs_metres && trial.verified.ok() && !storage::is_metric(trial.verified->verification))
-      trial.verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
+      trial.verified = Status(Reason::NOT_STEREO, "recognised at " + candidate.frame.to_string() +
+                                                      ", which is of a mono session and gives no metric pose");
     trials_.push_back(std::move(trial));
     candidates_.push_back(candidate);
     ++tried_;

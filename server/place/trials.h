@@ -1,4 +1,4 @@
-// Geometry over one candidate of appearance after the other, for one picture.
+// Tries geometry on one candidate of appearance after another, for one picture.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,8 @@
 
 namespace relmap::place {
 
-// Asked before each piece of work; must not be empty. Anything but ok (DEADLINE, SHUTTING_DOWN) ends the work with it.
+// Called before each candidate is verified, and now and then in other work. A status that is not ok (DEADLINE,
+// SHUTTING_DOWN) ends the work with that status. Must not be empty.
 using Proceed = std::function<Status()>;
 
 // Which candidates a run tries.

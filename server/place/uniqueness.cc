@@ -14,18 +14,18 @@ namespace relmap::place {
 namespace {
 
 constexpr std::uint32_t kPlaceEdges = 20;
-constexpr double kSameDiffers = 0.1;  // of two views of one place, at most
+constexpr double kSameDiffers = 0.1;  // the largest differing_share() of two views of one place
 
 bool metric(const PlaceTrial& trial) { return trial.verified.ok() && storage::is_metric(trial.verified->verification); }
 
-// Whether a place is another one, passed another time and never joined to it; `known` is metric.
+// Whether `other` is the place of `known`, passed at another time and not joined to it. `known` must be metric.
 bool seen_twice(const storage::Graph& graph, const PlaceTrial& known, const PlaceTrial& other, std::uint64_t seed) {
   const auto cold = graph.cold(other.frame);
   const auto session = graph.session(other.frame.session);
   if (!cold || !session) return false;
   const QueryPicture from_other{cold->appearance, session->header.camera, {}};
   const auto seen = verify_place(graph, from_other, known.frame, seed);
-  if (seen.reason() == Reason::WRONG_CALIBRATION) return true;  // the place is the same, a camera is not
+  if (seen.reason() == Reason::WRONG_CALIBRATION) return true;  // the same place, seen by different cameras
   if (!seen.ok() || 2 * seen->inliers < known.verified->inliers) return false;
   if (const float differs = differing_share(graph, from_other, *seen); differs < 0 || differs > kSameDiffers)
     return false;
@@ -36,7 +36,7 @@ bool seen_twice(const storage::Graph& graph, const PlaceTrial& known, const Plac
                        other.verified->T_match_query);
 }
 
-// Which trials are of one place: numbers of places, the best's is 0.
+// Numbers the places of the trials; trials of one place have one number, and the best's is 0.
 std::vector<std::uint32_t> places_of(const storage::Graph& graph, std::span<const PlaceTrial> trials, std::size_t best,
                                      std::uint64_t seed) {
   std::vector<std::vector<storage::FrameRange>> places{place_ranges(graph, trials[best].frame)};
@@ -47,7 +47,8 @@ std::vector<std::uint32_t> places_of(const storage::Graph& graph, std::span<cons
     });
     place.push_back(static_cast<std::uint32_t>(known - places.begin()));
     if (known != places.end()) continue;
-    const bool told = trial.verified.ok() && (metric(trials[best]) || metric(trial));  // without metres nothing tells
+    // Without a metric pose the two cannot be told to be one place.
+    const bool told = trial.verified.ok() && (metric(trials[best]) || metric(trial));
     if (told && (metric(trials[best]) ? seen_twice(graph, trials[best], trial, seed)
                                       : seen_twice(graph, trial, trials[best], seed)))
       place.back() = 0;
@@ -75,7 +76,7 @@ std::optional<std::size_t> best_of(std::span<const PlaceTrial> trials) {
 
 namespace {
 
-// How well each trial's place explains the query, those of `dismissed` places left out.
+// Weighs how well each trial's place explains the query, apart from places that were dismissed.
 class Weighing {
  public:
   Weighing(std::span<const PlaceTrial> trials, std::size_t best, std::span<const std::uint32_t> place)
@@ -84,7 +85,7 @@ class Weighing {
   void dismiss(std::uint32_t place) { dismissed_.insert(place); }
 
   void find_runner_up(Standing& standing) const {
-    std::map<std::uint32_t, std::vector<std::uint32_t>> fits_at;  // places of a feature, each once
+    std::map<std::uint32_t, std::vector<std::uint32_t>> fits_at;  // the places at which a feature fits, each once
     for (std::size_t i = 0; i < trials_.size(); ++i)
       if (counts(i))
         for (const std::uint32_t feature : trials_[i].features)
@@ -95,15 +96,15 @@ class Weighing {
       for (const std::uint32_t feature : trial.features) weight += 1 / static_cast<double>(fits_at[feature].size());
       return weight;
     };
-    double most = 0;
+    double max_weight = 0;
     std::set<std::uint32_t> confirmed;
     standing.runner_up.reset();
     for (std::size_t i = 0; i < trials_.size(); ++i) {
       if (place_[i] == 0) continue;
-      if (trials_[i].verified.ok()) confirmed.insert(place_[i]);  // what is told apart is confirmed all the same
+      if (trials_[i].verified.ok()) confirmed.insert(place_[i]);  // even if it has been dismissed
       if (!counts(i)) continue;
-      if (const double weight = weight_of(trials_[i]); weight > most) {
-        most = weight;
+      if (const double weight = weight_of(trials_[i]); weight > max_weight) {
+        max_weight = weight;
         standing.runner_up = i;
       }
     }
@@ -111,21 +112,21 @@ class Weighing {
     uniqueness.alike = static_cast<std::uint16_t>(confirmed.size());
     uniqueness.runner_up = standing.runner_up ? trials_[*standing.runner_up].frame : FrameId();
     const double inliers = trials_[best_].verified->inliers;
-    uniqueness.runner_up_inliers =
-        most == 0
-            ? std::uint16_t{0}
-            : static_cast<std::uint16_t>(std::min(65535.0, std::round(inliers * most / weight_of(trials_[best_]))));
+    uniqueness.runner_up_inliers = max_weight == 0
+                                       ? std::uint16_t{0}
+                                       : static_cast<std::uint16_t>(std::min(
+                                             65535.0, std::round(inliers * max_weight / weight_of(trials_[best_]))));
   }
 
  private:
-  // A place that was seen by a camera that contradicts the query's is no rival: as a rule it is the same place.
+  // A place whose camera contradicts the query's is no rival: as a rule it is the same place.
   bool counts(std::size_t trial) const {
     return !dismissed_.contains(place_[trial]) && !is_contradicted(trials_[trial]);
   }
 
   std::span<const PlaceTrial> trials_;
   std::size_t best_;
-  std::span<const std::uint32_t> place_;  // of each trial; 0: the best's
+  std::span<const std::uint32_t> place_;  // the number of each trial's place; 0 is the best's
   std::set<std::uint32_t> dismissed_;
 };
 

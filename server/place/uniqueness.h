@@ -1,5 +1,5 @@
-// Verified means unique: of the places that explain a picture, does one stand out? Where floors look alike geometry
-// confirms several of them, the wrong ones too (docs/method.md, 7).
+// Decides whether one of the places that explain a picture stands out. Where floors look alike, geometry confirms
+// several of them, the wrong ones too, so a place counts as verified only if it is unique (docs/method.md, 7).
 #pragma once
 
 #include <cstdint>
@@ -16,44 +16,49 @@
 
 namespace relmap::place {
 
-// A runner-up with more than this share of what speaks for the best makes it ambiguous.
+// The best place is ambiguous if the runner-up has more than this share of its weight.
 inline constexpr double kAlike = 0.5;
 
 struct Standing {
-  std::size_t best = 0;                  // of the trials: where most fits, of those that geometry confirms
-  std::optional<std::size_t> runner_up;  // elsewhere
-  std::vector<bool> at_best;             // of the trials: whether of the best's place
-  // `runner_up_inliers` is on the scale of the best's inliers: those times the share that the runner-up has of what
-  // speaks for the best, which what fits at several places does less: a feature that fits at n of them counts 1/n.
+  std::size_t best = 0;                  // index of the confirmed trial with the most inliers
+  std::optional<std::size_t> runner_up;  // index of the best trial at another place
+  std::vector<bool> at_best;             // for each trial, whether it is at the place of the best
+  // A trial's weight is the sum over its features, where a feature that fits at n places counts 1/n.
+  // `runner_up_inliers` is the number of the best's inliers times the ratio of the runner-up's weight to the best's.
   storage::Uniqueness uniqueness;
 };
 
-// Of trials that geometry confirms the one where most fits: the first of several.
+// The index of the confirmed trial with the most inliers (the first of equal ones); nullopt if none is confirmed.
 std::optional<std::size_t> best_of(std::span<const PlaceTrial> trials);
 
-// What of a place, verified in metres, the query's picture shows changed.
+// Compares the query's picture with the landmarks of a place that was verified with a metric pose.
 using ComparePlace = std::function<Changes(const VerifiedPlace& place)>;
 
-// Nothing where geometry confirms none of the first `answers` trials; one of these is the best. Of `trials` of one
-// query those at the place of the best (place_ranges()) are no rivals, nor is one that was never joined to it and yet
-// is the same place: from there the best is confirmed, with half its inliers at least, where both say that it is, and
-// next to nothing differs. Of two mono sessions, which have no metres, nothing tells but that they are of the same
-// photographs. `differs` is measured where there is a pose. A rival that would make the best ambiguous is compared by
-// `compare`, if that is given: one that is told apart from the best (told_apart()) counts no more than a place where
-// nothing fits.
+// Weighs the trials of one query against each other. The best is one of the first `answers` trials; nullopt if geometry
+// confirms none of these.
+//
+// Trials at the place of the best (place_ranges()) are no rivals. Neither is a trial at a place that no edges join to
+// the best but that is the same place: the best is confirmed from there with at least half of its inliers and at the
+// same pose, and next to nothing differs. Mono sessions have no metric poses, so only the same photographs tell that
+// two of them show the same place.
+//
+// `differs` is measured if the best has a metric pose. If `compare` is given, it is called for the best and for each
+// rival that would make the best ambiguous; a rival that it tells apart (told_apart()) is dismissed.
 std::optional<Standing> weigh(const storage::Graph& graph, const QueryPicture& query,
                               std::span<const PlaceTrial> trials, std::size_t answers, std::uint64_t seed,
                               const ComparePlace& compare = {});
 
-// A function of what a proposal records; no where nothing is known.
+// Whether a closure with this uniqueness and this number of inliers is ambiguous. Depends only on what a proposal
+// records; false if the uniqueness is not known.
 bool is_ambiguous(const storage::Uniqueness& uniqueness, std::uint32_t inliers);
 
-// What looks like `frame` elsewhere in the map, likeliest first, by its own words: places that explain a picture of it,
-// too, whether the words of the picture tell so or not. Frames within `masked` are left out.
+// Finds places elsewhere in the map that look like `frame` by the frame's own words, likeliest first. They may explain
+// a picture of `frame` too, even if the picture's words do not suggest them. Frames within `masked` are left out.
 std::vector<PlaceCandidate> look_alikes(const storage::Graph& graph, const PlaceIndex& places, FrameId frame,
                                         std::span<const storage::FrameRange> masked);
 
-// The frames that show the same place as `frame`, as the graph has it: within 20 edges, or frames of a mono session.
+// The frames that show the same place as `frame` according to the graph: those within 20 steps of place_neighbours(),
+// one range each.
 std::vector<storage::FrameRange> place_ranges(const storage::Graph& graph, FrameId frame);
 
 }  // namespace relmap::place

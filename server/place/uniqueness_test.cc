@@ -35,7 +35,7 @@ PlaceTrial fits(FrameId frame, std::vector<std::uint32_t> seen, bool confirmed =
   return {frame, std::move(seen), std::move(place)};
 }
 
-// Sessions 1 to 9 of 50 frames each, none joined to another.
+// Sessions 1 to 9 of 50 frames each, with no edges between them.
 class Weigh : public ::testing::Test {
  protected:
   Weigh() {
@@ -54,7 +54,7 @@ class Weigh : public ::testing::Test {
   HandMadeGraph graph_;
 };
 
-TEST_F(Weigh, AloneAPlaceIsUnique) {
+TEST_F(Weigh, APlaceWithoutRivalsIsUnique) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, {}, false), fits({2, 5}, features(0, 40))};
   const Standing standing = weigh(trials);
   EXPECT_EQ(standing.best, 1u);
@@ -87,7 +87,7 @@ TEST_F(Weigh, LookAlikesAreToldApartByWhatOnlyOneOfThemShows) {
 }
 
 // `relmap ingest --mono --again` gives another session of the same pictures.
-TEST_F(Weigh, APhotographThatWasTakenInTwiceIsNoRivalOfItself) {
+TEST_F(Weigh, APhotographThatWasAddedTwiceIsNoRivalOfItself) {
   const auto seen = features(0, 40);
   const std::vector<PlaceTrial> trials{fits({1, 5}, seen), fits({2, 5}, seen), fits({2, 8}, seen)};
   EXPECT_TRUE(is_ambiguous(weigh(trials), trials));
@@ -99,15 +99,15 @@ TEST_F(Weigh, APhotographThatWasTakenInTwiceIsNoRivalOfItself) {
   const Standing standing = weigh(trials);
   EXPECT_EQ(standing.at_best, (std::vector<bool>{true, true, true}));
   EXPECT_FALSE(standing.uniqueness.runner_up.valid());
-  std::swap(graph_.edit_cold({2, 5}), graph_.edit_cold({2, 9}));  // others were added before it was taken in again
+  std::swap(graph_.edit_cold({2, 5}), graph_.edit_cold({2, 9}));  // indices differ if pictures were added in between
   const std::vector<PlaceTrial> moved{fits({1, 5}, seen), fits({2, 9}, seen), fits({2, 8}, seen)};
   EXPECT_FALSE(weigh(moved).uniqueness.runner_up.valid());
   std::swap(graph_.edit_cold({2, 5}), graph_.edit_cold({2, 9}));
-  graph_.edit_cold({2, 5}).appearance[0].v = 1;  // an exchanged picture
+  graph_.edit_cold({2, 5}).appearance[0].v = 1;  // a different picture
   EXPECT_EQ(weigh(trials).uniqueness.runner_up, (FrameId{2, 5}));
 }
 
-TEST_F(Weigh, WhatIsInManyPlacesCountsLess) {
+TEST_F(Weigh, FeaturesThatFitAtManyPlacesCountLess) {
   const auto door = features(0, 40);
   std::vector<PlaceTrial> trials{fits({1, 5}, door + features(100, 30))};
   trials.push_back(fits({2, 5}, door));
@@ -117,7 +117,7 @@ TEST_F(Weigh, WhatIsInManyPlacesCountsLess) {
   EXPECT_EQ(weigh(trials).uniqueness.alike, 6u);
 }
 
-TEST_F(Weigh, APlaceThatIsNotConfirmedMayBeARivalAllTheSame) {
+TEST_F(Weigh, APlaceThatIsNotConfirmedMayBeARival) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 32)), fits({2, 5}, features(100, 28), false)};
   const Standing standing = weigh(trials);
   EXPECT_TRUE(is_ambiguous(standing, trials));
@@ -133,7 +133,7 @@ TEST_F(Weigh, NeighboursAreNoRivals) {
   EXPECT_FALSE(is_ambiguous(standing, trials));
 }
 
-TEST_F(Weigh, ARivalThatPicturesTellApartIsNone) {
+TEST_F(Weigh, ARivalThatPicturesTellApartIsDismissed) {
   const auto metric = [](PlaceTrial trial) {
     trial.verified->verification = storage::Verification::kStereo;
     return trial;
@@ -157,7 +157,7 @@ TEST_F(Weigh, ARivalThatPicturesTellApartIsNone) {
   EXPECT_EQ(asked, 4) << "pictures are looked at where there is doubt";
 }
 
-TEST_F(Weigh, OnlyAnAnswerIsTheBest) {
+TEST_F(Weigh, OnlyAnAnswerCanBeTheBest) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 40)), fits({2, 5}, features(0, 50))};
   const auto standing = relmap::place::weigh(graph_, {{}, kMono}, trials, 1, 1);
   ASSERT_TRUE(standing.has_value());
@@ -165,7 +165,7 @@ TEST_F(Weigh, OnlyAnAnswerIsTheBest) {
   EXPECT_TRUE(relmap::place::is_ambiguous(standing->uniqueness, 40));
 }
 
-TEST(IsAmbiguous, WhatIsNotKnownSpeaksForNothing) {
+TEST(IsAmbiguous, UnknownUniquenessIsNotAmbiguous) {
   storage::Uniqueness uniqueness;
   EXPECT_FALSE(is_ambiguous(uniqueness, 30));
   uniqueness.runner_up = {1, 1};
@@ -176,7 +176,7 @@ TEST(IsAmbiguous, WhatIsNotKnownSpeaksForNothing) {
   EXPECT_FALSE(is_ambiguous(uniqueness, 60));
 }
 
-// A street passed twice, as sessions 1 and 2, and nothing says that it is one street.
+// A street that was passed twice, in sessions 1 and 2, with no edges between the two.
 class PassedTwice : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kFrames = 14, kThere = 7;
@@ -192,7 +192,7 @@ class PassedTwice : public ::testing::Test {
     std::vector<std::size_t> points;
     picture_ = street_.picture(street_.pose(kThere), true, points);
   }
-  // Other things where the second pass, or the query, has seen something from `first` to `last` across the picture.
+  // Replaces what is seen between the shares `first` and `last` of the picture's width.
   static void change(std::vector<AppearanceFeature>& seen, double first, double last) {
     std::mt19937_64 random(5);
     for (AppearanceFeature& feature : seen)
@@ -210,7 +210,7 @@ class PassedTwice : public ::testing::Test {
   std::vector<AppearanceFeature> picture_;
 };
 
-TEST_F(PassedTwice, OnePlaceSeenTwiceIsNoRivalOfItself) {
+TEST_F(PassedTwice, APlaceIsNoRivalOfItself) {
   const Standing standing = stand();
   EXPECT_EQ(standing.at_best, (std::vector<bool>{true, true}));
   EXPECT_FALSE(standing.uniqueness.runner_up.valid());
@@ -218,14 +218,14 @@ TEST_F(PassedTwice, OnePlaceSeenTwiceIsNoRivalOfItself) {
   EXPECT_LT(standing.uniqueness.differs, 0.05);
 }
 
-TEST_F(PassedTwice, PlacesThatDifferInAPartAreTwo) {
+TEST_F(PassedTwice, PlacesThatDifferInAPartAreRivals) {
   for (std::uint32_t i = 0; i < kFrames; ++i) change(street_.graph.edit_cold({2, i}).appearance, 0, 0.3);
   const Standing standing = stand();
   EXPECT_EQ(standing.at_best, (std::vector<bool>{true, false}));
   EXPECT_EQ(standing.uniqueness.runner_up.session, 2u);
 }
 
-TEST_F(PassedTwice, WhatDiffersIsSeen) {
+TEST_F(PassedTwice, TheDifferingShareIsMeasured) {
   change(picture_, 0.5, 0.8);
   const QueryPicture query{picture_, kStreetCamera};
   const auto place = verify_place(street_.graph, query, {1, kThere}, 3);

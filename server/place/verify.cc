@@ -24,21 +24,22 @@ namespace {
 
 constexpr double kNearRadius = 0.02;  // of the picture's width
 constexpr double kOutOfSight = -1e9;
-// Fewer than kMinInliers of what looks alike in all of the place are believed where twice as many lie near where the
-// pose says that they should.
+// kMinToGrow inliers of matching by descriptors alone are enough if kGrown inliers are found when features are matched
+// again near where the pose predicts them; otherwise kMinInliers are needed.
 constexpr int kMinToGrow = 15;
 constexpr std::size_t kGrown = 2 * kMinToGrow;
-// A lens that is free to fit bends to what chance brings together: 26 to 37 inliers agreed on poses up to a metre off.
+// An unknown lens adapts to chance matches: 26 to 37 inliers agreed on poses up to a metre off.
 constexpr int kMinOfUnknownLens = 2 * kMinInliers;
-constexpr int kMinOfAView = 16;  // of one camera; below, chance agrees
+constexpr int kMinOfAView = 16;  // inliers in a frame of a mono session; fewer agree by chance
 
 Status poor_spread(const VerifiedPlace& place) {
   return {Reason::POOR_SPREAD,
           std::to_string(place.inliers) + " inliers cover " + number_text(100 * place.spread) + " % of the picture"};
 }
 
-// A few inliers beside each other agree with poses that are far apart, and what agrees with any pose is no recognition.
-// An angle known worse than half a turn is not known: a figure would say something.
+// POOR_SPREAD if the inliers do not determine the rotation: a few inliers close together agree with very different
+// poses, and what agrees with any pose is no recognition. The message has no figure if the uncertainty is above half a
+// turn, since the angle is then unknown.
 Status check_rotation(const VerifiedPlace& place) {
   const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace());
   if (sigma <= kMaxRotationSigma) return {};
@@ -49,8 +50,8 @@ Status check_rotation(const VerifiedPlace& place) {
           std::to_string(place.inliers) + known + "; it must be known to " + number_text(kMaxRotationSigma) + " rad"};
 }
 
-// The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
-// most the covariance sum w S.
+// The contribution of the frames' transforms to the covariance of the pose. The points of one frame share the error of
+// its transform to the centre. A pose that is a mean over frames with weights w has at most the covariance sum w S.
 Matrix6 covariance_of_way(const MapPoints& map, const std::vector<std::uint32_t>& placed, const SE3& T_match_query) {
   const double inliers = std::accumulate(placed.begin(), placed.end(), 0.0);
   std::vector<double> weight;
@@ -65,7 +66,7 @@ Matrix6 covariance_of_way(const MapPoints& map, const std::vector<std::uint32_t>
   return sum;
 }
 
-// What fits in one frame of a mono session.
+// The match of the query with one frame of a mono session.
 struct FittingView {
   FrameId frame;
   EpipolarMatch match;
@@ -79,7 +80,7 @@ std::optional<FittingView> fitting_view(const storage::Graph& graph, const Query
   return FittingView{frame, std::move(match).value()};
 }
 
-// The views beside the candidate show the same place, one of them perhaps from nearer to where the query was taken.
+// Also tries the frames beside the candidate, which show the same place, perhaps from nearer to the query's viewpoint.
 PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, FrameId candidate) {
   std::vector<FittingView> views;
   const auto add = [&](std::optional<FrameId> frame) {
@@ -101,8 +102,8 @@ PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, 
   if (views.empty())
     return {candidate,
             {},
-            Status(Reason::TOO_FEW_INLIERS,
-                   "fewer than " + std::to_string(kMinOfAView) + " matches agree on one geometry, there and beside")};
+            Status(Reason::TOO_FEW_INLIERS, "fewer than " + std::to_string(kMinOfAView) +
+                                                " matches agree on one geometry with that frame or one beside it")};
   const auto& [frame, match] = *best();
   VerifiedPlace place;
   place.match = frame;
@@ -122,13 +123,13 @@ PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, 
   if (place.inliers < static_cast<std::uint32_t>(kMinEpipolarInliers))
     return {frame, std::move(features),
             Status(Reason::TOO_FEW_INLIERS, std::to_string(place.inliers) +
-                                                " features agree on one geometry, there and beside; at least " +
+                                                " features agree with that frame and those beside it; at least " +
                                                 std::to_string(kMinEpipolarInliers) + " must")};
   if (place.spread < kMinSpread) return {frame, std::move(features), poor_spread(place)};
   return {frame, std::move(features), std::move(place)};
 }
 
-// How many inliers each frame of `map` placed.
+// How many inliers come from each frame of `map`.
 std::vector<std::uint32_t> placed_by_frame(const MapPoints& map, std::span<const DescriptorMatch> inliers) {
   std::vector<std::uint32_t> placed(map.frames.size());
   for (const DescriptorMatch& match : inliers) ++placed[map.points[match.point].placed];
@@ -147,7 +148,8 @@ std::vector<vision::Correspondence> correspond(const QueryPicture& query, const 
   return correspondences;
 }
 
-// Matches among what lies near each other seen from the pose: in so small a part of the picture few look alike.
+// Matches each feature with points that the pose projects near it: in so small a part of the picture few features look
+// alike.
 std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query) {
   const SE3 T_query_match = T_match_query.inverse();
   std::vector<Vector2> expected;
@@ -162,7 +164,7 @@ std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoin
   });
 }
 
-// The pose of the query, and its lens where that is not known.
+// Estimates the pose of the query, and its lens if that is not known.
 Result<vision::MotionAndLens> estimate_pose(const std::vector<vision::Correspondence>& correspondences,
                                             const StereoCamera& camera, const vision::MotionOptions& options) {
   if (camera.f == 0) return vision::estimate_motion_and_lens(correspondences, camera, options);
@@ -173,9 +175,9 @@ Result<vision::MotionAndLens> estimate_pose(const std::vector<vision::Correspond
 
 struct StereoPlace {
   VerifiedPlace place;
-  FrameId nearest;                // placed most of the inliers
-  Matrix6 way = Matrix6::Zero();  // of place.covariance, what the ways to the frames around have wrong
-  // What descriptors alone have brought together; all among which the pose was found; and the inliers.
+  FrameId main_frame;             // the frame from which most of the inliers come
+  Matrix6 way = Matrix6::Zero();  // the part of place.covariance that comes from the transforms between the frames
+  // Matches by descriptors alone; the matches among which the pose was found; and the inliers.
   std::vector<vision::Correspondence> alike, matched, agree;
 };
 
@@ -193,12 +195,12 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
   options.min_inliers = query.camera.f > 0 ? kMinToGrow : kMinOfUnknownLens;
   auto pose = estimate_pose(correspondences, query.camera, options);
   if (!pose.ok()) return pose.status();
-  // Where the pose is found more of what was seen can be told apart; where chance agreed there is no more.
+  // With the right pose, matching again near the predicted positions gains inliers; with a chance pose it does not.
   if (query.camera.f > 0) {
     const bool few = pose->motion.inliers.size() < static_cast<std::size_t>(kMinInliers);
     auto near = match_near(query, map, pose->motion.T_reference_camera);
     auto closer = correspond(query, map, near);
-    options.enough = 1;  // a share of what lies near is no sign: it was chosen by the pose
+    options.enough = 1;  // a large share of inliers is no evidence here, since the pose selected the matches
     auto motion = vision::estimate_motion(closer, query.camera, options, &pose->motion.T_reference_camera);
     if (motion.ok() && motion->inliers.size() > pose->motion.inliers.size()) {
       pose->motion = std::move(*motion);
@@ -206,8 +208,10 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
       correspondences = std::move(closer);
     }
     if (const std::size_t inliers = pose->motion.inliers.size(); few && inliers < kGrown)
-      return Status(Reason::TOO_FEW_INLIERS, std::to_string(inliers) + " matches near where few say agree; at least " +
-                                                 std::to_string(kGrown) + " must");
+      return Status(Reason::TOO_FEW_INLIERS,
+                    std::to_string(inliers) +
+                        " matches near the positions that a few inliers predict agree; at least " +
+                        std::to_string(kGrown) + " must");
   }
   const vision::Motion& motion = pose->motion;
 
@@ -236,15 +240,15 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
   for (const DescriptorMatch& match : inliers)
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
-  const auto most = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
-  return StereoPlace{std::move(place), map.frames[most].frame,     way,
+  const auto main = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
+  return StereoPlace{std::move(place), map.frames[main].frame,     way,
                      std::move(alike), std::move(correspondences), std::move(agree)};
 }
 
-// Whether the right eye sees what the left one does, where it should. Of good pairs it saw 75 % and more, of pictures
-// of two times or of exchanged eyes seldom 50.
+// NOT_STEREO if the right picture does not show what it should of the points in the left one. In good pairs it showed
+// 75 % and more of them, in pictures of different times or with exchanged eyes seldom 50 %.
 Status check_pair(std::span<const vision::Correspondence> agree, const StereoCamera& camera, const SE3& T_match_query) {
-  constexpr double kMinDisparity = 4;  // pixels: nothing is so far away by mistake
+  constexpr double kMinDisparity = 4;  // pixels; farther points may lack a disparity in good pairs, too
   constexpr std::size_t kMinExpected = 15;
   constexpr double kMinSeen = 0.3;
   const SE3 T_query_match = T_match_query.inverse();
@@ -258,11 +262,11 @@ Status check_pair(std::span<const vision::Correspondence> agree, const StereoCam
   if (expected < kMinExpected || static_cast<double>(seen) >= kMinSeen * static_cast<double>(expected)) return {};
   return {Reason::NOT_STEREO, "of " + std::to_string(expected) +
                                   " points that both eyes should see the right picture shows " + std::to_string(seen) +
-                                  ": it is not that of this pair, or the eyes are exchanged, or the calibration is not "
-                                  "theirs; the left picture can be asked for alone"};
+                                  ": it is not of this pair, or the eyes are exchanged, or the calibration is of other "
+                                  "cameras; ask with the left picture alone"};
 }
 
-// What is found fits, and yet it was not taken by this camera.
+// Checks whether a picture whose place was found was taken by the query's camera.
 Status check_place(const StereoPlace& found, const QueryPicture& query, const StereoCamera& map_camera) {
   if (query.camera.f == 0) return {};
   if (query.pair)
@@ -274,19 +278,19 @@ Status check_place(const StereoPlace& found, const QueryPicture& query, const St
                                std::to_string(found.place.match.session) + ": it fits " + status.message()};
 }
 
-// The same but for the rounding of numbers in a file, and of a size that was reduced.
+// Whether two lenses are the same apart from the rounding of numbers in a file or of a reduced picture size.
 bool is_same_lens(const StereoCamera& a, const StereoCamera& b) {
   constexpr double kSame = 1e-3;
   return std::abs(a.f / a.width - b.f / b.width) < kSame * b.f / b.width &&
          std::abs(a.cx / a.width - b.cx / b.width) < kSame && std::abs(a.cy / a.width - b.cy / b.width) < kSame;
 }
 
-// The pose, and how well it is known, of a camera that is the named one within what calibrations are. What confirmed
-// the place stays what it was: the inliers of the camera as it is named.
+// Estimates the pose and its covariance again, allowing for the usual errors of calibrations. The inliers stay those
+// of the camera as it was named.
 Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_camera, StereoPlace* found) {
   vision::MotionOptions options;
   options.min_inliers = kMinToGrow;
-  // Not the inliers alone: they were chosen by the lens as it is named.
+  // All matches, not the inliers alone, since those were selected with the lens as it was named.
   const auto motion =
       vision::estimate_tolerant_motion(found->matched, query.camera, map_camera, found->place.T_match_query, options);
   if (!motion.ok()) return motion.status();
@@ -295,7 +299,7 @@ Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_
   return check_rotation(found->place);
 }
 
-// Right or turned, both as likely: the mean of the squares.
+// The picture is turned or not with equal probability, so half of the squared rotation is added to the covariance.
 Status allow_for_other_eye(const Vector3& turn, VerifiedPlace& place) {
   place.covariance.bottomRightCorner<3, 3>() += 0.5 * turn * turn.transpose();
   return check_rotation(place);
@@ -309,14 +313,15 @@ bool is_contradicted(const PlaceTrial& trial) {
 }
 
 const PlaceTrial* contradiction(std::span<const PlaceTrial> trials) {
-  std::size_t most = 0;
+  std::size_t max_confirmed = 0;
   const PlaceTrial* contradicted = nullptr;
   for (const PlaceTrial& trial : trials) {
-    if (trial.verified.ok()) most = std::max(most, trial.features.size());
+    if (trial.verified.ok()) max_confirmed = std::max(max_confirmed, trial.features.size());
     if (!is_contradicted(trial)) continue;
     if (!contradicted || trial.features.size() > contradicted->features.size()) contradicted = &trial;
   }
-  return contradicted && most < kSureInliers && contradicted->features.size() > most ? contradicted : nullptr;
+  return contradicted && max_confirmed < kSureInliers && contradicted->features.size() > max_confirmed ? contradicted
+                                                                                                       : nullptr;
 }
 
 PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed) {
@@ -328,9 +333,10 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
 
   auto found = verify_stereo(graph, query, candidate, seed);
   if (!found.ok()) return {candidate, {}, found.status()};
-  // What was seen from another frame is told from there: the way between the two may be badly known, or wrong.
-  if (found->nearest != candidate && !storage::within(found->nearest, query.masked))
-    if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) found = std::move(nearer);
+  // The pose is expressed in the frame that saw most of the inliers, since the transform between the two frames may be
+  // uncertain or wrong.
+  if (found->main_frame != candidate && !storage::within(found->main_frame, query.masked))
+    if (auto nearer = verify_stereo(graph, query, found->main_frame, seed); nearer.ok()) found = std::move(nearer);
   if (Status status = check_place(*found, query, session->header.camera); !status.ok())
     return {found->place.match, std::move(found->place.features), std::move(status)};
   const bool is_other = query.known == CameraKnown::kSupposed ||

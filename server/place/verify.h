@@ -1,4 +1,4 @@
-// Is this picture really of that place? Geometry decides (docs/method.md, 7).
+// Verifies by geometry that a picture shows a place (docs/method.md, 7).
 #pragma once
 
 #include <cstdint>
@@ -13,78 +13,81 @@
 
 namespace relmap::place {
 
-// Whose word a camera is. Unless the session that saw the place was measured with it, it is taken to be right within
-// what calibrations are: estimate_tolerant_motion().
+// How the camera of a query is known. Unless it is the camera of a session, its calibration is taken to be right only
+// within the usual errors of calibrations (estimate_tolerant_motion()).
 enum class CameraKnown : std::uint8_t {
-  kMeasuredWith,  // a session's own, of a frame of the map
-  kNamed,         // by whoever asks
-  kSupposed,      // by nobody: it may be another camera than the session's, whatever its numbers are
+  kMeasuredWith,  // the camera of the session in the map to which the picture belongs
+  kNamed,         // named by the caller
+  kSupposed,      // only supposed: the picture may be of another camera, even one with the same numbers
 };
 
 struct QueryPicture {
-  std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
-  // Baseline 0: mono. f 0: nothing but the picture's size is known, and the lens is estimated with the pose.
+  std::span<const AppearanceFeature> features;  // rectified; with disparities if the query is stereo
+  // Baseline 0: mono. f 0: only the picture's size is known, and the lens is estimated with the pose.
   StereoCamera camera;
-  std::span<const storage::FrameRange> masked = {};  // no answers: the query's own recent past
-  // It is said to be what both eyes saw at one time: then most of what is recognised must have a disparity.
+  std::span<const storage::FrameRange> masked = {};  // frames that are no answers: the query's own recent past
+  // Whether the picture is said to be one of a stereo pair; enough of what is recognised must then have a disparity.
   bool pair = false;
   CameraKnown known = CameraKnown::kMeasuredWith;
-  // The picture is as likely as not the right eye's, taken for the left one's: then it is turned by this rotation
-  // (vector, radians), which the covariance of the pose allows for. Zero: it is known whose it is.
+  // Not zero if the picture, taken for the left eye's, may as likely be the right eye's: the rotation between the eyes
+  // (rotation vector, radians), for which the covariance of the pose allows.
   Vector3 eye_turn = Vector3::Zero();
 };
 
-inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways
+inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, in both directions
 inline constexpr int kMinInliers = 20;
-inline constexpr double kMinSpread = 0.05;  // share of the picture's area that the inliers' cells cover
+inline constexpr double kMinSpread = 0.05;  // share of the picture's cells in which inliers lie
 
 struct VerifiedPlace {
   FrameId match;
   SE3 T_match_query;
-  Matrix6 covariance = Matrix6::Zero();
+  Matrix6 covariance = Matrix6::Zero();  // of T_match_query Exp(xi)
   storage::Verification verification = storage::Verification::kStereo;
-  bool homography = false;  // where the verification is kEpipolar: of one plane, no fundamental matrix
+  bool homography = false;  // for kEpipolar: whether a homography was fitted rather than a fundamental matrix
   std::uint32_t inliers = 0;
-  std::vector<std::uint32_t> features;  // the inliers: of the query, ascending
-  double spread = 0;
-  double focal_length = 0;                         // pixels: the query's, or the estimate
-  std::vector<storage::ProposedBinding> bindings;  // inliers whose map side is a landmark
+  std::vector<std::uint32_t> features;             // the inliers, as features of the query, ascending
+  double spread = 0;                               // share of the picture's cells in which inliers lie (spread.h)
+  double focal_length = 0;                         // pixels; the query's, or its estimate
+  std::vector<storage::ProposedBinding> bindings;  // inliers that are matched to landmarks
 };
 
-// Matches the query against the features and landmarks of `candidate` and the frames up to kViewReach steps along its
-// session's odometry, expressed in the frame that saw most of what fits: `match`, the candidate itself as a rule.
-// NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS (of an unknown lens twice as many are needed), POOR_SPREAD,
-// NO_CALIBRATION (an unknown focal length that what is seen does not tell), WRONG_CALIBRATION (check_camera(): the
-// place is recognised, and the pose would be wrong), NOT_STEREO (a pair that is none). `seed` fixes RANSAC. A candidate
-// of a mono session is verified by fundamental matrices or homographies between the query and it and the frames beside
-// it, with which 16 features each and 30 together agree; `match` is the frame with which most do. T_match_query is the
-// identity with a covariance that says nothing, and there are no bindings.
+// Verifies that the query shows `candidate`, and estimates its pose from the features and landmarks of the frames up to
+// kViewReach steps along the candidate's odometry. The pose is relative to `match`, the frame that saw most of the
+// inliers, which is the candidate as a rule. `seed` makes RANSAC deterministic.
+//
+// A candidate of a mono session is verified by fundamental matrices or homographies between the query and the candidate
+// and the frames beside it: at least 16 features must agree with each, and 30 in total. `match` is then the frame with
+// the most inliers, T_match_query is the identity with a meaningless, huge covariance, and there are no bindings.
+//
+// NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS (an unknown lens needs twice as many), POOR_SPREAD, NO_CALIBRATION
+// (an unknown focal length cannot be estimated from what is seen), WRONG_CALIBRATION (check_camera(): the place is
+// recognised, but the pose would be wrong), NOT_STEREO (the two pictures of a pair do not belong together).
 Result<VerifiedPlace> verify_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 
-// The same, and what fits there where it is too little to be confirmed: that may be as much as fits anywhere.
+// The result of verify_place(), and the features that fit even if the place is refused.
 struct PlaceTrial {
   FrameId frame;                        // `match`, or the candidate
-  std::vector<std::uint32_t> features;  // that fit: of the query, ascending
+  std::vector<std::uint32_t> features;  // features of the query that fit, ascending
   Result<VerifiedPlace> verified;
 };
 PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
 
-// Whether geometry found the place and says that the picture is not of the camera that is named for it, or no pair
-// (WRONG_CALIBRATION, NOT_STEREO).
+// Whether geometry recognised the place but found that the picture is not of the named camera (WRONG_CALIBRATION) or
+// that the pair is none (NOT_STEREO).
 bool is_contradicted(const PlaceTrial& trial);
 
-// With so many inliers the check of the camera tells: who passes it is of that camera.
+// With so many inliers the check of the camera is conclusive: a picture that passes it is of that camera.
 inline constexpr std::size_t kSureInliers = 2 * kMinInliers;
 
-// The contradicted one of the trials of one picture with most features, if more fit there than anywhere that is
-// confirmed, and kSureInliers nowhere: too little fits elsewhere to tell the same, and the pose there is as wrong. Else
-// it is the contradicted place whose camera is another one. Null otherwise.
+// Given the trials of one picture, returns the contradicted trial with the most features if the query's camera must be
+// wrong: more features fit there than at any confirmed place, and no confirmed place has kSureInliers, so the check of
+// the camera was not conclusive there. Null otherwise: then it is the camera of the contradicted place that is wrong.
 const PlaceTrial* contradiction(std::span<const PlaceTrial> trials);
 
-// Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,
-// matched by descriptor inside the gate of the transform's covariance. `first_maskable` and newer frames of the frame's
-// own session are left out (they are tracked already).
+// Proposes re-observations in `frame` of landmarks seen around `match`, given the pose of the frame: landmarks are
+// projected and matched by descriptor inside the gate of the transform's covariance. Frame `first_maskable` of the
+// frame's own session and newer ones are left out, since they are tracked already.
 std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& graph, const QueryPicture& query,
                                                        FrameId frame, FrameId match, const SE3& T_match_frame,
                                                        const Matrix6& covariance, std::uint32_t first_maskable);

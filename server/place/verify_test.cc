@@ -14,7 +14,7 @@ namespace {
 constexpr FrameId kMatch{1, 6};
 const SE3 kView = SE3::exp((Vector6() << 0.2, -0.1, 0.15, 0.03, -0.08, 0.02).finished());
 
-// Of the view from pose(6) * kView, in the frame that it was told from.
+// The true pose of the view from pose(6) * kView, relative to the frame in which the place was verified.
 SE3 truth(const SyntheticStreet& street, const VerifiedPlace& place) {
   return street.pose(place.match.index).inverse() * street.pose(6) * kView;
 }
@@ -48,7 +48,7 @@ TEST(VerifyPlace, FindsTheTransformAndTheLandmarks) {
   }
 }
 
-TEST(VerifyPlace, OneEyeIsEnough) {
+TEST(VerifyPlace, AMonoQueryIsVerified) {
   SyntheticStreet street(2, 12, 0);
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6) * kView, false, points);
@@ -60,7 +60,7 @@ TEST(VerifyPlace, OneEyeIsEnough) {
   EXPECT_TRUE(std::isnan(place->bindings[0].u_right));
 }
 
-TEST(VerifyPlace, TheOtherEyesDirectionIsInTheCovariance) {
+TEST(VerifyPlace, TheCovarianceAllowsForTheRotationBetweenTheEyes) {
   SyntheticStreet street(3, 12, 0.5);
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6) * kView, false, points);
@@ -85,12 +85,12 @@ TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
   EXPECT_NEAR(place->focal_length / kStreetCamera.f, 1, 0.02);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).t.norm(), 0.1);
   const auto known = verify_place(street.graph, as_query(features, false), kMatch, 7);
-  EXPECT_GE(place->covariance(2, 2), known->covariance(2, 2)) << "how far away things are is less sure";
+  EXPECT_GE(place->covariance(2, 2), known->covariance(2, 2)) << "with an unknown lens the depth is less certain";
 }
 
-// Beside each other and coarse: poses far apart agree with them, and whatever looks a little like it would be this
-// place.
-TEST(VerifyPlace, InliersThatTellNoRotationAreNoPlace) {
+// Features that are close together and coarse agree with very different poses, so anything that looks a little like the
+// place would be recognised as it.
+TEST(VerifyPlace, InliersThatDoNotDetermineTheRotationAreRefused) {
   SyntheticStreet street(2, 12, 0);
   std::vector<std::size_t> points;
   std::vector<AppearanceFeature> features = street.picture(street.pose(6) * kView, false, points);
@@ -107,8 +107,8 @@ TEST(VerifyPlace, InliersThatTellNoRotationAreNoPlace) {
   EXPECT_NE(coarse.status().message().find("rotation"), std::string::npos) << coarse.status().message();
 }
 
-// Coarse, and in a row: turned about it by any angle the camera sees nearly the same.
-TEST(VerifyPlace, InliersOfWhichAnyAngleIsTrueAreSaidToTellNone) {
+// Coarse features in a row: turned about the row by any angle, the camera sees nearly the same.
+TEST(VerifyPlace, TheRefusalHasNoFigureWhereAnyRotationFits) {
   HandMadeGraph graph;
   graph.add_session(1, kStreetCamera);
   std::mt19937_64 random(1);
@@ -131,7 +131,7 @@ TEST(VerifyPlace, InliersOfWhichAnyAngleIsTrueAreSaidToTellNone) {
       << row.status().message();
 }
 
-// Normalised squared errors of the transform: of mean 6 where the covariance is honest.
+// Mean normalised squared error of the transform, which is 6 if the covariance is right.
 double mean_nees(bool stereo, int trials) {
   double sum = 0;
   for (int trial = 0; trial < trials; ++trial) {
@@ -159,7 +159,8 @@ TEST(VerifyPlace, CovarianceIsHonestWithOneEye) {
   EXPECT_LT(nees, 8.5);
 }
 
-// Most things stand there twice, so that hardly any is known by its looks alone, but each where the others say.
+// Most points have a look-alike, so that hardly any is recognised by its descriptor alone, but each is where the pose
+// predicts it.
 class VerifyLookAlikes : public testing::Test {
  protected:
   VerifyLookAlikes() {
@@ -193,7 +194,7 @@ class VerifyLookAlikes : public testing::Test {
   std::map<std::size_t, std::size_t> looks_;
 };
 
-TEST_F(VerifyLookAlikes, AFewAreBelievedWhereManyMoreLieNearWhereTheySay) {
+TEST_F(VerifyLookAlikes, FewInliersAreEnoughWhereManyMoreAreFoundNearTheirPrediction) {
   ASSERT_GT(features_.size(), 60u);
   const auto place = verify(features_.size());
   ASSERT_TRUE(place.ok()) << place.status().to_string();
@@ -201,7 +202,7 @@ TEST_F(VerifyLookAlikes, AFewAreBelievedWhereManyMoreLieNearWhereTheySay) {
   EXPECT_LT((place->T_match_query.inverse() * truth(street_, *place)).log().norm(), 1e-3);
 }
 
-TEST_F(VerifyLookAlikes, AFewAreNotBelievedWhereAFewMoreDo) {
+TEST_F(VerifyLookAlikes, FewInliersAreRefusedWhereOnlyAFewMoreAreFound) {
   const auto place = verify(27);
   ASSERT_FALSE(place.ok());
   EXPECT_EQ(place.reason(), Reason::TOO_FEW_INLIERS);
@@ -214,7 +215,7 @@ TEST(VerifyPlace, AnotherStreetIsRefused) {
   EXPECT_EQ(verify_place(street.graph, as_query(features), kMatch, 7).reason(), Reason::TOO_FEW_INLIERS);
 }
 
-TEST(VerifyPlace, NamesWhatIsMissing) {
+TEST(VerifyPlace, ARefusalNamesWhatIsMissing) {
   SyntheticStreet street(5, 12, 0);
   std::vector<std::size_t> points;
   auto features = street.picture(street.pose(6), true, points);
@@ -223,7 +224,7 @@ TEST(VerifyPlace, NamesWhatIsMissing) {
   std::vector<AppearanceFeature> corner;
   for (const AppearanceFeature& feature : features)
     if (feature.u < 120 && feature.v < 96) corner.push_back(feature);
-  // A patch of the picture, however rich, says little about where the camera is.
+  // A small part of the picture says little about the pose, however many features it has.
   while (corner.size() < 25) {
     corner.push_back(corner[corner.size() % 7]);
     corner.back().u += 1;

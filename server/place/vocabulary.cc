@@ -15,7 +15,7 @@
 namespace relmap::place {
 namespace {
 
-// The bytes that the tables point into, owned or mapped.
+// The bytes into which the tables point, owned or mapped.
 class Storage {
  public:
   explicit Storage(Bytes bytes) : owned_(std::move(bytes)) { bytes_ = owned_; }

@@ -1,5 +1,5 @@
-// The visual vocabulary with its Chow-Liu tree (docs/method.md, 7; Cummins and Newman, IJRR 2008): a binary file,
-// memory-mapped.
+// The visual vocabulary with its Chow-Liu tree (docs/method.md, 7; Cummins and Newman, IJRR 2008), which is a binary
+// file that is memory-mapped.
 #pragma once
 
 #include <cstdint>
@@ -19,30 +19,32 @@ class Vocabulary {
  public:
   virtual ~Vocabulary() = default;
 
-  // NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION.
+  // Maps a vocabulary file. NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION.
   static Result<std::shared_ptr<const Vocabulary>> load(const std::string& path);
   // The same from the bytes of a file.
   static Result<std::shared_ptr<const Vocabulary>> from_bytes(Bytes bytes);
 
   virtual std::uint32_t size() const = 0;  // words
-  virtual std::uint32_t crc() const = 0;   // identity: of the whole file
+  virtual std::uint32_t crc() const = 0;   // checksum of the whole file, which identifies the vocabulary
   virtual std::string source() const = 0;  // what it was trained on, and under which terms
 
-  // Nearest word of each feature: the nearest centroid among the words of the 8 branches nearest to it.
+  // The word of each feature: the nearest centroid among the words of the 8 branches nearest to the feature.
   virtual std::vector<std::uint32_t> words(std::span<const AppearanceFeature> features) const = 0;
 
-  // Of each word: p(z = 1), its parent in the tree (itself: the root), p(z = 1 | parent's z = 0 and 1).
+  // For each word: p(z = 1), its parent in the tree (the root is its own), and p(z = 1) given that the parent is absent
+  // or present.
   virtual std::span<const float> marginal() const = 0;
   virtual std::span<const std::uint32_t> parent() const = 0;
   virtual std::span<const float> given_parent_absent() const = 0;
   virtual std::span<const float> given_parent_present() const = 0;
 
-  // Places shipped to stand for the unknown world in p(new): their words, each sorted.
+  // Sample places, which stand for the unknown world in the probability of a new place: the sorted words of each.
   virtual std::size_t sample_places() const = 0;
   virtual std::span<const std::uint32_t> sample_place(std::size_t i) const = 0;
 };
 
-// The vocabulary that is shipped with the programs: ../share/relmap/default.vocab, seen from the running executable.
+// The path of the vocabulary that is shipped with the programs: ../share/relmap/default.vocab relative to the folder of
+// the running executable.
 std::string default_vocabulary_path();
 
 }  // namespace relmap::place

@@ -14,7 +14,7 @@ constexpr std::size_t kHeaderBytes = 32;
 
 std::size_t padded(std::size_t bytes) { return (bytes + 3) / 4 * 4; }
 
-// Hands out tables one after the other; the total size has been checked before.
+// Hands out one table after another; the total size has been checked before.
 class Cursor {
  public:
   explicit Cursor(ByteSpan bytes) : next_(bytes.data()) {}

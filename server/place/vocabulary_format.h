@@ -1,23 +1,23 @@
-// The bytes of a vocabulary file, version 1. Little-endian; every table begins at a multiple of 4 bytes, so that the
-// mapped file is used in place.
+// The format of a vocabulary file, version 1. Little-endian. Every table begins at a multiple of 4 bytes, so that the
+// mapped file can be used in place.
 //
 //    0  u8[8]        "RELMAPVO"
 //    8  u32          version
 //   12  u32          W, words: 1 .. 2^20
 //   16  u32          K, branches: 1 .. W
 //   20  u32          S, sample places: 1 .. 2^16
-//   24  u32          N, words of all sample places together
+//   24  u32          N, words of all sample places in total
 //   28  u32          bytes of the source text, at most 4096
 //   32  u8[]         source text (UTF-8), zeros to the next multiple of 4
 //       u8[K][128]   centroids of the branches
-//       u32[K + 1]   first word of each branch, ascending, none empty; the last is W
+//       u32[K + 1]   first word of each branch, ascending, no branch empty; the last is W
 //       u8[W][128]   centroids of the words
 //       u32[W]       parent in the Chow-Liu tree; the one root is its own
 //       f32[W]       p(z = 1)
 //       f32[W]       p(z = 1 | parent absent); the root: p(z = 1)
 //       f32[W]       p(z = 1 | parent present); the root: p(z = 1)
 //       u32[S + 1]   first entry of each sample place in the next table; the last is N
-//       u32[N]       words, of each place ascending
+//       u32[N]       words of the sample places, ascending within each
 //       u32          CRC32C of all bytes before
 #pragma once
 
@@ -41,18 +41,18 @@ inline constexpr std::size_t kMaxSourceBytes = 4096;
 // All probabilities of the model lie within [kProbabilityFloor, 1 - kProbabilityFloor].
 inline constexpr double kProbabilityFloor = 1e-4;
 
-// What a file says.
+// The content of a vocabulary file.
 struct VocabularyModel {
   std::string source;
   std::vector<Descriptor> branches;
-  std::vector<std::uint32_t> branch_begin;  // branches + 1
+  std::vector<std::uint32_t> branch_begin;  // one more than there are branches
   std::vector<Descriptor> centroids;
   std::vector<std::uint32_t> parent;
   std::vector<float> marginal, given_parent_absent, given_parent_present;
   std::vector<std::vector<std::uint32_t>> sample_places;
 };
 
-// The same, in place: views into the bytes.
+// The same as views of the bytes.
 struct VocabularyTables {
   std::string_view source;
   std::span<const Descriptor> branches;
@@ -66,8 +66,8 @@ struct VocabularyTables {
 
 Bytes encode_vocabulary(const VocabularyModel& model);
 
-// `bytes` must begin at a multiple of 4 and outlive the tables. CORRUPT (wrong magic, sizes, checksum, or a table that
-// no trainer writes), UNKNOWN_FORMAT_VERSION.
+// Checks the bytes of a file and returns its tables. `bytes` must begin at a multiple of 4 and outlive the tables.
+// CORRUPT (wrong magic, sizes or checksum, or a table that no trainer writes), UNKNOWN_FORMAT_VERSION.
 Result<VocabularyTables> parse_vocabulary(ByteSpan bytes);
 
 }  // namespace relmap::place

@@ -1,4 +1,4 @@
-// Any bytes as a vocabulary file, the checksum made right so that the tables behind it are reached.
+// Parses any bytes as a vocabulary file, with the checksum corrected so that the tables behind it are reached.
 #include <cstring>
 
 #include "proto/base/crc32c.h"
@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const auto vocabulary = relmap::place::Vocabulary::from_bytes(std::move(bytes));
   if (!vocabulary.ok()) return 0;
-  // What is accepted can be used.
+  // A vocabulary that is accepted must be usable.
   std::vector<relmap::AppearanceFeature> features(2);
   features[1].descriptor.fill(255);
   for (const std::uint32_t word : (*vocabulary)->words(features))

@@ -75,7 +75,7 @@ TEST_F(VocabularyFile, NamesWhatIsWrong) {
   EXPECT_EQ(Vocabulary::load(path_).reason(), Reason::UNKNOWN_FORMAT_VERSION);
 }
 
-TEST(VocabularyBytes, IdentityIsOfTheContent) {
+TEST(VocabularyBytes, TheChecksumIdentifiesTheContent) {
   const auto crc = [](std::uint64_t seed) { return random_vocabulary(10, 1, seed)->crc(); };
   EXPECT_EQ(crc(4), crc(4));
   EXPECT_NE(crc(4), crc(5));

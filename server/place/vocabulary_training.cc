@@ -10,10 +10,10 @@
 namespace relmap::place {
 namespace {
 
-// Every k-th of all descriptors, at most `most`.
+// Every k-th of all descriptors, at most `max_points` of them.
 std::vector<Descriptor> choose_points(std::span<const std::vector<Descriptor>> pictures, std::size_t total,
-                                      std::size_t most) {
-  const std::size_t step = std::max<std::size_t>(1, (total + most - 1) / most);
+                                      std::size_t max_points) {
+  const std::size_t step = std::max<std::size_t>(1, (total + max_points - 1) / max_points);
   std::vector<Descriptor> points;
   points.reserve(total / step + 1);
   std::size_t i = 0;
@@ -59,7 +59,7 @@ Result<VocabularyModel> train_vocabulary(std::span<const std::vector<Descriptor>
   model.branch_begin = std::move(tree.branch_begin);
   model.centroids = std::move(tree.centroids);
 
-  // Documents are made as maps and queries will make them.
+  // The words of documents are found in the way in which maps and queries find theirs.
   std::vector<std::vector<std::uint32_t>> documents;
   const WordSearch search(model.branches, model.branch_begin, model.centroids);
   for (const auto& picture : pictures) {

@@ -10,7 +10,7 @@
 namespace relmap::place {
 namespace {
 
-// Pictures of things: each thing shows its own few descriptors, a little changed.
+// Pictures of things, each of which has a few descriptors of its own that vary a little.
 std::vector<std::vector<Descriptor>> pictures_of_things(std::size_t pictures, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Descriptor> things(60);
@@ -44,7 +44,7 @@ TEST(TrainVocabulary, MakesAFileThatIsAccepted) {
   EXPECT_EQ((*vocabulary)->source(), "things");
   EXPECT_LE((*vocabulary)->size(), 60u);
   EXPECT_GT((*vocabulary)->size(), 40u);
-  // Marginals are the shares of pictures that show the word.
+  // A word's marginal is the share of pictures that show it.
   double mean = 0;
   for (const float p : (*vocabulary)->marginal()) mean += static_cast<double>(p) / (*vocabulary)->size();
   EXPECT_NEAR(mean, 1 - std::pow(59.0 / 60, 30), 0.1);
@@ -57,7 +57,7 @@ TEST(TrainVocabulary, IsDeterministic) {
   EXPECT_EQ(encode_vocabulary(*a), encode_vocabulary(*b));
 }
 
-TEST(TrainVocabulary, TellsHowFarItIs) {
+TEST(TrainVocabulary, ReportsItsProgress) {
   const auto pictures = pictures_of_things(50, 3);
   double last = 0;
   std::string stage;

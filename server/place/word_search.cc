@@ -7,7 +7,7 @@
 namespace relmap::place {
 namespace {
 
-// A descriptor as 16-bit numbers: the compiler makes multiply-adds of the products with bytes.
+// A descriptor as 16-bit numbers, for which the compiler makes multiply-adds of the products with bytes.
 using Wide = std::array<std::int16_t, kDescriptorBytes>;
 
 RELMAP_READS_DESCRIPTORS std::int32_t dot(const Wide& a, const Descriptor& b) {

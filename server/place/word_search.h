@@ -1,5 +1,5 @@
-// The nearest word of a descriptor, by two levels: the words lie sorted by branch, and only those of the nearest few
-// branches are looked at.
+// Finds the nearest word of a descriptor in two levels: words are sorted by branch, and only those of the nearest
+// branches are searched.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,20 @@
 
 namespace relmap::place {
 
-// Of the branches: 99.6 % of the answers are those of an exhaustive search (docs/decisions/recognition.md).
+// With so many branches, 99.6 % of the answers are those of an exhaustive search (docs/decisions/recognition.md).
 inline constexpr std::size_t kBranchesSearched = 8;
 
-// Immutable and thread-safe. The tables are borrowed.
+// Immutable and thread-safe. The tables must outlive it.
 class WordSearch {
  public:
   WordSearch(std::span<const Descriptor> branches, std::span<const std::uint32_t> branch_begin,
              std::span<const Descriptor> centroids);
 
-  // Of equally near words, the lowest of the nearer branch.
+  // The nearest word; of equally near ones, the lowest of the nearest branch.
   std::uint32_t nearest(const Descriptor& descriptor) const;
 
  private:
-  // Centres in space with their squared lengths: |d - c|^2 orders them as |c|^2 - 2 d.c does, at half the price.
+  // Centres and their squared lengths: |c|^2 - 2 d.c has the same order as |d - c|^2 and costs half as much.
   struct Centres {
     std::span<const Descriptor> at;
     std::vector<std::int32_t> squared_length;

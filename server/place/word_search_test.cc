@@ -29,7 +29,7 @@ TEST(WordSearch, FindsWhatAnExhaustiveSearchFinds) {
   }
 }
 
-TEST(WordSearch, OfEquallyNearWordsTakesTheLowest) {
+TEST(WordSearch, TakesTheLowestOfEquallyNearWords) {
   std::vector<Descriptor> centroids(4);
   centroids[0].fill(200);
   for (std::size_t i = 1; i < 4; ++i) centroids[i].fill(10);
@@ -40,7 +40,7 @@ TEST(WordSearch, OfEquallyNearWordsTakesTheLowest) {
   EXPECT_EQ(WordSearch(branches, begin, centroids).nearest(query), 1u);
 }
 
-TEST(WordSearch, HoldsTheLargestDistancesThereAre) {
+TEST(WordSearch, DoesNotOverflowAtTheLargestDistances) {
   std::vector<Descriptor> centroids(2);
   centroids[0].fill(255);
   centroids[1].fill(0);

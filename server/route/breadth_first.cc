@@ -5,9 +5,9 @@
 namespace relmap::route {
 
 namespace {
-constexpr std::size_t kBytesPerNode =
-    192;  // of the tree, at most: the node, its hash entry, what growing leaves unused
-}
+// Memory of a node of the tree, at most: the node, its hash entry, and unused capacity.
+constexpr std::size_t kBytesPerNode = 192;
+}  // namespace
 
 Result<storage::PathTree> search_breadth_first(const storage::Graph& graph, FrameId root, const WorkLimit& work,
                                                const Visitor& visit) {

@@ -1,4 +1,4 @@
-// Where a way leads along edges on which the robot that drove them was carried (Edge::carried_by): a lift, a train.
+// Records where a path follows edges along which the robot was carried, as by a lift or a train (Edge::carried_by).
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,10 @@
 
 namespace relmap::route {
 
-// Frames of one session, in the order in which it drove; one after the other along its motion.
+// Consecutive frames of one session, in the order in which it drove.
 struct CarriedStretch {
   FrameId first, last;
-  std::vector<EdgeId> closures = {};  // that say so: ascending, at most kMaxNamed
+  std::vector<EdgeId> closures = {};  // the closures that show it: ascending, at most kMaxNamed
 
   static constexpr std::size_t kMaxNamed = 16;
   bool operator==(const CarriedStretch&) const = default;

@@ -37,7 +37,7 @@ class Carried : public testing::Test {
   DrawnMap map_;
 };
 
-TEST_F(Carried, ARouteSaysThroughWhichFramesItsRobotWasCarriedWhicheverWayItGoes) {
+TEST_F(Carried, ARouteListsCarriedStretchesInEitherDirection) {
   const CarriedStretch lift{map_.id('B'), map_.id('D'), {kFirst, kSecond}};
   EXPECT_THAT(on_route('A', 'E'), ElementsAre(lift));
   EXPECT_THAT(on_route('E', 'A'), ElementsAre(lift));
@@ -45,7 +45,7 @@ TEST_F(Carried, ARouteSaysThroughWhichFramesItsRobotWasCarriedWhicheverWayItGoes
   EXPECT_THAT(on_route('A', 'B'), IsEmpty());
 }
 
-TEST_F(Carried, EachStepSaysIt) {
+TEST_F(Carried, EachStepTellsWhetherTheRobotWasCarried) {
   const FrameId start[] = {map_.id('A')}, goal[] = {map_.id('E')};
   const Route route = find_route(map_, start, goal).or_throw();
   std::string carried;
@@ -54,14 +54,14 @@ TEST_F(Carried, EachStepSaysIt) {
   EXPECT_EQ(carried, "BC") << "on the way on from there";
 }
 
-TEST_F(Carried, ATransformSaysItToo) {
+TEST_F(Carried, ATransformListsCarriedStretches) {
   const CarriedStretch lift{map_.id('B'), map_.id('D'), {kFirst, kSecond}};
   EXPECT_THAT(transform_between(map_, map_.id('A'), map_.id('E')).or_throw().carried.list(), ElementsAre(lift));
   EXPECT_THAT(transform_between(map_, map_.id('E'), map_.id('A')).or_throw().carried.list(), ElementsAre(lift));
   EXPECT_THAT(transform_between(map_, map_.id('D'), map_.id('E')).or_throw().carried.list(), IsEmpty());
 }
 
-TEST_F(Carried, TwoRidesAreTwoStretchesInTheOrderOfTheWay) {
+TEST_F(Carried, TwoRidesAreTwoStretchesInTheOrderOfThePath) {
   map_.editable(map_.id('C')).edges.front().carried_by.clear();
   map_.editable(map_.id('B')).edges.front().carried_by = {kSecond};
   const CarriedStretch first{map_.id('A'), map_.id('B'), {kSecond}},
@@ -70,7 +70,7 @@ TEST_F(Carried, TwoRidesAreTwoStretchesInTheOrderOfTheWay) {
   EXPECT_THAT(on_route('E', 'A'), ElementsAre(last, first));
 }
 
-TEST(CarriedStretches, NamesNoMoreThanAnAnswerHolds) {
+TEST(CarriedStretches, KeepsNoMoreThanAnAnswerHolds) {
   CarriedStretches stretches;
   for (std::uint32_t i = 0; i < 1000; ++i) stretches.add({1, 10 * i}, {1, 10 * i + 1}, {{{1, i}, 1}});
   EXPECT_EQ(stretches.list().size(), CarriedStretches::kMax);

@@ -10,12 +10,12 @@ namespace relmap::route {
 
 namespace {
 
-// A way to a frame that is not settled yet. Ordered by cost, then by frame, then by age, so that ties are broken alike
-// in every run.
+// A path to a frame that is not settled yet. Ordered by cost, then by frame, then by age, so that ties are broken in
+// the same way in every run.
 struct Offer {
   double cost;
   FrameId frame;
-  EdgeId edge;  // by which it comes; invalid for a start
+  EdgeId edge;  // the last edge of the path; invalid for a start
   std::uint32_t age;
 
   bool operator>(const Offer& other) const {
@@ -24,7 +24,7 @@ struct Offer {
   }
 };
 
-// Distances are kept for the frontier only: a frame that is settled needs none.
+// Dijkstra's algorithm. Costs are kept for the frontier only, since settled frames need none.
 class Search {
  public:
   Search(const storage::Graph& graph, const RouteOptions& options, const WorkLimit& work)
@@ -47,7 +47,7 @@ class Search {
   const RouteOptions& options_;
   const WorkLimit& work_;
   Trail trail_;
-  std::vector<Offer> frontier_;  // a heap, the best first
+  std::vector<Offer> frontier_;  // a heap with the cheapest first
   std::uint32_t offers_ = 0;
   Passage passage_;
 };
@@ -109,7 +109,7 @@ Result<Route> Search::trace(FrameId goal) const {
       trail_.trace(graph_, goal, work_, [&](const storage::Edge& edge) { route.count(edge, options_.weights(edge)); });
   if (!path.ok()) return path.status();
   route.path = std::move(path).value();
-  route.carried.reverse();  // it was traced from its end
+  route.carried.reverse();  // the path was traced from its end
   route.unmeasured.reverse();
   return route;
 }

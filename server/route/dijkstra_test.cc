@@ -33,7 +33,7 @@ std::string route(const DrawnMap& map, std::string_view from, std::string_view t
 
 const RouteOptions kQuickest{.weights = kByTime};
 
-TEST(Route, FollowsTheDriveWhereThereIsNoOtherWay) {
+TEST(Route, FollowsTheDriveWhereThereIsNoOtherRoute) {
   DrawnMap map(R"(
     A---B---C
             |
@@ -77,7 +77,7 @@ TEST(Route, LeavesOutEdgesThatAreNotAcceptedOrDoNotCarry) {
 }
 
 TEST(Route, ShortestAndFastestMayDiffer) {
-  // The direct way is slow, the detour fast.
+  // The direct route is slow, the detour fast.
   DrawnMap map(R"(
     A-----B
     |     |
@@ -133,7 +133,7 @@ TEST(Route, ManyEndsGiveTheNearestPair) {
   EXPECT_EQ(route(map, "BE", "AF"), "BA");
 }
 
-TEST(Route, SaysWhichSessionsDoNotMeet) {
+TEST(Route, ARefusalNamesTheSessionsThatAreNotConnected) {
   DrawnMap map(R"(
     A---B   C---D   E---F
   )");
@@ -151,7 +151,7 @@ TEST(Route, SaysWhichSessionsDoNotMeet) {
       << found.status().message();
 }
 
-TEST(Route, LimitsOfCostAndWorkHaveReasonsOfTheirOwn) {
+TEST(Route, LimitsOfCostAndWorkHaveTheirOwnReasons) {
   DrawnMap map(R"(
     A---B---C---D---E
   )");
@@ -307,7 +307,7 @@ TEST(RouteFilter, LongLoopsAndWeakEdgesCanBeLeftOut) {
   EXPECT_EQ(route(map, "A", "D", filtered(filter)), "NOT_CONNECTED");
 }
 
-TEST(RouteFilter, WhatIfAClosureWereInForce) {
+TEST(RouteFilter, AClosureMayBeSupposedToBeInForce) {
   DrawnMap map(R"(
     A---B---C
     |       |
@@ -339,8 +339,8 @@ TEST(RouteFilter, WhatIfAClosureWereInForce) {
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "nobody knows how long it is";
 }
 
-// Two views of one place whose way round is too short for an edge of the graph.
-TEST(RouteFilter, ClosuresThatOnlyBindAreWaysWhereTheyAreAskedFor) {
+// Two views of one place that are too close along the graph for a loop edge.
+TEST(RouteFilter, ClosuresThatOnlyBindMayBeSupposedToBeEdges) {
   DrawnMap map(R"(
     A---B---C
     |       |
@@ -403,8 +403,8 @@ TEST(Route, WeightsAreNotNegativeAndNotAllZero) {
   EXPECT_EQ(route(map, "A", "B", {.weights = {2, 3, 0, 0}, .max_cost = 19}), "COST_LIMIT");
 }
 
-// The frames of the same route by a search that keeps all it ever knew: the first of the cheapest offers to a frame
-// counts, frames are settled by cost and then by id.
+// The frames of the same route by a reference search that keeps everything: the first of the cheapest offers to a frame
+// counts, and frames are settled by cost and then by id.
 std::vector<FrameId> route_by_the_book(const storage::Graph& graph, FrameId from, FrameId to) {
   struct Node {
     double cost;
@@ -432,7 +432,7 @@ std::vector<FrameId> route_by_the_book(const storage::Graph& graph, FrameId from
 }
 
 // A grid, where most pairs have many routes of the same length.
-TEST(Route, OfEquallyCheapRoutesAlwaysTheSameOneIsTaken) {
+TEST(Route, TheChoiceAmongEquallyCheapRoutesIsDeterministic) {
   std::mt19937 random(11);
   const std::string names = "ABCDEFGHIJKLMNOPQRSTUVWXYabcdefghijklmnopqrstuvwxy";
   for (int trial = 0; trial < 10; ++trial) {
@@ -459,17 +459,17 @@ TEST(Route, OfEquallyCheapRoutesAlwaysTheSameOneIsTaken) {
 TEST(Route, HoldsAFewBytesForEachFrame) {
   constexpr std::uint32_t kFrames = 200'000;
   const storage::EndlessDrive drive(kFrames);
-  std::size_t most = 0;
+  std::size_t max_bytes = 0;
   const WorkLimit work{.proceed = [&](std::size_t bytes) {
-    most = std::max(most, bytes);
+    max_bytes = std::max(max_bytes, bytes);
     return Status();
   }};
   const std::vector<FrameId> from{{1, kFrames - 1}}, to{{1, 0}};
   const Route route = find_route(drive, from, to, {}, work).or_throw();
   EXPECT_EQ(route.steps(), kFrames);
   EXPECT_EQ(route.distance_m, kFrames - 1);
-  EXPECT_GT(most, 2 * kFrames);
-  EXPECT_LT(most, 8 * kFrames);
+  EXPECT_GT(max_bytes, 2 * kFrames);
+  EXPECT_LT(max_bytes, 8 * kFrames);
   std::uint32_t expected = kFrames;
   for (RouteWalk walk(drive, route); const auto step = walk.next();) ASSERT_EQ(step->frame.index, --expected);
   EXPECT_EQ(expected, 0u);

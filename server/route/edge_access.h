@@ -1,4 +1,4 @@
-// The record of an edge that a search is about to walk, without copying it.
+// Access to the record of an edge that a search is about to walk, without a copy.
 #pragma once
 
 #include <memory>
@@ -7,7 +7,8 @@
 
 namespace relmap::route {
 
-// Keeps the frame that stores the edge alive.
+// A reference to an edge that keeps the frame that stores it alive. The constructors throw StatusError (DATA_LOSS) if
+// the edge is missing.
 class EdgeRef {
  public:
   // `near`: graph.hot() of the frame from which `step` starts.

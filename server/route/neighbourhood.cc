@@ -26,7 +26,7 @@ Result<Neighbourhood> neighbourhood(const storage::Graph& graph, FrameId root, c
   if (!tree.ok()) return tree.status();
   result.cut = tree->cut;
 
-  // Each edge is met once: from the frame that stores it.
+  // Each edge is listed once, by the frame that stores it.
   for (const NeighbourhoodFrame& member : result.frames) {
     const auto hot = graph.hot(member.frame);
     if (!hot) continue;

@@ -1,4 +1,4 @@
-// The part of the map around a frame, in that frame's coordinates.
+// Extracts the part of the map around a frame, in that frame's coordinates.
 #pragma once
 
 #include <limits>
@@ -19,16 +19,17 @@ struct NeighbourhoodFrame {
   SE3 T_root_frame;
   std::uint32_t depth = 0;             // edges from the root
   double distance_m = 0;               // along the path from the root
-  std::uint32_t unmeasured_steps = 0;  // on the path (is_unmeasured()): with any, T_root_frame is a guess
+  std::uint32_t unmeasured_steps = 0;  // unmeasured edges on the path (is_unmeasured()); with any, the pose is a guess
 };
 
 struct Neighbourhood {
   std::vector<NeighbourhoodFrame> frames;  // in the order of discovery, the root first
-  std::vector<EdgeId> edges;               // accepted and carrying, both ends inside; ascending
-  bool cut = false;                        // work.max_frames left frames out
+  std::vector<EdgeId> edges;               // edges of the graph with both ends inside, ascending
+  bool cut = false;                        // whether work.max_frames left frames out
 };
 
-// NO_SUCH_FRAME, and what work.proceed says. Throws StatusError where reads of the graph do.
+// Returns the frames and edges within `limits` of `root`, breadth-first. NO_SUCH_FRAME, and what work.proceed returns.
+// Throws StatusError where reads of the graph do.
 Result<Neighbourhood> neighbourhood(const storage::Graph& graph, FrameId root, const NeighbourhoodLimits& limits,
                                     const WorkLimit& work);
 

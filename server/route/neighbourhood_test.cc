@@ -50,12 +50,12 @@ TEST_F(NeighbourhoodTest, PosesAreInTheFrameOfTheRoot) {
 
 TEST_F(NeighbourhoodTest, EdgesAreThoseWithBothEndsInside) {
   EXPECT_EQ(around('A', {.edges = 1}).edges.size(), 2u);
-  EXPECT_EQ(around('A', {.edges = 30}).edges.size(), 7u);  // the one between D and E is on no path, but inside
+  EXPECT_EQ(around('A', {.edges = 30}).edges.size(), 7u);  // that between D and E is inside, though on no path
   map_.set_state(around('A', {.edges = 1}).edges[1], storage::EdgeState::kRemoved);
   EXPECT_EQ(around('A', {.edges = 30}).edges.size(), 6u);
 }
 
-TEST_F(NeighbourhoodTest, SaysWhenItWasCut) {
+TEST_F(NeighbourhoodTest, SaysWhetherItWasCut) {
   EXPECT_FALSE(around('A', {.edges = 2}).cut);
   EXPECT_TRUE(around('A', {.edges = 30}, 3).cut);
   EXPECT_EQ(around('A', {.edges = 30}, 3).frames.size(), 3u);

@@ -1,4 +1,4 @@
-// Which frames and edges a route may use.
+// Decides which frames and edges a route may use.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace relmap::route {
 
-// By default: all frames, and all edges of the graph.
+// What a route may use. By default these are all frames, and all edges of the graph.
 struct RouteFilter {
-  std::set<SessionNumber> sessions;  // whose frames may be passed; empty: all
-  std::unordered_set<FrameId> avoided;
-  std::uint32_t min_support = 0;  // of an edge in force: observations that use it
-  bool long_loops = true;         // loop edges longer than kLongLoopMetres, too
-  storage::Supposed supposed;
+  std::set<SessionNumber> sessions;     // sessions whose frames may be passed; empty means all
+  std::unordered_set<FrameId> avoided;  // frames that may not be passed
+  std::uint32_t min_support = 0;        // least support of an edge in force, in observations
+  bool long_loops = true;               // whether loop edges longer than kLongLoopMetres may be used
+  storage::Supposed supposed;           // closures that are taken to be edges, too
 
   bool refuses_nothing() const { return sessions.empty() && avoided.empty() && min_support == 0 && long_loops; }
   bool passes(FrameId frame) const {
@@ -29,17 +29,18 @@ struct RouteFilter {
   }
 };
 
-// Whether an edge may be travelled, asked in the course of one search. Odometry and prior edges of a `oneway` session
-// are travelled only as driven, a -> b; loop edges, which nobody drove, both ways.
+// Tells one search which frames and edges are open. Odometry and prior edges of a `oneway` session are open only in the
+// direction in which they were driven, a -> b; loop edges, which nobody drove, are open in both directions.
 class Passage {
  public:
   Passage(const storage::Graph& graph, const RouteFilter& filter) : graph_(graph), filter_(filter) {}
 
   bool open(FrameId frame);
-  // From Edge::a to Edge::b (forward), or back; the edge is one of the graph, or supposed to be.
+  // Whether the edge may be travelled from Edge::a to Edge::b (forward) or back, which includes the frame at its end.
+  // The edge must be in the graph or supposed to be.
   bool open(const storage::Edge& edge, bool forward);
 
-  // So far something was refused for its direction, or by the filter.
+  // Whether anything has been refused so far because of its direction, or by the filter.
   bool met_oneway() const { return met_oneway_; }
   bool met_filter() const { return met_filter_; }
 

@@ -26,7 +26,7 @@ const char* unit_of(const RouteWeights& weights) {
 
 Status check_weights(const RouteWeights& weights) {
   if (weights.valid()) return {};
-  return {Reason::INVALID_ARGUMENT, "weights are 0, or 1e-9 to 1e9, and not all 0"};
+  return {Reason::INVALID_ARGUMENT, "each weight must be 0 or between 1e-9 and 1e9, and not all may be 0"};
 }
 
 Status check_ends(std::span<const FrameId> from, std::span<const FrameId> to) {

@@ -1,4 +1,4 @@
-// Where a way leads along edges of one kind: stretches of frames, as many as an answer holds.
+// The stretches of a path that follow edges of one kind.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace relmap::route {
 
-// Of a way whose edges are met one after the other, from either end. A Stretch has frames `first` and `last` of one
-// session, in the order in which it drove.
+// Collects stretches of a path whose edges are added in order, from either end. A Stretch has the frames `first` and
+// `last` of one session, in the order in which it drove. At most kMax stretches are kept.
 template <typename Stretch>
 class Stretches {
  public:
@@ -20,7 +20,7 @@ class Stretches {
   const std::vector<Stretch>& list() const { return list_; }
 
  protected:
-  // The stretch that the edge from a to b goes on with, or begins; null: it would begin one too many.
+  // The stretch that the edge from a to b extends or begins; null if it would begin one too many.
   Stretch* extend(FrameId a, FrameId b) {
     if (!list_.empty() && list_.back().last == a) {
       list_.back().last = b;

@@ -1,6 +1,6 @@
-// What a search over a large part of the map remembers: for each frame that it settled, by which edge it came. One code
-// a frame, in arrays by chunk, so that a search through a million frames holds 3 MB; and the path that results, which
-// is two bytes a step, to be walked as often as somebody asks.
+// What a search over a large part of the map remembers: for each frame that it settled, the edge by which it was
+// reached. This is one code a frame, in arrays by chunk, so that a search through a million frames holds 3 MB. The
+// resulting path takes two bytes a step and can be walked any number of times.
 #pragma once
 
 #include <array>
@@ -18,9 +18,9 @@
 
 namespace relmap::route {
 
-// From `from` to `to`. turns[i], the last step first: which of its neighbours() the frame goes on to. It means what it
-// says on the graph on which it was found, with what was supposed then, which for a MapView is for as long as the view
-// is held.
+// A path from `from` to `to`. `turns` holds, last step first, the index of the next frame among the neighbours() of
+// each frame. The path is valid only for the graph on which it was found and with the same `supposed`; for a MapView,
+// that is as long as the view is held.
 struct Path {
   FrameId from, to;
   std::vector<std::uint16_t> turns;
@@ -34,20 +34,20 @@ class Trail {
   explicit Trail(storage::Supposed supposed = {}) : supposed_(supposed) {}
 
   bool contains(FrameId frame) const { return arrival(frame) != kNever; }
-  // `steps`: neighbours() of the frame; `edge`: by which it was reached, invalid for a start.
+  // `steps` are the neighbours() of the frame; `edge` is the one by which it was reached, invalid for a start.
   void settle(FrameId frame, const std::vector<storage::Neighbour>& steps, EdgeId edge);
 
   std::size_t frames() const { return frames_; }
   std::set<SessionNumber> sessions() const;
   std::size_t memory_bytes() const;
 
-  // The way back from a settled frame to its start, turned round. `visit` sees each edge, from the goal on. What
-  // work.proceed says ends it.
+  // Returns the path from the start to a settled frame. Calls `visit` with each edge, beginning at the goal. Ends early
+  // with what work.proceed returns.
   using Visitor = std::function<void(const storage::Edge& edge)>;
   Result<Path> trace(const storage::Graph& graph, FrameId goal, const WorkLimit& work, const Visitor& visit) const;
 
  private:
-  // Codes: never settled, a start, or 2 + place among the frame's own neighbours.
+  // Codes: never settled, a start, or 2 + the index of the previous frame among the frame's own neighbours.
   static constexpr std::uint16_t kNever = 0, kStart = 1, kFirst = 2;
   std::uint16_t arrival(FrameId frame) const;
 
@@ -59,16 +59,16 @@ class Trail {
 // Walks a path from its start. Throws StatusError where reads of the graph do.
 class PathWalk {
  public:
-  // Both must outlive it.
+  // Graph and path must outlive the walk.
   PathWalk(const storage::Graph& graph, const Path& path) : graph_(graph), path_(path), frame_(path.from) {}
 
   struct Step {
     FrameId frame;
     std::shared_ptr<const storage::FrameHot> hot;
-    std::optional<EdgeRef> edge;  // to the next frame; none at the last
+    std::optional<EdgeRef> edge;  // the edge to the next frame; none at the last
     bool forward = false;         // walked from Edge::a to Edge::b
   };
-  // nullopt after the last.
+  // The next step; nullopt after the last.
   std::optional<Step> next();
 
  private:

@@ -29,7 +29,7 @@ Transform compound(const storage::Graph& graph, const Path& path) {
 
 struct Offer {
   FrameId frame;
-  EdgeId edge;  // by which it comes
+  EdgeId edge;  // by which the frame is reached
 };
 
 }  // namespace

@@ -33,7 +33,7 @@ TEST(Transform, ToItselfIsCertain) {
   EXPECT_EQ(found->covariance, Matrix6::Zero());
 }
 
-// Against the definition: T_ab Exp(xi) is propagated through products and inverses numerically.
+// Compares with the definition: T_ab Exp(xi) is propagated numerically through products and inverses.
 TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
   DrawnMap map("A--B--C--D");
   map.drive("ABCD");
@@ -97,7 +97,7 @@ TEST(Transform, SaysWhetherItsCovarianceIsCompounded) {
   EXPECT_TRUE(compounded('A', 'D'));
 }
 
-TEST(Transform, TakesEdgesAsIndependentWhereWhatTheyHaveInCommonIsImpossible) {
+TEST(Transform, TakesEdgesAsIndependentWhereTheirCorrelationIsImpossible) {
   DrawnMap map("A--B--C--D");
   map.drive("ABCD");
   for (const char name : {'B', 'C', 'D'}) map.editable(map.id(name)).edges[0].T_ab = SE3();
@@ -107,7 +107,7 @@ TEST(Transform, TakesEdgesAsIndependentWhereWhatTheyHaveInCommonIsImpossible) {
   EXPECT_EQ(transform_between(map, map.id('A'), map.id('D'))->covariance, independent);
 }
 
-TEST(Transform, HasReasonsForFarAndForNever) {
+TEST(Transform, TellsOutOfReachFromNotConnected) {
   DrawnMap map("A-B-C-D-E   F-G");
   map.drive("ABCDE");
   map.drive("FG");

@@ -1,5 +1,4 @@
-// Where a way leads along edges that nothing measured (is_unmeasured()): how long it is there, and where it leads, are
-// guesses.
+// Records where a path follows edges that no sensor measured (is_unmeasured()): there, length and course are guesses.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +7,7 @@
 
 namespace relmap::route {
 
-// Frames of one session, in the order in which it drove; one after the other along its motion.
+// Consecutive frames of one session, in the order in which it drove.
 struct UnmeasuredStretch {
   FrameId first, last;
   std::uint32_t steps = 0;
@@ -19,9 +18,9 @@ struct UnmeasuredStretch {
 
 class UnmeasuredStretches : public Stretches<UnmeasuredStretch> {
  public:
-  // Of any edge of the way.
+  // Adds an edge of the path, of any kind.
   void add(const storage::Edge& edge);
-  // Of all stretches, those that are one too many for list(), too.
+  // Totals over all stretches, including those for which list() has no room.
   std::uint32_t steps() const { return steps_; }
   double distance_m() const { return distance_m_; }
 

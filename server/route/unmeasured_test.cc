@@ -38,7 +38,7 @@ class Unmeasured : public testing::Test {
   DrawnMap map_;
 };
 
-TEST_F(Unmeasured, ARouteSaysWhereItIsAGuessWhicheverWayItGoes) {
+TEST_F(Unmeasured, ARouteListsUnmeasuredStretchesInEitherDirection) {
   const UnmeasuredStretch dark{map_.id('B'), map_.id('D'), 2, 4};
   EXPECT_THAT(on_route('A', 'E').list(), ElementsAre(dark));
   EXPECT_THAT(on_route('E', 'A').list(), ElementsAre(dark));
@@ -54,7 +54,7 @@ TEST_F(Unmeasured, LandmarksSeenFromBothSidesMeasureAStep) {
   EXPECT_THAT(on_route('A', 'E').list(), ElementsAre(UnmeasuredStretch{map_.id('C'), map_.id('D'), 1, 2}));
 }
 
-TEST_F(Unmeasured, EachStepSaysIt) {
+TEST_F(Unmeasured, EachStepTellsWhetherItIsUnmeasured) {
   const FrameId start[] = {map_.id('A')}, goal[] = {map_.id('E')};
   const Route route = find_route(map_, start, goal).or_throw();
   std::string guessed;
@@ -63,7 +63,7 @@ TEST_F(Unmeasured, EachStepSaysIt) {
   EXPECT_EQ(guessed, "BC") << "on the way on from there";
 }
 
-TEST_F(Unmeasured, ATransformSaysItToo) {
+TEST_F(Unmeasured, ATransformListsUnmeasuredStretches) {
   const UnmeasuredStretch dark{map_.id('B'), map_.id('D'), 2, 4};
   for (const auto& [a, b] : {std::pair{'A', 'E'}, {'E', 'A'}}) {
     const Transform found = transform_between(map_, map_.id(a), map_.id(b)).or_throw();
@@ -73,7 +73,7 @@ TEST_F(Unmeasured, ATransformSaysItToo) {
   EXPECT_EQ(transform_between(map_, map_.id('D'), map_.id('E')).or_throw().unmeasured.steps(), 0u);
 }
 
-TEST_F(Unmeasured, ANeighbourhoodSaysItOfEachFrame) {
+TEST_F(Unmeasured, ANeighbourhoodCountsUnmeasuredStepsOfEachFrame) {
   std::string steps;
   const Neighbourhood around = neighbourhood(map_, map_.id('A'), {}, {}).or_throw();
   for (const NeighbourhoodFrame& frame : around.frames)
@@ -81,7 +81,7 @@ TEST_F(Unmeasured, ANeighbourhoodSaysItOfEachFrame) {
   EXPECT_EQ(steps, "A0B0C1D2E2");
 }
 
-TEST(UnmeasuredStretches, CountsThoseThatAreTooManyToBeNamed) {
+TEST(UnmeasuredStretches, CountsStretchesForWhichTheListHasNoRoom) {
   UnmeasuredStretches stretches;
   storage::Edge gap;
   gap.kind = storage::EdgeKind::kPrior;

@@ -1,4 +1,4 @@
-// How far a search may go: every search over the map ends, whatever the size of the map.
+// The limit of a search, which makes every search over the map end, whatever the size of the map.
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,10 @@
 namespace relmap::route {
 
 struct WorkLimit {
-  // Frames that a search may touch before it answers OUT_OF_REACH.
+  // Frames that a search may touch before it ends with OUT_OF_REACH.
   std::size_t max_frames = 10'000'000;
-  // Asked every kWorkStride frames with the bytes that the search holds; a status that is not ok (DEADLINE,
-  // BUDGET_EXCEEDED, SHUTTING_DOWN) ends the search with it.
+  // Called every kWorkStride frames with the number of bytes that the search holds. A status that is not ok (DEADLINE,
+  // BUDGET_EXCEEDED, SHUTTING_DOWN) ends the search with that status.
   std::function<Status(std::size_t bytes)> proceed;
 };
 inline constexpr std::size_t kWorkStride = 128;

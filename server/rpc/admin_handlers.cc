@@ -32,7 +32,7 @@ v1::Progress progress_of(const std::string& step, std::uint64_t done, std::uint6
   return progress;
 }
 
-// Bytes that the engine has worked through, told to the stream.
+// Shows the engine's progress, in bytes, to the stream.
 storage::EngineProgress engine_progress(JobStream<v1::Progress>& stream, const std::string& step) {
   return [&stream, step](std::uint64_t done, std::uint64_t total) {
     stream.show(progress_of(step, done, total, "bytes"));
@@ -48,7 +48,7 @@ v1::Finding finding_message(const storage::Finding& finding) {
   return message;
 }
 
-// What verification says, gathered into messages.
+// Collects the findings of a verification into messages.
 class VerifyReport {
  public:
   explicit VerifyReport(JobStream<v1::VerifyReply>& stream) : stream_(stream) {}
@@ -151,11 +151,11 @@ Result<Producer<v1::Progress>> backup(const v1::BackupRequest& request, const De
                                       MaintenanceTurn& maintenance) {
   const std::string folder = request.folder();
   if (!std::filesystem::path(folder).is_absolute())
-    return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is no absolute path on the daemon's machine");
+    return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is not an absolute path on the daemon's machine");
   return start<v1::Progress>(
       maintenance, "Admin.Backup", deadline, [&mapper, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
         storage::Engine& engine = mapper.engine();
-        (void)mapper.commit(deadline.at);  // if it fails, the journal has what the map has not
+        (void)mapper.commit(deadline.at);  // if it fails, the backup has the rest in its journal
         const std::uint64_t durable = engine.last_journal_sequence();
         if (Status made = engine.checkpoint(folder, engine_progress(stream, "backing up")); !made.ok()) return made;
         const std::uint64_t bytes = bytes_in(folder);

@@ -44,7 +44,7 @@ TEST_F(AdminHandlers, VerifyReadsAllOfASoundMap) {
   EXPECT_EQ(map_.mapper->budget().used(storage::Share::kReplies), 0u);
 }
 
-TEST_F(AdminHandlers, VerifyOfASessionThatIsNotThereIsRefused) {
+TEST_F(AdminHandlers, VerifyOfAnUnknownSessionIsRefused) {
   v1::VerifyRequest request;
   request.add_sessions(7);
   EXPECT_EQ(call(*map_.core, verify_request, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
@@ -63,7 +63,7 @@ TEST_F(AdminHandlers, LongWorkEndsWithItsCaller) {
   EXPECT_EQ(end.reason(), Reason::DEADLINE);
 }
 
-TEST_F(AdminHandlers, OneLongWorkAtATime) {
+TEST_F(AdminHandlers, LongWorkRunsOneAtATime) {
   const auto held = map_.core->maintenance.take("Admin.Compact");
   const auto refused = call(*map_.core, verify_request, {}, deadline_);
   EXPECT_EQ(refused.reason(), Reason::BUDGET_EXCEEDED);
@@ -82,7 +82,7 @@ TEST_F(AdminHandlers, ReindexSaysWhatToDoInstead) {
   EXPECT_THAT(refused.status().message(), HasSubstr("relmap-admin reindex /data"));
 }
 
-TEST_F(AdminHandlers, BackupNeedsAnAbsolutePathAndAnEngineThatCan) {
+TEST_F(AdminHandlers, BackupNeedsAnAbsolutePathAndAnEngineThatSupportsIt) {
   v1::BackupRequest request;
   request.set_folder("copy");
   EXPECT_EQ(call(*map_.core, backup, request, deadline_).reason(), Reason::INVALID_ARGUMENT);

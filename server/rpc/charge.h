@@ -1,4 +1,4 @@
-// Bytes of the budget that one call holds until it ends.
+// The bytes that one call charges to the budget until it ends.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ class Charge {
   Charge& operator=(const Charge&) = delete;
   ~Charge() { budget_->release(share_, bytes_); }
 
-  // Raises the charge to `bytes`; BUDGET_EXCEEDED if the share or the whole does not allow it.
+  // Raises the charge to `bytes`; BUDGET_EXCEEDED if the share or the whole budget does not allow it.
   Status grow_to(std::size_t bytes) {
     if (bytes <= bytes_) return {};
     if (!budget_->try_charge(share_, bytes - bytes_))

@@ -1,4 +1,4 @@
-// What an operator does to loop closures: SetEdgeState and ProposeEdge.
+// An operator's edits of loop closures: SetEdgeState and ProposeEdge.
 #include <algorithm>
 
 #include "proto/wire/convert.h"
@@ -17,7 +17,7 @@ namespace relmap::rpc {
 
 namespace {
 
-// Edits of a view that nobody else sees, and what they would change.
+// Applies edits to a draft that nobody else sees, to find what they would change.
 class DryRun {
  public:
   DryRun(storage::Budget& budget, const RpcLimits& limits, const storage::MapView& view, const Deadline& deadline)
@@ -36,7 +36,7 @@ class DryRun {
     return map::closure_between(recorder_, record.query, record.match)->id;
   }
 
-  // Before the edit.
+  // Must be called before the edit.
   std::uint64_t removal(EdgeId id) const {
     return storage::find_edge(recorder_, id) ? map::removal_mark(recorder_, id) : 0;
   }
@@ -59,12 +59,12 @@ void add_effect(EdgeId edited, const std::vector<map::EdgeChange>& changes, v1::
       *reply.add_also_changed() = to_wire(change.id);
 }
 
-// Between the check of a request and its turn in the journal the map may have changed.
+// The refusal of an edit because the map changed between its check and its turn in the journal.
 Status overtaken() {
   return {Reason::WRONG_STATE, "the map has changed meanwhile, and the edit changed nothing: ask again"};
 }
 
-// The closure that a record proposed, or put into force, between these two frames or frames beside them.
+// The closure between these two frames, or frames beside them, that the record with this sequence proposed or accepted.
 std::optional<storage::Edge> edited_near(const storage::Graph& graph, FrameId a, FrameId b, std::uint64_t sequence) {
   const auto is_it = [&](const storage::Edge& edge) {
     return std::any_of(edge.history.begin(), edge.history.end(), [&](const storage::EdgeEvent& event) {
@@ -137,7 +137,7 @@ Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& requ
   record.shown = request.shown();
   const bool removes_all = *state == storage::EdgeState::kRemoved && !record.alone;
   if (record.shown != 0 && !removes_all)
-    return {Reason::INVALID_ARGUMENT, "shown goes with the removal of a closure and all that agree with it only"};
+    return {Reason::INVALID_ARGUMENT, "shown is only allowed in the removal of a closure and all that agree with it"};
 
   v1::SetEdgeStateReply reply;
   if (request.dry_run()) {

@@ -17,7 +17,7 @@ map::MapperOptions without_lookup() {
   return options;
 }
 
-// Nothing is recognised by itself: there are the closures that a test proposes.
+// Recognition is off: the only closures are those that a test proposes.
 class ClosureHandlers : public testing::Test {
  protected:
   static v1::ProposeEdgeRequest between(FrameId a, FrameId b, bool dry_run = false) {
@@ -37,7 +37,7 @@ class ClosureHandlers : public testing::Test {
   Result<v1::ProposeEdgeReply> propose(const v1::ProposeEdgeRequest& request) {
     return call(*map_.core, propose_edge, request, deadline_);
   }
-  // A dry run first: it tells what is done then, and changes nothing.
+  // First makes a dry run, which must report the same changes and change nothing.
   v1::SetEdgeStateReply set(v1::SetEdgeStateRequest request) {
     EXPECT_TRUE(map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50)).ok());
     const std::uint64_t version = map_.mapper->view()->version();
@@ -61,7 +61,7 @@ class ClosureHandlers : public testing::Test {
 
 constexpr FrameId kEarly{1, 4}, kLate{1, 44};  // one lap apart
 
-TEST_F(ClosureHandlers, WhatGeometryFindsBetweenTwoFramesIsProposedAndJudged) {
+TEST_F(ClosureHandlers, AClosureFoundByGeometryIsProposedAndJudged) {
   const auto dry = propose(between(kLate, kEarly, true)).or_throw();
   const std::uint64_t before = sequence();
   EXPECT_EQ(dry.journal_sequence(), 0u);
@@ -115,7 +115,7 @@ TEST_F(ClosureHandlers, AProposalMayBePutIntoForceAtOnce) {
   EXPECT_EQ(propose(request).or_throw().journal_sequence(), done.journal_sequence());
 }
 
-TEST_F(ClosureHandlers, WhyThereIsNoProposalIsSaidByName) {
+TEST_F(ClosureHandlers, ARefusedProposalNamesItsReason) {
   const Status elsewhere = propose(between({1, 10}, ServedMap::kUnconnected)).status();
   EXPECT_EQ(elsewhere.reason(), Reason::TOO_FEW_INLIERS);
   EXPECT_THAT(elsewhere.message(), HasSubstr("2:3 at 1:10: "));
@@ -131,7 +131,7 @@ TEST_F(ClosureHandlers, WhyThereIsNoProposalIsSaidByName) {
   EXPECT_EQ(propose(long_note).reason(), Reason::INVALID_ARGUMENT);
 }
 
-TEST_F(ClosureHandlers, EachEditTellsWhatItChangesAndCanBeUndone) {
+TEST_F(ClosureHandlers, EachEditReportsItsChangesAndCanBeUndone) {
   const auto id = propose(between(kEarly, kLate)).or_throw().edge().id();
   const auto accepted = set(edit(id, v1::EDGE_STATE_ACCEPTED, true));
   EXPECT_EQ(accepted.edge().reason(), v1::REASON_ACCEPTED_BY_OPERATOR);
@@ -155,7 +155,7 @@ TEST_F(ClosureHandlers, EachEditTellsWhatItChangesAndCanBeUndone) {
             Reason::UNSUPPORTED);
 }
 
-// Between what a dry run showed and the removal a closure more came into force.
+// Another closure comes into force between the dry run and the removal.
 TEST_F(ClosureHandlers, ARemovalIsBoundToWhatItsDryRunShowed) {
   const auto id = propose(between(kEarly, kLate)).or_throw().edge().id();
   ASSERT_EQ(propose(between({1, 6}, {1, 46})).or_throw().edge().state(), v1::EDGE_STATE_ACCEPTED);

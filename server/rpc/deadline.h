@@ -1,4 +1,4 @@
-// Until when, and whether at all, a caller still wants its answer.
+// The deadline of a call, and whether its caller still waits.
 #pragma once
 
 #include <chrono>
@@ -10,9 +10,9 @@ namespace relmap::rpc {
 
 struct Deadline {
   std::chrono::steady_clock::time_point at = std::chrono::steady_clock::time_point::max();
-  std::function<Status()> interrupted;  // not ok: the caller has gone, or the daemon stops; empty: never
+  std::function<Status()> interrupted;  // not ok if the caller has gone or the daemon stops; may be empty
 
-  // DEADLINE once it has passed, or what `interrupted` says.
+  // DEADLINE once the deadline has passed, or what `interrupted` returns.
   Status check() const {
     if (interrupted)
       if (Status status = interrupted(); !status.ok()) return status;

@@ -1,4 +1,4 @@
-// What an edit changes, as relmap.v1 messages. Internal to server/rpc: shows generated code.
+// The changes of an edit, as relmap.v1 messages. Internal to server/rpc, since it exposes generated code.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@ namespace relmap::rpc {
 v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);
 v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 
-// What two edits, one after the other, changed together.
+// The combined changes of two successive edits.
 std::vector<map::EdgeChange> combined(std::vector<map::EdgeChange> first, const std::vector<map::EdgeChange>& second);
 
 }  // namespace relmap::rpc

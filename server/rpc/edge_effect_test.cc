@@ -61,7 +61,7 @@ TEST(EditEffect, NamesTheStretchesAlongWhichTheRobotCountsAsCarried) {
   EXPECT_EQ(message.not_carried(0).first().index(), 29u);
 }
 
-TEST(EditEffect, OfTwoEditsIsFromBeforeTheFirstToAfterTheSecond) {
+TEST(EditEffect, CombinesTwoEditsFromBeforeTheFirstToAfterTheSecond) {
   const auto both = combined({change(kOther, kDecided, kLone), change(kClosure, std::nullopt, kLone)},
                              {change(kOther, kLone, kDecided), change(kClosure, kLone, kDecided)});
   ASSERT_EQ(both.size(), 1u) << "the other is what it was";
@@ -70,7 +70,7 @@ TEST(EditEffect, OfTwoEditsIsFromBeforeTheFirstToAfterTheSecond) {
   EXPECT_EQ(both[0].after->state, storage::EdgeState::kAccepted);
 }
 
-TEST(EdgeMessage, TellsHowFarThePlaceStandsOutAndWhoCarriedTheRobot) {
+TEST(EdgeMessage, HoldsUniquenessAndCarryingClosures) {
   storage::Edge edge;
   EXPECT_FALSE(edge_message(edge).has_uniqueness()) << "it is not known";
   edge.uniqueness.known = true;

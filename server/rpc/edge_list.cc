@@ -33,14 +33,14 @@ class Walk {
  private:
   static constexpr std::size_t kBytesPerOther = 64;
 
-  // The frames of a mono session are not joined.
+  // Frames of mono sessions have no edges.
   static bool has_edges(const storage::Session& session) {
     return session.frames > 0 && session.header.camera.is_stereo();
   }
 
   static Span one(FrameId id) { return {id.session, id.index, id.index}; }
 
-  // The frames that store an edge of this one.
+  // The frames that store the edges of this frame.
   std::vector<Span> around(FrameId id) const {
     std::set<FrameId> frames{id};
     if (const auto hot = graph_.hot(id))
@@ -50,7 +50,7 @@ class Walk {
     return spans;
   }
 
-  // The session, and the frames of others that closed a loop with it.
+  // Lists the edges of a session, including those that frames of other sessions store.
   Status run_session(SessionNumber number) {
     const auto session = graph_.session(number);
     if (!session || !has_edges(*session)) return {};
@@ -83,7 +83,7 @@ class Walk {
     return {};
   }
 
-  // From `start`, which exists, to the end of the span.
+  // Visits the frames from `start`, which must exist, to the end of the span.
   template <typename Visit>
   Status each_frame(const Span& span, FrameId start, const bool& going_on, Visit visit) {
     for (FrameId id = start; going_on;) {
@@ -93,7 +93,7 @@ class Walk {
       visit(*hot);
       if (id.index >= span.last) break;
       const auto next = storage::next_in_session(id, *hot);
-      if (!next) return {Reason::DATA_LOSS, "nothing leads on from frame " + id.to_string()};
+      if (!next) return {Reason::DATA_LOSS, "no edge leads on from frame " + id.to_string()};
       id = *next;
     }
     return {};

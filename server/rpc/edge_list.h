@@ -1,4 +1,4 @@
-// All edges and closures of the map, or those that a caller wants, in increasing id.
+// Lists the edges and closures of the map, or those that match a filter, in order of their ids.
 #pragma once
 
 #include <functional>
@@ -13,8 +13,8 @@ namespace relmap::rpc {
 struct EdgeFilter {
   std::set<storage::EdgeState> states;   // empty: all
   std::set<storage::EdgeKind> kinds;     // empty: all
-  std::optional<SessionNumber> session;  // with an end in it
-  std::optional<FrameId> frame;          // with it as an end
+  std::optional<SessionNumber> session;  // edges with an end in this session
+  std::optional<FrameId> frame;          // edges with this frame as an end
 
   bool matches(const storage::Edge& edge) const {
     return (states.empty() || states.contains(edge.state)) && (kinds.empty() || kinds.contains(edge.kind)) &&
@@ -23,8 +23,8 @@ struct EdgeFilter {
   }
 };
 
-// Calls `visit` with the edges that match and are greater than `after`, ascending, until it returns false. `after`, if
-// valid, is an edge of the map. DATA_LOSS, and what work.proceed says.
+// Calls `visit` with the matching edges behind `after`, ascending by id, until it returns false. `after` is an edge of
+// the map, or invalid to begin with the first. DATA_LOSS, and what work.proceed returns.
 Status for_each_edge(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const route::WorkLimit& work,
                      const std::function<bool(const storage::Edge&)>& visit);
 

@@ -15,14 +15,14 @@ namespace relmap::rpc {
 namespace {
 
 constexpr std::size_t kMaxLabelsPerFrame = 64;
-constexpr std::chrono::milliseconds kLookEach{100};  // at how far a deletion has come
+constexpr std::chrono::milliseconds kLookEach{100};  // between looks at the progress of a deletion
 
 }  // namespace
 
 Result<v1::SetLabelReply> set_label(const v1::SetLabelRequest& request, const Deadline& deadline, map::Mapper& mapper,
                                     EditLog& edits) {
   const Status named = check_name("label", request.label());
-  if (!named.ok() && !request.remove()) return named;  // what was a name once can be taken off
+  if (!named.ok() && !request.remove()) return named;  // labels that were valid once can still be removed
   const auto frame = existing_frame(*mapper.view(), request.has_frame(), request.frame(), "frame");
   if (!frame.ok()) return frame.status();
   std::uint64_t sequence = 0;
@@ -33,7 +33,8 @@ Result<v1::SetLabelReply> set_label(const v1::SetLabelRequest& request, const De
         const auto hot = map->hot(*frame);
         if (!hot) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
         if (map::is_going(*map, *frame))
-          return {Reason::SESSION_DELETED, frame->to_string() + " goes with session " + std::to_string(frame->session)};
+          return {Reason::SESSION_DELETED,
+                  frame->to_string() + " is being deleted with session " + std::to_string(frame->session)};
         const bool present = std::find(hot->labels.begin(), hot->labels.end(), request.label()) != hot->labels.end();
         if (request.remove() && !present && !named.ok()) return named;
         if (request.remove() && !present)

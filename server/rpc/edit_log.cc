@@ -8,7 +8,7 @@ Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& c
     return {Reason::INVALID_ARGUMENT,
             "idempotency key of " + std::to_string(key.size()) + " bytes; at most " + std::to_string(kMaxKeyBytes)};
   const std::unique_lock lock(mutex_, deadline.at);
-  if (!lock.owns_lock()) return {Reason::DEADLINE, "another edit is being made"};
+  if (!lock.owns_lock()) return {Reason::DEADLINE, "another edit is still running"};
   const std::size_t hash = std::hash<std::string>()(content);
   if (!key.empty()) {
     const auto found = done_.find(key);

@@ -1,4 +1,4 @@
-// Edits by their idempotency keys: the same edit with the same key is done once, however often it is sent.
+// Makes edits idempotent by their keys: an edit that is sent again with the same key is done only once.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,9 @@ class EditLog {
   static constexpr std::size_t kKept = 4096;
   static constexpr std::size_t kMaxKeyBytes = 128;
 
-  // Runs `edit`, which answers with its journal sequence, unless an edit with this key was done: then gives that one's.
-  // Edits run one at a time. INVALID_ARGUMENT: the key is too long, or was used for another `content`; DEADLINE.
+  // Runs `edit`, which returns its journal sequence, unless an edit with this key was done already; then returns that
+  // one's sequence. Edits run one at a time. INVALID_ARGUMENT if the key is too long or was used for another `content`;
+  // DEADLINE.
   Result<std::uint64_t> once(const std::string& key, const std::string& content, const Deadline& deadline,
                              const std::function<Result<std::uint64_t>()>& edit);
 

@@ -1,4 +1,4 @@
-// How a Reason travels: as gRPC's nearest status code, with relmap.v1.Error in grpc-status-details-bin.
+// Maps a Reason to the closest gRPC status code, with a relmap.v1.Error in grpc-status-details-bin.
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -11,7 +11,7 @@ namespace relmap::rpc {
 
 grpc::StatusCode status_code(Reason reason);
 
-// `request_id` is what the log calls the call.
+// `request_id` identifies the call in the log.
 grpc::Status to_grpc(const Status& status, const std::string& request_id);
 
 }  // namespace relmap::rpc

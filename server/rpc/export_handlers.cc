@@ -14,17 +14,17 @@ namespace relmap::rpc {
 
 namespace {
 
-constexpr std::size_t kFramesPerMessage = 2000;  // of about 100 bytes
+constexpr std::size_t kFramesPerMessage = 2000;  // of about 100 bytes each
 constexpr std::size_t kCheckStride = 256;
 
-// Where a stream broke: in this session so many frames had been sent. Written like a frame id.
+// Where a stream broke: the session, and how many of its frames had been sent. Written like a frame id.
 struct Position {
   SessionNumber session = 0;
   std::uint32_t frames = 0;
 };
 
 struct ExportContents {
-  std::optional<TrajectoryFormat> file;  // none: frames
+  std::optional<TrajectoryFormat> file;  // nullopt for frames
   bool landmarks = false;
 };
 
@@ -40,12 +40,12 @@ class ExportStream {
     for (const storage::Session& session : sessions_) total_ += session.frames;
   }
 
-  // Leaves out what had been sent; the chain is followed all the same. INVALID_ARGUMENT.
+  // Skips what has been sent; the chain of poses is still followed from the start. INVALID_ARGUMENT.
   Status skip_to(Position position) {
     while (current_ < sessions_.size() && sessions_[current_].number != position.session)
       done_ += sessions_[current_++].frames;
     if (current_ == sessions_.size())
-      return {Reason::INVALID_ARGUMENT, "the resume token is of another choice of sessions"};
+      return {Reason::INVALID_ARGUMENT, "the resume token is of an export of other sessions"};
     open();
     header_sent_ = position.frames > 0;
     for (std::uint32_t i = 0; i < position.frames; ++i) {
@@ -84,7 +84,7 @@ class ExportStream {
     return pose;
   }
 
-  // False: nothing is left of this session.
+  // Fills a message; false if nothing is left of this session.
   Result<bool> fill(v1::ExportReply& reply) {
     const storage::Session& session = sessions_[current_];
     if (!header_sent_ && contents_.file) reply.set_data(trajectory_header(*contents_.file, session));
@@ -104,7 +104,7 @@ class ExportStream {
     return true;
   }
 
-  // Both return how many bytes they added, about.
+  // Both return approximately how many bytes they added.
   std::size_t add_line(const TrajectoryPose& pose, v1::ExportReply& reply) const {
     const std::string line = trajectory_line(*contents_.file, pose);
     reply.mutable_data()->append(line);
@@ -137,7 +137,7 @@ class ExportStream {
   std::size_t current_ = 0;
   std::optional<TrajectoryReader> reader_;
   bool header_sent_ = false;
-  std::uint32_t frames_ = 0;  // taken from the current session
+  std::uint32_t frames_ = 0;  // frames taken from the current session
   std::uint64_t done_ = 0, total_ = 0;
 };
 
@@ -159,7 +159,7 @@ Result<std::vector<storage::Session>> chosen_sessions(const storage::MapView& vi
     if (storage::is_deleted(*session))
       return {Reason::SESSION_DELETED, "session " + std::to_string(number) + " was deleted"};
     if (!session->header.camera.is_stereo())
-      return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is of one camera: it has no trajectory"};
+      return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is a mono session and has no trajectory"};
     sessions.push_back(*std::move(session));
   }
   return sessions;

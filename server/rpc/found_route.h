@@ -1,4 +1,4 @@
-// A route that is being streamed: kept for as long as its stream may be resumed.
+// A route that is being streamed; it is kept as long as its stream may be resumed.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,10 @@ namespace relmap::rpc {
 struct FoundRoute {
   FoundRoute(storage::Budget& budget, std::uint64_t n) : number(n), charge(budget, storage::Share::kReplies) {}
 
-  const std::uint64_t number;  // of this run of the daemon
+  const std::uint64_t number;  // counts the routes of this run of the daemon
   std::shared_ptr<const storage::MapView> view;
   route::RouteAnswer answer;
-  std::uint32_t fingerprint = 0;  // of the request, its ends apart
+  std::uint32_t fingerprint = 0;  // of the request without its ends
   std::uint32_t ends_fingerprint = 0;
   Charge charge;
 };

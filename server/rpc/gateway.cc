@@ -15,11 +15,12 @@ namespace relmap::rpc {
 
 namespace {
 
-// Held for every call while it runs: messages, view, working memory of a small question. Searches charge their own.
+// Memory charged for every call while it runs: messages, view, working memory of a small question. Searches charge
+// theirs separately.
 constexpr std::size_t kBytesPerCall = 64 * 1024;
 constexpr std::size_t kMaxRequestId = 64;
 
-// The caller's own id for the call if it is fit for a log line, else a random one.
+// The caller's id for the call if it is fit for a log line, or else a random one.
 std::string choose_request_id(const grpc::CallbackServerContext& context) {
   const auto given = context.client_metadata().find("x-request-id");
   if (given != context.client_metadata().end()) {
@@ -31,15 +32,15 @@ std::string choose_request_id(const grpc::CallbackServerContext& context) {
   return hex(std::uint64_t{random()});
 }
 
-// Without TLS nobody can be told from anybody: whoever reaches the port, which is loopback unless --insecure says
-// otherwise, is operator.
+// Without TLS callers cannot be told apart: everybody who reaches the port, which is loopback unless --insecure is
+// given, is an operator.
 Identity identify(const grpc::CallbackServerContext&) { return {"anonymous", Role::kOperator}; }
 
 std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerContext& context, double default_s) {
   const auto now = std::chrono::steady_clock::now();
   const auto left = context.deadline() - std::chrono::system_clock::now();
-  const auto longest = std::chrono::hours(24);
-  if (left > longest)
+  const auto max_wait = std::chrono::hours(24);
+  if (left > max_wait)
     return now +
            std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(default_s));
   return now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(left);
@@ -98,10 +99,10 @@ Status Call::admit(std::size_t more) {
     if (streams > gateway_.limits_.max_ingest_streams)
       return {Reason::BUDGET_EXCEEDED,
               std::to_string(gateway_.limits_.max_ingest_streams) + " streams of keyframes are open already"};
-    // What they hold must leave room for answers.
+    // Streams must leave room for answers.
     const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
     if (static_cast<std::size_t>(streams) * (kBytesPerCall + more) > share / 2)
-      return {Reason::BUDGET_EXCEEDED, "streams of keyframes are open already in half of the " + std::to_string(share) +
+      return {Reason::BUDGET_EXCEEDED, "open streams of keyframes use half of the " + std::to_string(share) +
                                            " bytes that the memory budget leaves for replies"};
     charge_.emplace(gateway_.budget_, storage::Share::kReplies);
     return charge_->grow_to(kBytesPerCall + more);
@@ -115,12 +116,12 @@ Status Call::admit(std::size_t more) {
     return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_pictures) + " pictures are waiting already"};
   charge_.emplace(gateway_.budget_, storage::Share::kReplies);
   if (Status status = charge_->grow_to(kBytesPerCall); !status.ok()) return status;
-  // The picture that is being described has its reserve; those that wait behind it do not.
+  // The picture that is being described has reserved memory; those that wait behind it do not.
   if (lane_ == Lane::kPictures && pictures == 1) return {};
-  // Nor may they take all that other calls are answered from.
+  // Waiting pictures must leave room for the replies of other calls.
   const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
   if (lane_ == Lane::kPictures && gateway_.budget_.used(storage::Share::kReplies) + more > share / 2)
-    return {Reason::BUDGET_EXCEEDED, "pictures wait already in half of the " + std::to_string(share) +
+    return {Reason::BUDGET_EXCEEDED, "waiting pictures use half of the " + std::to_string(share) +
                                          " bytes that the memory budget leaves for replies"};
   return charge_->grow_to(kBytesPerCall + more);
 }

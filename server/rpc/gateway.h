@@ -1,5 +1,5 @@
-// The one way in: every RPC passes  identity -> role -> deadline -> admission and budget -> metrics -> request id ->
-// handler -> error mapping.  Handlers know nothing of gRPC; adapters (*_service.cc) only name them.
+// The gateway of all RPCs. Each passes identity -> role -> deadline -> admission and budget -> metrics -> request id ->
+// handler -> error mapping. Handlers know nothing of gRPC; the adapters (*_service.cc) only name them.
 #pragma once
 
 #include <grpcpp/server_context.h>
@@ -21,9 +21,10 @@
 
 namespace relmap::rpc {
 
-// Pictures are described one at a time, by a thread of their own (they need a fixed reserve of memory). Streams of
-// maintenance wait for work of hours on a third kind of thread, so that no query waits behind them. Streams of
-// keyframes last as long as a robot drives: they have a limit of their own, no deadline, and no thread.
+// The lanes of calls, which have separate threads and limits. Pictures are described one at a time by a thread of their
+// own, since this needs a fixed reserve of memory. Maintenance streams wait for hours of work on another thread, so
+// that no query waits behind them. Streams of keyframes last as long as a robot drives: they have a limit of their own,
+// but no deadline and no thread.
 enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest };
 
 class Gateway {
@@ -31,16 +32,17 @@ class Gateway {
   // `budget` and `metrics` must outlive it.
   Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics);
 
-  // From now on new calls are refused with SHUTTING_DOWN and running ones see their deadline passed.
+  // From now on refuses new calls with SHUTTING_DOWN and interrupts running ones (Deadline::check()).
   void drain() { draining_ = true; }
-  // Calls that gRPC has not let go of yet: their answers may still be on their way.
+  // The number of calls that gRPC still holds; their answers may still be in transit.
   int calls() const { return calls_; }
 
-  // `handler`: Result<Reply>(const Request&, const Deadline&).
+  // Answers a unary call. `handler` is a Result<Reply>(const Request&, const Deadline&).
   template <typename Request, typename Reply, typename Handler>
   grpc::ServerUnaryReactor* unary(grpc::CallbackServerContext* context, const char* method, Lane lane,
                                   const Request* request, Reply* reply, Handler handler);
-  // `handler`: Result<Producer<Reply>>(const Request&, const Deadline&). The request lives until the stream ends.
+  // Answers with a stream. `handler` is a Result<Producer<Reply>>(const Request&, const Deadline&). The request lives
+  // until the stream ends.
   template <typename Reply, typename Request, typename Handler>
   grpc::ServerWriteReactor<Reply>* stream(grpc::CallbackServerContext* context, const char* method, Lane lane,
                                           const Request* request, Handler handler);
@@ -53,27 +55,27 @@ class Gateway {
   Metrics& metrics_;
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
-  std::atomic<int> running_{0}, pictures_{0},
-      ingest_{0};  // until they are answered: gRPC may be late in letting go of them
-  TaskPool general_, picture_thread_, maintenance_thread_;  // last: joined first
+  // Calls that are not answered yet; gRPC may hold a call a little longer.
+  std::atomic<int> running_{0}, pictures_{0}, ingest_{0};
+  TaskPool general_, picture_thread_, maintenance_thread_;  // declared last, so that they are joined first
 };
 
-// What one call is, whatever its kind of reply.
+// One call, unary or stream.
 class Call {
  public:
   Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane);
   ~Call();
 
-  // Role, protocol version, admission, budget: a call of usual size, and `more` bytes. Once, first.
+  // Checks role, admission and budget, and charges a call of usual size plus `more` bytes. Must be called first, once.
   Status admit(std::size_t more);
   const Deadline& deadline() const { return deadline_; }
   std::string peer() const { return context_->peer(); }
   void cancel() { cancelled_ = true; }
   void post(std::function<void()> task);
-  // Counts and logs; what the caller gets. Once, last.
+  // Counts and logs the call, and returns what the caller gets. Must be called last, once.
   grpc::Status end(const Status& status);
 
-  // Runs `body`, which returns a Status, and turns what it throws into one.
+  // Runs `body`, which returns a Status, and turns exceptions into a Status.
   template <typename Body>
   Status guarded(Body body);
 
@@ -133,8 +135,8 @@ grpc::ServerUnaryReactor* Gateway::unary(grpc::CallbackServerContext* context, c
 template <typename Reply, typename Request, typename Handler>
 grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* context, const char* method, Lane lane,
                                                  const Request* request, Handler handler) {
-  // A step takes one message from the producer and writes it; the next step is posted when the caller has taken it, so
-  // that a slow caller holds no thread.
+  // A step takes one message from the producer and writes it. The next step is posted when the caller has taken the
+  // message, so a slow caller holds no thread.
   class Reactor final : public grpc::ServerWriteReactor<Reply> {
    public:
     Reactor(Gateway& gateway, grpc::CallbackServerContext* c, const char* m, Lane l) : call(gateway, c, m, l) {}

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t kDefaultDepth = 30;
 constexpr std::uint32_t kDefaultFrames = 1000;
 constexpr std::uint32_t kMaxFrames = 10000;
-// gRPC's clients take 4 MB unless told otherwise.
+// The default limit of gRPC's clients is 4 MB.
 constexpr std::size_t kMaxReplyBytes = 3u << 20;
 constexpr std::size_t kBytesPerLandmark = 32;
 

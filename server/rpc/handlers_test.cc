@@ -29,7 +29,7 @@ class Handlers : public testing::Test {
   }
   static v1::FrameId wire(FrameId id) { return to_wire(id); }
 
-  // What the robot saw as frame i of the circuit, as a query.
+  // The view of frame i of the circuit as a query.
   v1::View view_of(const sim::PointsWorld& world, std::uint32_t i, bool camera = true) const {
     v1::View view;
     const Keyframe keyframe = world.keyframe(i);
@@ -37,7 +37,7 @@ class Handlers : public testing::Test {
     if (camera) *view.mutable_camera() = to_wire(keyframe.session.camera);
     return view;
   }
-  // Another drive along the same circuit: the same points, other noise.
+  // Another drive along the same circuit, with the same points and other noise.
   sim::PointsWorld again() const {
     sim::PointsWorldOptions options = ServedMap::circuit_options();
     options.noise_seed = 5;
@@ -126,7 +126,7 @@ TEST_F(Handlers, LocaliseSaysWhyItCannot) {
   EXPECT_EQ(ask(localise, request).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
-TEST_F(Handlers, PicturesThatAreNoneAreRefusedByName) {
+TEST_F(Handlers, InvalidPicturesAreRefusedByName) {
   v1::LocaliseRequest request;
   request.mutable_view()->set_session(1);
   request.mutable_view()->mutable_left()->set_data("GIF89a and so on");
@@ -204,7 +204,7 @@ TEST_F(Handlers, MatchImagePutsWhatGeometryConfirmsFirst) {
   EXPECT_EQ(reply->reason(), v1::REASON_OK);
 }
 
-// Two candidates side by side may both be told from the frame that saw most of what fits.
+// Two neighbouring candidates may both be verified in the one frame that saw most of the inliers.
 TEST_F(Handlers, MatchImageListsAFrameOnce) {
   v1::MatchImageRequest request;
   request.set_max_verified(20);
@@ -238,7 +238,7 @@ TEST_F(Handlers, AFrameOfAMonoSessionAsksWhichPlacesLookLikeIt) {
   for (const v1::PlaceMatch& place : reply->places())
     EXPECT_FALSE(place.frame().session() == mono && place.frame().index() > 6) << "its own recent past";
 
-  // A robot that sees in stereo is recognised in the mono session, without metres and without an edge.
+  // A stereo robot is recognised in the mono session, without a metric pose and without an edge.
   *request.mutable_view()->mutable_frame() = wire({1, 20});
   const auto other = ask(match_image, request);
   ASSERT_TRUE(other.ok());
@@ -287,7 +287,7 @@ TEST_F(Handlers, RoutesLeadFromAPictureToALabel) {
   EXPECT_NEAR(summary.distance_m(), steps.back().distance_m(), 1e-9);
 }
 
-TEST_F(Handlers, RoutesThatCannotBeSayWhy) {
+TEST_F(Handlers, RefusedRoutesSayWhy) {
   const auto reason = [&](const v1::FindRouteRequest& request) {
     return call(*map_.core, find_route, request, deadline_).status();
   };
@@ -358,7 +358,7 @@ TEST_F(Handlers, RoutesHaveAlternativesAtEitherEnd) {
       << "an end that is none";
 }
 
-TEST_F(Handlers, RoutesLeadToWhereARobotIs) {
+TEST_F(Handlers, RoutesLeadToTheNewestFrameOfARobot) {
   const storage::Session session = *map_.mapper->view()->session(1);
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire({1, 3});
@@ -419,7 +419,7 @@ TEST_F(Handlers, RoutesKeepToTheirFilter) {
   EXPECT_EQ(reason(request), Reason::NOT_CONNECTED);
 }
 
-TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
+TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
   RpcLimits limits;
   limits.route_steps_per_message = 5;
   Core core(*map_.mapper, map_.core->facts, limits);
@@ -438,7 +438,7 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
 
   request.set_resume_token(first->resume_token());
   const v1::RouteEnd from = request.from(), to = request.to();
-  request.clear_from();  // the token knows
+  request.clear_from();  // the token implies it
   request.clear_to();
   auto stream = call(core, find_route, request, deadline_).or_throw();
   std::size_t at = 5;
@@ -476,7 +476,7 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
   v1::RouteSummary by_frames, by_cells;
   steps_of(request, &by_frames);
   EXPECT_NE(by_frames.frame_by_frame(), "");
-  // The best way by edges: cells do not know of closures that only bind.
+  // The best route by edges, since cells do not contain closures that only bind.
   const std::vector<FrameId> from{{1, 3}}, to{{1, 30}};
   const auto view = map_.mapper->view();
   const route::Route by_edges = route::find_route(*view, from, to).or_throw();
@@ -514,7 +514,7 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
   const auto alone = call(*map_.core, find_route, request, deadline_);
   EXPECT_EQ(alone.reason(), Reason::NOT_CONNECTED);
   EXPECT_THAT(alone.status().message(), HasSubstr("2 (elsewhere)"));
-  // Cells say so for what there are no costs of, too.
+  // Cells tell that the ends are not connected even for a cost that they do not have.
   request.mutable_weights()->set_metre(2);
   const auto weighed = call(*map_.core, find_route, request, deadline_);
   EXPECT_EQ(weighed.reason(), Reason::NOT_CONNECTED);
@@ -628,7 +628,7 @@ TEST_F(Handlers, EdgesAreListedByStateKindAndPlace) {
   EXPECT_EQ(ask(list_edges, request).reason(), Reason::INVALID_ARGUMENT);
 }
 
-TEST_F(Handlers, ALoopClosureCanBeTakenOutButNotTheRobotsMotion) {
+TEST_F(Handlers, ALoopClosureCanBeRemovedButNotTheRobotsMotion) {
   v1::ListEdgesRequest accepted;
   accepted.add_states(v1::EDGE_STATE_ACCEPTED);
   accepted.add_kinds(v1::EDGE_KIND_LOOP);
@@ -656,7 +656,7 @@ TEST_F(Handlers, ALoopClosureCanBeTakenOutButNotTheRobotsMotion) {
   EXPECT_EQ(ask(set_edge_state, request).reason(), Reason::NO_SUCH_EDGE);
 }
 
-TEST_F(Handlers, LabelsCanBeSetFoundAndTakenOff) {
+TEST_F(Handlers, LabelsCanBeSetFoundAndRemoved) {
   v1::SetLabelRequest request;
   *request.mutable_frame() = wire({1, 7});
   request.set_label("dock/1");
@@ -695,8 +695,8 @@ TEST_F(Handlers, LabelsCanBeSetFoundAndTakenOff) {
   }
 }
 
-// Maps may hold labels that were names when they were given.
-TEST_F(Handlers, ALabelThatIsNoNameAnyMoreCanBeTakenOff) {
+// Maps may hold labels that were valid when they were set.
+TEST_F(Handlers, ALabelThatIsNoLongerValidCanBeRemoved) {
   v1::SetLabelRequest request;
   *request.mutable_frame() = wire({1, 7});
   request.set_label(" ");
@@ -710,7 +710,7 @@ TEST_F(Handlers, ALabelThatIsNoNameAnyMoreCanBeTakenOff) {
   EXPECT_EQ(taken_off->labels_size(), 0);
 }
 
-TEST_F(Handlers, StatusCountsWhatIsThere) {
+TEST_F(Handlers, StatusCountsTheContentOfTheMap) {
   const auto reply = ask(get_status, v1::GetStatusRequest());
   ASSERT_TRUE(reply.ok());
   EXPECT_EQ(reply->frames(), ServedMap::kFrames + ServedMap::kElsewhere);
@@ -737,7 +737,7 @@ TEST_F(Handlers, StatusSaysWhyLcmDoesNotRun) {
   EXPECT_EQ(reply->ingest().not_taken(0).count(), 3u);
 }
 
-TEST_F(Handlers, ExportsTrajectoriesAndGoesOnWhereAStreamBroke) {
+TEST_F(Handlers, ExportsTrajectoriesAndResumesWhereAStreamBroke) {
   v1::ExportRequest request;
   EXPECT_EQ(call(*map_.core, export_trajectories, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
   request.set_format(v1::EXPORT_FORMAT_TUM);
@@ -804,7 +804,7 @@ TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
   }
 }
 
-TEST_F(Handlers, AnEdgeSaysWhetherAnythingMeasuredIt) {
+TEST_F(Handlers, AnEdgeTellsWhetherItIsMeasured) {
   storage::Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
   EXPECT_FALSE(edge_message(step).unmeasured());
   step.kind = storage::EdgeKind::kPrior;
@@ -845,7 +845,7 @@ TEST_F(Handlers, ADeadlineEndsASearch) {
   EXPECT_TRUE(ask(wait_idle, idle).ok());
 }
 
-// What moves in a session: its edges' and landmarks' estimates.
+// What may move in a session: the estimates of its edges and landmarks.
 std::vector<double> estimates_of(const storage::Graph& map, SessionNumber session) {
   std::vector<double> estimates;
   for (std::uint32_t i = 0; i < ServedMap::kFrames; ++i) {
@@ -858,7 +858,7 @@ std::vector<double> estimates_of(const storage::Graph& map, SessionNumber sessio
   return estimates;
 }
 
-TEST_F(Handlers, NothingInAFrozenSessionMovesThoughOthersCloseLoopsToIt) {
+TEST_F(Handlers, AFrozenSessionDoesNotMoveWhenOthersCloseLoopsToIt) {
   v1::FreezeSessionRequest request;
   request.set_session(1);
   request.set_frozen(true);
@@ -923,7 +923,7 @@ TEST_F(Handlers, ASessionIsDeletedForGood) {
   EXPECT_EQ(map_.mapper->view()->session(1)->frames, ServedMap::kFrames);
   const SessionHeader header = map_.mapper->view()->session(1)->header;
   request.set_uuid(header.uuid.to_string());
-  for (int asked = 0; asked < 2; ++asked) {  // who asks again looks on
+  for (int asked = 0; asked < 2; ++asked) {  // asking again only watches the deletion
     auto progress = ask(delete_session, request).or_throw();
     std::uint64_t done = 0;
     while (const auto said = progress().or_throw()) {
@@ -950,7 +950,7 @@ TEST_F(Handlers, ASessionIsDeletedForGood) {
   EXPECT_EQ(ask(get_frame, frame).reason(), Reason::NO_SUCH_FRAME);
   EXPECT_EQ(ask(find_labels, v1::FindLabelsRequest())->labels_size(), 0);
 
-  // What is recognised is what is left.
+  // Only what is left is recognised.
   v1::LocaliseRequest where;
   *where.mutable_view() = view_of(third, 25);
   const auto found = ask(localise, where);

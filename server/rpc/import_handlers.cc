@@ -58,7 +58,8 @@ Result<Keyframe> keyframe_of(const v1::ImportedFrame& frame, const SessionHeader
 
 Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionNumber session) {
   if (loop.query() <= loop.match())
-    return {Reason::INVALID_ARGUMENT, loop.query() == loop.match() ? "from a frame to itself" : "query is the later"};
+    return {Reason::INVALID_ARGUMENT,
+            loop.query() == loop.match() ? "it leads from a frame to itself" : "query must be the later frame"};
   storage::ClosureProposalRecord proposal;
   proposal.query = {session, loop.query()};
   proposal.match = {session, loop.match()};
@@ -73,10 +74,10 @@ Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop,
   return proposal;
 }
 
-// What is to be written; its session has begun.
+// The part of a message that is to be written, after its session has begun.
 struct Piece {
   SessionNumber session = 0;
-  std::vector<Keyframe> frames;  // that the map does not hold
+  std::vector<Keyframe> frames;  // those that the map does not hold yet
   std::vector<storage::ClosureProposalRecord> loops;
 };
 
@@ -113,7 +114,8 @@ Result<Piece> check_piece(map::Mapper& mapper, const v1::ImportGraphRequest& req
   if (request.first() > next) return {Reason::NO_SUCH_FRAME, "frames from " + std::to_string(next) + " on are missing"};
   for (const storage::ClosureProposalRecord& loop : piece.loops)
     if (loop.query.index >= std::max<std::uint64_t>(next, request.first() + frames.size()))
-      return {Reason::NO_SUCH_FRAME, "a loop from frame " + std::to_string(loop.query.index) + ", which is not there"};
+      return {Reason::NO_SUCH_FRAME,
+              "a loop from frame " + std::to_string(loop.query.index) + ", which does not exist"};
   for (Keyframe& keyframe : frames)
     if (keyframe.sequence >= next) piece.frames.push_back(std::move(keyframe));
   if (known != sessions.end() && known->frames > 0 && !piece.frames.empty() &&
@@ -128,7 +130,7 @@ Result<Piece> check_piece(map::Mapper& mapper, const v1::ImportGraphRequest& req
   return piece;
 }
 
-// Records on their way into the journal, one after the other.
+// Writes records to the journal, one after another.
 class Writer {
  public:
   Writer(map::Mapper& mapper, const Deadline& deadline) : mapper_(mapper), deadline_(deadline) {}
@@ -146,7 +148,7 @@ class Writer {
       std::this_thread::sleep_for(kPause);
     }
   }
-  // Of the last one, once all are durable and applied; 0 if there were none.
+  // Waits until all records are durable and applied. Returns the sequence of the last one; 0 if there were none.
   Result<std::uint64_t> finish() {
     std::uint64_t last = 0;
     for (auto& outcome : outcomes_) {
@@ -171,7 +173,7 @@ class Writer {
 
 Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request, const Deadline& deadline,
                                           map::Mapper& mapper, ImportTurn& turn) {
-  // One at a time: a piece is judged by what the map holds, and pieces must not fill the threads of all other calls.
+  // One at a time, since a piece is checked against the map, and pieces must not occupy the threads of all other calls.
   const std::unique_lock held(turn.mutex, std::try_to_lock);
   if (!held.owns_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
   const auto piece = check_piece(mapper, request);
@@ -189,7 +191,7 @@ Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request,
   }
   for (const storage::ClosureProposalRecord& loop : piece->loops)
     if (Status taken = writer.write(loop); !taken.ok()) return taken;
-  // The next piece looks at the map for what this one brought.
+  // The next piece is checked against the frames of this one, so they must be in the map first.
   const auto written = writer.finish();
   if (!written.ok()) return written.status();
   reply.set_journal_sequence(*written);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kLap = 40, kFrames = 60;
 
-// A circuit of 40 frames, driven one and a half times.
+// A circuit of 40 frames that is driven one and a half times.
 SE3 pose(std::uint32_t index) {
   const double angle = 2 * std::numbers::pi * index / kLap;
   return {so3_exp({0, angle, 0}), {10 * (1 - std::cos(angle)), 0, 10 * std::sin(angle)}};
@@ -46,7 +46,7 @@ class ImportGraph : public ::testing::Test {
   Result<v1::ImportGraphReply> import(const v1::ImportGraphRequest& request) {
     return call(core_, import_graph, request, {});
   }
-  // All of the stream in one message.
+  // Returns the whole stream as one message.
   static v1::FindRouteReply route(Core& core, const v1::FindRouteRequest& request) {
     v1::FindRouteReply whole;
     auto stream = call(core, find_route, request, {}).or_throw();
@@ -98,7 +98,7 @@ TEST_F(ImportGraph, LoopsThatAgreeCloseTheCircuit) {
   }
   EXPECT_TRUE(found[0].carries) << "it is a way of the graph";
 
-  // The same again changes nothing.
+  // Importing the same again changes nothing.
   const auto again = import(rest);
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(again->frames_known(), kFrames - 30);
@@ -106,7 +106,7 @@ TEST_F(ImportGraph, LoopsThatAgreeCloseTheCircuit) {
   EXPECT_EQ(loops().size(), 4u);
 }
 
-TEST_F(ImportGraph, AStepThatIsNotKnownIsTrustedLittle) {
+TEST_F(ImportGraph, AnUnknownStepIsTrustedLittle) {
   auto request = piece(0, 10);
   request.mutable_frames(5)->clear_step();
   ASSERT_TRUE(import(request).ok());
@@ -116,7 +116,7 @@ TEST_F(ImportGraph, AStepThatIsNotKnownIsTrustedLittle) {
   EXPECT_GT(hot->edges[0].covariance(0, 0), 1);
 }
 
-TEST_F(ImportGraph, RoutesAndTransformsSayAlongWhichStepsTheyAreAGuess) {
+TEST_F(ImportGraph, RoutesAndTransformsListUnmeasuredSteps) {
   constexpr std::uint32_t kFar = 190, kDark = 100;  // in chunks of their own
   auto request = piece(0, kFar + 1);
   request.mutable_frames(kDark)->clear_step();
@@ -197,7 +197,7 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
     EXPECT_EQ(route(short_ways, way).summary().bound_closures(), steps == 12) << "it has 12 by edges";
   }
 
-  // A stream that broke goes on along it.
+  // A broken stream resumes along the same route.
   Core in_pieces(*mapper_, core_.facts, {.route_steps_per_message = 1});
   auto stream = call(in_pieces, find_route, way, {}).or_throw();
   way.set_resume_token(stream().or_throw()->resume_token());
@@ -218,7 +218,7 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
     EXPECT_NE(without.message().find("closures that only bind"), std::string::npos);
   };
   expect_refused(far, Reason::NOT_CONNECTED);
-  // The second search looks for memory last of all; for want of it what edges say stands.
+  // If only the second search finds no memory, the answer by edges stands.
   std::size_t looks = 0, last = 0;
   const Deadline no_memory_at_last{
       .interrupted = [&]() -> Status { return ++looks == last ? Status(Reason::BUDGET_EXCEEDED, "") : Status(); }};
@@ -234,7 +234,7 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
   expect_refused(far, Reason::COST_LIMIT);
 }
 
-TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
+TEST_F(ImportGraph, AnInvalidPieceIsRefusedByNameAndNothingIsWritten) {
   const auto refused = [&](const v1::ImportGraphRequest& request) {
     const auto reply = import(request);
     EXPECT_TRUE(mapper_->view()->sessions().empty());
@@ -269,7 +269,7 @@ TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
   EXPECT_EQ(refused(request).reason(), Reason::INVALID_ARGUMENT);
 }
 
-TEST_F(ImportGraph, PiecesFollowEachOtherInTime) {
+TEST_F(ImportGraph, PiecesMustFollowEachOtherInTime) {
   ASSERT_TRUE(import(piece(0, 10)).ok());
   auto next = piece(10, 20);
   for (int i = 0; i < 10; ++i) next.mutable_frames(i)->set_time_us(static_cast<std::uint64_t>(i + 1));

@@ -10,7 +10,7 @@ namespace relmap::rpc {
 
 namespace {
 
-const Status kNoIntake{Reason::UNSUPPORTED, "this server takes no keyframes in"};
+const Status kNoIntake{Reason::UNSUPPORTED, "this server does not take keyframes"};
 
 void add_counts(const std::map<Reason, std::uint64_t>& counts,
                 google::protobuf::RepeatedPtrField<v1::ReasonCount>& to) {
@@ -53,7 +53,7 @@ Result<v1::ListRobotsReply> list_robots(const v1::ListRobotsRequest&, const Dead
   if (!intake.server) return kNoIntake;
   std::vector<intake::RobotStats> robots = intake.server->robots();
   const auto view = mapper.view();
-  // Of a session that is deleted, or ended by now, nobody is missing.
+  // A silent robot is not missing if its session has ended or is being deleted.
   std::erase_if(robots, [&](const intake::RobotStats& robot) {
     const auto session = robot.silent ? view->session(robot.session) : std::nullopt;
     return session && (storage::is_going(*session) || session->state == storage::SessionState::kEnded);

@@ -13,8 +13,8 @@ namespace relmap::rpc {
 
 namespace {
 constexpr std::size_t kMaxSessions = 1024;  // on one stream
-constexpr std::size_t kMaxReplies = 256;    // that nobody takes; news may be lost
-// A usual keyframe on its way in, and what stands in the other direction. (What gRPC holds has its own limit.)
+constexpr std::size_t kMaxReplies = 256;    // that wait to be sent; beyond it news are dropped
+// Memory of a usual incoming keyframe and of what waits to be sent. What gRPC holds has its own limit.
 constexpr std::size_t kStreamBytes = 64 * 1024;
 }  // namespace
 
@@ -30,7 +30,7 @@ IngestStream::IngestStream(map::Mapper& mapper, const Intake& intake, Gateway& g
 }
 
 void IngestStream::OnReadDone(bool ok) {
-  if (!ok) return end({});  // the robot has said all it had to
+  if (!ok) return end({});  // the robot has closed its side
   const Status taken = call_.guarded([&] { return take(request_); });
   if (!taken.ok()) return end(taken);
   request_.Clear();
@@ -82,7 +82,7 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
     return {Reason::UNKNOWN_PROTOCOL_VERSION,
             "protocol " + std::to_string(major) + "; known: " + std::to_string(kProtocolMajor)};
   if (Status storage = mapper_.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
-  const std::string& robot = request.hello().robot();  // for the log: what it sends says whose it is
+  const std::string& robot = request.hello().robot();  // for the log only; keyframes name their robot themselves
   who_ = (check_name("robot", robot).ok() ? "robot " + robot : "a robot without a name") + " (" + call_.peer() + ")";
   spdlog::info("{} has connected", who_);
   v1::IngestReply welcome;
@@ -160,7 +160,7 @@ void IngestStream::OnDone() {
 
 void IngestStream::OnCancel() { end({Reason::DEADLINE, "the robot has gone"}); }
 
-// What is to be said still goes out before.
+// Ends the stream after what waits to be sent has been sent.
 void IngestStream::end(const Status& status) {
   const std::lock_guard lock(mutex_);
   if (!ending_) ending_ = status;

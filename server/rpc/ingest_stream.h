@@ -1,6 +1,7 @@
-// One robot's stream of keyframes (Ingest.Stream): what it sends goes to the intake, what the intake says of its
-// sessions goes back. A message is read when the one before has been taken in, so gRPC's flow control holds a sender
-// back; of acknowledgements only the newest waits, so a slow receiver holds nothing.
+// One robot's stream of keyframes (Ingest.Stream). Keyframes go to the intake, and the intake's acknowledgements and
+// news of the robot's sessions go back. A message is read only when the one before has been processed, so gRPC's flow
+// control limits a fast sender. Only the newest acknowledgement of a session is kept for sending, so a slow receiver
+// takes no memory.
 #pragma once
 
 #include <grpcpp/support/server_callback.h>
@@ -21,7 +22,7 @@ namespace relmap::rpc {
 
 class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply> {
  public:
-  // Deletes itself when the stream is done.
+  // The object deletes itself when the stream is done.
   IngestStream(map::Mapper& mapper, const Intake& intake, Gateway& gateway, grpc::CallbackServerContext* context);
 
   void OnReadDone(bool ok) override;
@@ -36,16 +37,16 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   void hear(const Acknowledgement& ack);
   void hear(const PoseNews& news);
   void end(const Status& status);
-  void go_on();  // mutex_ is held
+  void go_on();  // requires mutex_
 
   map::Mapper& mapper_;
   intake::IngestServer* const intake_;  // null: refused
   Call call_;
   v1::IngestRequest request_;
-  std::string who_;  // robot and address, once it has said hello
+  std::string who_;  // robot and address, set by its hello
 
   std::mutex mutex_;
-  std::set<SessionUuid> sessions_;  // that were spoken of here
+  std::set<SessionUuid> sessions_;  // sessions that this stream has mentioned
   std::map<SessionUuid, Acknowledgement> acknowledgements_;
   std::deque<v1::IngestReply> replies_;
   v1::IngestReply writing_;
@@ -53,7 +54,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   std::optional<Status> ending_;
   bool finished_ = false;
 
-  std::unique_ptr<intake::IngestServer::Subscription> subscription_;  // destroyed first
+  std::unique_ptr<intake::IngestServer::Subscription> subscription_;  // declared last, so that it is destroyed first
 };
 
 }  // namespace relmap::rpc

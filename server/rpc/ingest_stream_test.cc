@@ -1,4 +1,4 @@
-// Robots over gRPC: a client's own stream against a server, its intake and a map.
+// Robots over gRPC: a client's stream to a server with its intake and a map.
 #include "server/rpc/ingest_stream.h"
 
 #include <gmock/gmock.h>
@@ -97,7 +97,7 @@ class IngestStreamTest : public testing::Test {
   std::unique_ptr<v1::Ingest::Stub> stub_;
 };
 
-TEST_F(IngestStreamTest, WelcomesTakesInAndAcknowledgesWhatIsDurable) {
+TEST_F(IngestStreamTest, WelcomesARobotAndAcknowledgesWhatIsDurable) {
   grpc::ClientContext context;
   const auto stream = open(context);
   v1::IngestReply reply;
@@ -114,7 +114,7 @@ TEST_F(IngestStreamTest, WelcomesTakesInAndAcknowledgesWhatIsDurable) {
   EXPECT_EQ(ack->session_uuid(), uuid_to_wire(world_.keyframe(0).session.uuid));
   EXPECT_GE(ack->credits(), 1u);
 
-  ASSERT_TRUE(stream->Write(keyframe(3)));  // a repeat: said again, and nothing changes
+  ASSERT_TRUE(stream->Write(keyframe(3)));  // a repeat is acknowledged again and changes nothing
   EXPECT_EQ(acknowledged(*stream, kKeyframes)->next_sequence(), kKeyframes);
   stream->WritesDone();
   while (stream->Read(&reply)) {
@@ -124,7 +124,7 @@ TEST_F(IngestStreamTest, WelcomesTakesInAndAcknowledgesWhatIsDurable) {
   EXPECT_EQ(map_.mapper->view()->session(3)->frames, kKeyframes);
 }
 
-TEST_F(IngestStreamTest, AnotherStreamGoesOnWhereTheFirstBrokeAndOnlyTheNewestOfASessionIsSaid) {
+TEST_F(IngestStreamTest, AnotherStreamContinuesWhereTheFirstBrokeAndSendsOnlyTheNewestAcknowledgement) {
   {
     grpc::ClientContext context;
     const auto stream = open(context);
@@ -192,7 +192,7 @@ TEST_F(IngestStreamTest, GapsEndsAndRefusalsTravel) {
   context.TryCancel();
 }
 
-TEST_F(IngestStreamTest, NewsGoToTheirRobot) {
+TEST_F(IngestStreamTest, NewsAreSentToTheirRobot) {
   grpc::ClientContext context;
   const auto stream = open(context);
   stream->Write(keyframe(0));
@@ -223,7 +223,7 @@ TEST_F(IngestStreamTest, NewsGoToTheirRobot) {
   context.TryCancel();
 }
 
-TEST_F(IngestStreamTest, WhatIsNoStreamOfOursIsRefusedByName) {
+TEST_F(IngestStreamTest, AnInvalidStreamIsRefusedByName) {
   {
     grpc::ClientContext context;
     EXPECT_EQ(reason_of(open(context, 2)->Finish()), Reason::UNKNOWN_PROTOCOL_VERSION);

@@ -1,4 +1,5 @@
-// Work of minutes or hours as a stream of messages: it runs on a thread of its own, and the stream takes what it says.
+// A job of minutes or hours as a stream of messages: the job runs on a thread of its own, and the stream takes its
+// messages.
 #pragma once
 
 #include <chrono>
@@ -18,10 +19,10 @@ namespace relmap::rpc {
 template <typename Reply>
 class JobStream {
  public:
-  // `job` is done when it returns. `deadline` outlives the stream.
+  // Starts `job`, which is done when it returns. `deadline` must outlive the stream.
   JobStream(MaintenanceTurn::Held turn, const Deadline& deadline, std::function<Status(JobStream&)> job)
       : turn_(std::move(turn)), deadline_(deadline), thread_([this, job = std::move(job)] { run(job); }) {}
-  // Ends the job and waits for that.
+  // Tells the job to end, and waits for it.
   ~JobStream() {
     {
       const std::lock_guard lock(mutex_);
@@ -33,18 +34,18 @@ class JobStream {
   JobStream(const JobStream&) = delete;
   JobStream& operator=(const JobStream&) = delete;
 
-  // For the job. Not ok: nobody waits for it any more.
+  // Called by the job. Not ok if nobody waits for it any more.
   Status check() const {
     const std::lock_guard lock(mutex_);
     if (abandoned_) return {Reason::DEADLINE, "the caller has gone"};
     return deadline_.check();
   }
-  // How far it has come: the newest counts.
+  // Called by the job. Sets its progress, of which only the newest is sent.
   void show(Reply progress) {
     const std::lock_guard lock(mutex_);
     progress_ = std::move(progress);
   }
-  // What must arrive. Waits while much has not been taken.
+  // Called by the job. Sends a message; waits while kUnsent messages have not been taken.
   void send(Reply reply) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return unsent_.size() < kUnsent || abandoned_; });
@@ -52,8 +53,9 @@ class JobStream {
     changed_.notify_all();
   }
 
-  // For the stream. What was sent, else now and then how far it is: so the caller sees that work goes on, and the
-  // daemon that the caller has gone.
+  // Called by the stream. Returns the next message, or every kPulse the progress, by which the caller sees that the
+  // work goes on, and the daemon whether the caller has gone. nullopt at the end, or the status with which the job
+  // failed.
   Result<std::optional<Reply>> take() {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, kPulse, [this] { return !unsent_.empty() || end_; });
@@ -96,7 +98,7 @@ class JobStream {
   Reply progress_;
   std::optional<Status> end_;
   bool abandoned_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // declared last, since it uses the others
 };
 
 }  // namespace relmap::rpc

@@ -27,7 +27,7 @@ class JobStreamTest : public testing::Test {
   Deadline deadline_;
 };
 
-TEST_F(JobStreamTest, GivesWhatWasSentInOrderHoweverSlowlyItIsTaken) {
+TEST_F(JobStreamTest, DeliversMessagesInOrderToASlowReader) {
   Stream stream(turn_.take("counting").value(), deadline_, [](Stream& out) -> Status {
     for (int i = 0; i < 100; ++i) out.send(std::to_string(i));
     return {};
@@ -38,7 +38,7 @@ TEST_F(JobStreamTest, GivesWhatWasSentInOrderHoweverSlowlyItIsTaken) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(messages[static_cast<std::size_t>(i)], std::to_string(i));
 }
 
-TEST_F(JobStreamTest, SaysHowFarItIsWhileNothingIsSent) {
+TEST_F(JobStreamTest, ReportsProgressWhileNothingIsSent) {
   std::atomic<bool> go_on{false};
   Stream stream(turn_.take("waiting").value(), deadline_, [&](Stream& out) -> Status {
     out.show("half way");
@@ -50,7 +50,7 @@ TEST_F(JobStreamTest, SaysHowFarItIsWhileNothingIsSent) {
   EXPECT_EQ(read(stream).second.reason(), Reason::IO_ERROR);
 }
 
-TEST_F(JobStreamTest, EndsTheJobWhenNobodyTakesFromItAnyMore) {
+TEST_F(JobStreamTest, EndsTheJobWhenItsReaderIsGone) {
   std::atomic<bool> told{false};
   {
     Stream stream(turn_.take("for ever").value(), deadline_, [&](Stream& out) -> Status {

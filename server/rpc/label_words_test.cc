@@ -15,7 +15,7 @@ TEST(LabelWords, EachWordBeginsOneOfTheLabel) {
   EXPECT_FALSE(has_words("dock-3/north", "33"));
 }
 
-TEST(LabelWords, OfOtherAlphabetsBytesAreCompared) {
+TEST(LabelWords, BytesOfOtherAlphabetsAreCompared) {
   EXPECT_TRUE(has_words("Küche im Obergeschoß", "kü ober"));
   EXPECT_FALSE(has_words("Küche", "ku"));
 }
@@ -26,7 +26,7 @@ TEST(LabelWords, WithoutWordsEveryLabelIsFound) {
   EXPECT_FALSE(has_words("", "dock"));
 }
 
-TEST(LabelWords, ABeginningIsFoundInWhateverCase) {
+TEST(LabelWords, APrefixIsFoundInAnyCase) {
   for (const char* prefix : {"traf", "Traffic L", "TRAFFIC LIGHT", ""})
     EXPECT_TRUE(begins_with("Traffic light", prefix)) << prefix;
   for (const char* prefix : {"light", "traffic lights", "raf"})

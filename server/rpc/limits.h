@@ -1,4 +1,4 @@
-// What one caller may cost.
+// Limits on what callers may cost.
 #pragma once
 
 #include <cstddef>
@@ -7,17 +7,17 @@
 namespace relmap::rpc {
 
 struct RpcLimits {
-  int threads = 4;                               // that run handlers (pictures have one more of their own)
-  int max_concurrent = 64;                       // RPCs running, waiting or streaming; beyond it BUDGET_EXCEEDED
-  int max_ingest_streams = 256;                  // beside them
-  int max_pictures = 16;                         // of them, with a picture
-  std::uint64_t max_search_frames = 10'000'000;  // per route or transform: OUT_OF_REACH
-  std::uint64_t near_route_steps = 50;           // of a route by cells that is searched again with bound closures
+  int threads = 4;                               // threads that run handlers; pictures have another of their own
+  int max_concurrent = 64;                       // RPCs that run, wait or stream; beyond it BUDGET_EXCEEDED
+  int max_ingest_streams = 256;                  // not counted in max_concurrent
+  int max_pictures = 16;                         // RPCs with a picture, of max_concurrent
+  std::uint64_t max_search_frames = 10'000'000;  // frames of a search; beyond it OUT_OF_REACH
+  std::uint64_t near_route_steps = 50;           // routes by cells up to this length are searched again near the start
   double default_deadline_s = 60;                // for callers that set none
-  std::size_t route_steps_per_message = 1000;    // of a stream, at most
+  std::size_t route_steps_per_message = 1000;    // steps in a message of a stream, at most
 };
 
-// Of a stream. What a slow caller has not taken is one message, once as we made it and once as gRPC sends it.
+// Usual size of a message of a stream. A slow caller holds one message, once as we made it and once as gRPC sends it.
 inline constexpr std::size_t kUsualStreamMessageBytes = 256u << 10;
 
 }  // namespace relmap::rpc

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t kSessionsPerPage = 100, kMaxSessionsPerPage = 1000;
 constexpr std::uint32_t kEdgesPerPage = 1000, kMaxEdgesPerPage = 5000;
 constexpr std::uint32_t kLabelsPerPage = 1000, kMaxLabelsPerPage = 5000;
-constexpr std::size_t kMaxPageBytes = 2u << 20;  // beyond it a page ends early
+constexpr std::size_t kMaxPageBytes = 2u << 20;  // a page ends early beyond it
 
 std::uint32_t page_size(std::uint32_t asked, std::uint32_t usual, std::uint32_t most) {
   return asked == 0 ? usual : std::min(asked, most);

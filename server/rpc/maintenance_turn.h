@@ -1,4 +1,5 @@
-// Verify, Backup and Compact, one at a time: two of them would halve each other's disk and double the memory held.
+// Lets Verify, Backup and Compact run one at a time, since two would halve each other's disk throughput and double the
+// memory.
 #pragma once
 
 #include <memory>
@@ -12,14 +13,14 @@ namespace relmap::rpc {
 // Thread-safe.
 class MaintenanceTurn {
  public:
-  // Held for as long as the work goes on.
+  // Must be held as long as the work runs.
   using Held = std::shared_ptr<const void>;
 
-  // BUDGET_EXCEEDED, naming the work under way.
+  // Takes the turn for `work`. BUDGET_EXCEEDED, with the name of the work that is running, if there is one.
   Result<Held> take(const std::string& work) {
     const std::lock_guard lock(mutex_);
     if (!under_way_.empty())
-      return Status(Reason::BUDGET_EXCEEDED, work + ": " + under_way_ + " is under way, and one at a time is enough");
+      return Status(Reason::BUDGET_EXCEEDED, work + ": " + under_way_ + " is running, and only one may run at a time");
     under_way_ = work;
     return Held(this, [this](const void*) {
       const std::lock_guard ended(mutex_);

@@ -20,7 +20,7 @@ static_assert(static_cast<int>(MotionSource::kUnsensed) == v1::MOTION_SOURCE_UNS
 
 v1::EdgeKind to_wire(storage::EdgeKind kind) { return static_cast<v1::EdgeKind>(kind); }
 v1::EdgeState to_wire(storage::EdgeState state) { return static_cast<v1::EdgeState>(state); }
-// One by one: the wire has values that are never stored (HOMOGRAPHY), so the numbers need not go on alike.
+// Not a cast: the wire has values that are never stored (HOMOGRAPHY), so the numbers may differ.
 v1::Verification to_wire(storage::Verification verification) {
   switch (verification) {
     case storage::Verification::kNone:
@@ -41,13 +41,13 @@ v1::Verification to_wire(storage::Verification verification) {
 
 Result<storage::EdgeState> from_wire(v1::EdgeState state) {
   if (state == v1::EDGE_STATE_UNSPECIFIED || !v1::EdgeState_IsValid(state))
-    return {Reason::INVALID_ARGUMENT, "no state of an edge: " + std::to_string(state)};
+    return {Reason::INVALID_ARGUMENT, "unknown state of an edge: " + std::to_string(state)};
   return static_cast<storage::EdgeState>(state);
 }
 
 Result<storage::EdgeKind> from_wire(v1::EdgeKind kind) {
   if (kind == v1::EDGE_KIND_UNSPECIFIED || !v1::EdgeKind_IsValid(kind))
-    return {Reason::INVALID_ARGUMENT, "no kind of an edge: " + std::to_string(kind)};
+    return {Reason::INVALID_ARGUMENT, "unknown kind of an edge: " + std::to_string(kind)};
   return static_cast<storage::EdgeKind>(kind);
 }
 

@@ -8,18 +8,18 @@
 namespace relmap::rpc {
 namespace {
 
-// All that can be stored.
+// All values that can be stored.
 constexpr std::array kStored = {storage::Verification::kNone,     storage::Verification::kStereo,
                                 storage::Verification::kPnP,      storage::Verification::kEpipolar,
                                 storage::Verification::kImported, storage::Verification::kCompounded};
 
-TEST(VerificationOnTheWire, SaysWhatIsStored) {
+TEST(VerificationOnTheWire, HasAllStoredValues) {
   constexpr std::array kExpected = {v1::VERIFICATION_NONE,     v1::VERIFICATION_STEREO,   v1::VERIFICATION_PNP,
                                     v1::VERIFICATION_EPIPOLAR, v1::VERIFICATION_IMPORTED, v1::VERIFICATION_COMPOUNDED};
   for (std::size_t i = 0; i < kStored.size(); ++i) EXPECT_EQ(to_wire(kStored[i]), kExpected[i]) << i;
 }
 
-TEST(VerificationOnTheWire, HasNoOtherValuesThanThoseAndWhatIsNeverStored) {
+TEST(VerificationOnTheWire, HasOnlyStoredValuesAndHomography) {
   std::set<int> wire{v1::VERIFICATION_HOMOGRAPHY};
   for (const storage::Verification verification : kStored)
     EXPECT_TRUE(wire.insert(to_wire(verification)).second) << v1::Verification_Name(to_wire(verification));

@@ -1,4 +1,4 @@
-// What every RPC counts: calls, time, and refusals by reason.
+// Metrics of every RPC: calls, time, and refusals by reason.
 #pragma once
 
 #include <algorithm>

@@ -18,7 +18,7 @@ namespace {
 
 constexpr float kMaxDisparity = 256;
 
-// The pyramid level whose 9 x 9 patch covers about what the descriptor's centre does.
+// The pyramid level whose 9 x 9 patch covers about the same area as the descriptor's centre.
 int matching_level(float scale, int levels) {
   return std::clamp(static_cast<int>(std::lround(std::log2(std::max(scale, 1.0F) / 4))), 0, levels - 1);
 }
@@ -35,11 +35,11 @@ void add_disparities(vision::ImageView left, vision::ImageView right, std::vecto
   }
 }
 
-// Whether these can be what both eyes of the camera saw at one time, as far as two pictures tell whatever they show:
-// what is a matter of degrees is left to the place.
+// Refuses pictures that cannot be a pair of the camera taken at one time. Only clear cases are refused here; smaller
+// errors are left to the verification of the place.
 Status check_eyes(vision::ImageView left, vision::ImageView right, const StereoCamera& camera) {
   constexpr double kMaxRowError = 2;  // pixels, in the median
-  constexpr double kExchanged = -3;   // pixels of disparity, in the median: nothing is beyond infinity so far
+  constexpr double kExchanged = -3;   // median disparity in pixels, which is never so negative in a pair
   if (vision::measure_exposure(left).blind()) return {Reason::EYE_DEAD, "the left picture shows nothing"};
   if (vision::same_picture(left, right)) return {Reason::NOT_STEREO, "both pictures are the same"};
   vision::RigCheck check(camera);
@@ -51,7 +51,7 @@ Status check_eyes(vision::ImageView left, vision::ImageView right, const StereoC
                                                            : false;
   if (!told) return {};
   return {wrong.reason(),
-          "the two are no pair of this camera, or not of one moment: " + vision::with_advice(wrong).message()};
+          "the pictures are not a pair of this camera, or not of one moment: " + vision::with_advice(wrong).message()};
 }
 
 struct CameraOf {
@@ -74,7 +74,7 @@ struct CameraOf {
   }
 };
 
-// What can be said before anything is decoded.
+// Checks what can be checked before anything is decoded.
 Status check_files(const PictureQuestion& question, const vision::PictureSize& left) {
   int width = 0, height = 0;
   bool stereo = false;
@@ -136,7 +136,7 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   }
 
   if (!right_grey.empty() && vision::measure_exposure(right_grey).blind())
-    right_grey = vision::Image();  // the left one is asked alone
+    right_grey = vision::Image();  // the left picture is used alone
   if (!right_grey.empty())
     if (Status status = check_eyes(left_grey, right_grey, result.camera); !status.ok()) return status;
   result.features = vision::picture_appearance(left_grey);

@@ -1,4 +1,5 @@
-// From a picture to what places are compared by: decoded within limits, reduced, rectified, described.
+// Turns a picture into the features by which places are compared: decodes it within limits, reduces, rectifies and
+// describes it.
 #pragma once
 
 #include <variant>
@@ -12,7 +13,7 @@
 
 namespace relmap::rpc {
 
-// Of the pictures as given: none, rectified already, or not.
+// The calibration of the pictures as given: none, that of rectified pictures, or that of raw ones.
 using PictureCalibration = std::variant<std::monostate, StereoCamera, StereoCalibration>;
 
 // JPEG or PNG files; `right` may be empty.
@@ -22,18 +23,18 @@ struct PictureQuestion {
 };
 
 struct DescribedPicture {
-  std::vector<AppearanceFeature> features;  // in pixels of `camera`; disparities where a right picture gave them
-  // Rectified and reduced; baseline 0 without a right picture, or with one that shows nothing; f 0 without a
-  // calibration, and the principal point is the centre.
+  std::vector<AppearanceFeature> features;  // in pixels of `camera`; with disparities if there is a right picture
+  // The camera of the rectified and reduced picture. The baseline is 0 without a right picture or if that shows
+  // nothing. Without a calibration, f is 0 and the principal point is the centre.
   StereoCamera camera;
-  double scale = 1;                    // pixels of `camera` per pixel of the picture
-  Vector3 eye_turn = Vector3::Zero();  // Rectifier::eye_turn(), of a picture that was rectified
+  double scale = 1;                    // pixels of `camera` per pixel of the given picture
+  Vector3 eye_turn = Vector3::Zero();  // Rectifier::eye_turn() if the picture was rectified here
 };
 
+// Describes a picture or a stereo pair. Needs up to 120 MB while it runs, so the caller must let in one at a time.
 // NOT_A_PICTURE, PICTURE_TOO_LARGE, PICTURE_DAMAGED, IMPLAUSIBLE_CALIBRATION, BAD_SIZE (picture and camera differ, or
-// left and right), NOT_STEREO (a right picture without a stereo calibration, the same as the left one, exchanged with
-// it), EYE_DEAD (of a pair the left one shows nothing), ROWS_APART (of another time, or not rectified). Needs up to 120
-// MB for a moment: the caller lets in one at a time.
+// left and right), NOT_STEREO (a right picture that has no stereo calibration, equals the left one or is exchanged with
+// it), EYE_DEAD (the left picture of a pair shows nothing), ROWS_APART (a pair of different times, or not rectified).
 Result<DescribedPicture> describe_picture(const PictureQuestion& question);
 
 }  // namespace relmap::rpc

@@ -16,7 +16,7 @@ namespace {
 constexpr int kWidth = 320, kHeight = 240, kShift = 12;
 const StereoCamera kCamera{300, 160, 120, 0.1, kWidth, kHeight};
 
-// Blots of all sizes, wide enough to cut a left and a right picture out of it.
+// A picture of blobs of all sizes, wide enough to cut a left and a right picture out of it.
 cv::Mat texture() {
   std::mt19937 random(3);
   cv::Mat picture(kHeight, kWidth + kShift, CV_8U, cv::Scalar(128));
@@ -36,7 +36,7 @@ Bytes png(const cv::Mat& picture) {
 
 class PictureQuery : public testing::Test {
  protected:
-  // A wall at one depth: what the left eye sees at u, the right one sees at u - kShift.
+  // A wall at one depth: what is at u in the left picture is at u - kShift in the right one.
   const cv::Mat wall_ = texture();
   const Bytes left_ = png(wall_(cv::Rect(0, 0, kWidth, kHeight)));
   const Bytes right_ = png(wall_(cv::Rect(kShift, 0, kWidth, kHeight)));
@@ -94,8 +94,8 @@ TEST_F(PictureQuery, PicturesAndCameraMustFit) {
   EXPECT_EQ(describe_picture({left_, {}, absurd}).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
-// What no camera sees with two eyes at one time is refused before anything is looked for.
-TEST_F(PictureQuery, APairThatIsNoneIsRefused) {
+// Pictures that cannot be a pair are refused before the map is searched.
+TEST_F(PictureQuery, PicturesThatAreNotAPairAreRefused) {
   EXPECT_EQ(describe_picture({right_, left_, kCamera}).reason(), Reason::NOT_STEREO) << "exchanged";
   EXPECT_EQ(describe_picture({left_, left_, kCamera}).reason(), Reason::NOT_STEREO) << "twice the same";
   cv::Mat lower;
@@ -106,7 +106,7 @@ TEST_F(PictureQuery, APairThatIsNoneIsRefused) {
   EXPECT_NE(apart.message().find("what helps: "), std::string::npos) << apart.message();
 }
 
-TEST_F(PictureQuery, AnEyeThatShowsNothingLeavesTheOther) {
+TEST_F(PictureQuery, ARightPictureThatShowsNothingLeavesTheLeftOne) {
   const auto described = describe_picture({left_, png(cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(0))), kCamera});
   ASSERT_TRUE(described.ok()) << described.status().to_string();
   EXPECT_GT(described->features.size(), 100u);

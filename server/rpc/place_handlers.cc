@@ -18,8 +18,8 @@ v1::Verification verification_of(const place::VerifiedPlace& place) {
   return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
 }
 
-// Whether a view that was answered so is one picture of a camera that was only supposed, and is another one. A pair,
-// and features, cannot be asked about without their camera.
+// Whether this answer shows that a single picture, whose camera was only supposed, is of another camera. A pair or
+// features cannot be asked about without their camera.
 bool is_of_another_camera(const v1::View& view, Reason answer) {
   return view.supposed() && view.has_left() && !view.has_right() && answer == Reason::WRONG_CALIBRATION;
 }
@@ -28,7 +28,7 @@ place::PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> pr
   return {seen.features, seen.camera, seen.masked, prior, seen.pair, seen.known, seen.eye_turn};
 }
 
-// The same picture, of a camera that nobody knows.
+// The same picture with an unknown camera.
 v1::View without_camera(v1::View view) {
   view.clear_calibration();
   view.clear_supposed();
@@ -36,7 +36,7 @@ v1::View without_camera(v1::View view) {
   return view;
 }
 
-// In pixels of the picture as it was given; 0 where its camera was.
+// The estimated focal length, in pixels of the given picture; 0 if the camera was known.
 double estimated_focal_length(const SeenView& seen, const place::VerifiedPlace& place) {
   return seen.camera && seen.camera->f == 0 ? place.focal_length / seen.scale : 0;
 }

@@ -1,4 +1,4 @@
-// Where a view was seen, for every handler that takes one. Internal to server/rpc: shows generated code.
+// Localises a view, for every handler that takes one. Internal to server/rpc, since it exposes generated code.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 
 namespace relmap::rpc {
 
-// Reasons as of Map.Localise.
+// The reasons are those of Map.Localise.
 Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& asked,
                                         std::optional<FrameId> prior, const Deadline& deadline);
 

@@ -1,4 +1,4 @@
-// The messages of a stream, taken one after another.
+// A function that produces the messages of a stream, one after another.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@
 
 namespace relmap::rpc {
 
-// nullopt: that was all. Called by one thread at a time.
+// Returns nullopt after the last message. Called by one thread at a time.
 template <typename Reply>
 using Producer = std::function<Result<std::optional<Reply>>()>;
 

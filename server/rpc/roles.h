@@ -1,4 +1,4 @@
-// Who may call what.
+// The roles of callers, and what each may call.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace relmap::rpc {
 
-// Each may do what those before it may.
+// Each role may do what those before it may.
 enum class Role : std::uint8_t { kReader = 1, kRobot = 2, kOperator = 3 };
 
 struct Identity {
@@ -15,7 +15,7 @@ struct Identity {
   Role role = Role::kReader;
 };
 
-// The least role that may call "Map.FindRoute"; nullopt: no such method.
+// The lowest role that may call a method such as "Map.FindRoute"; nullopt if there is no such method.
 std::optional<Role> required_role(std::string_view method);
 
 }  // namespace relmap::rpc

@@ -39,7 +39,7 @@ v1::RouteStep step_message(const route::RouteStep& step, bool covariance) {
   return message;
 }
 
-// The step at which a stream broke, and whose request it was.
+// The step at which a stream broke, and the fingerprint of its request.
 struct Position {
   std::size_t step = 0;
   std::uint32_t fingerprint = 0;
@@ -58,7 +58,7 @@ struct Position {
   }
 };
 
-// Routes whose streams nobody has resumed for the longest time make room.
+// Charges the memory of a route; drops the least recently used ones to make room.
 Status charge_for(TokenKeeper<FoundRoute>& others, FoundRoute& found) {
   for (;;) {
     Status charged = found.charge.grow_to(found.answer.route.path.memory_bytes());
@@ -66,7 +66,7 @@ Status charge_for(TokenKeeper<FoundRoute>& others, FoundRoute& found) {
   }
 }
 
-// Reads the steps from the view as the caller takes them.
+// Streams a route; the steps are read from the view as the caller takes them.
 class RouteStream {
  public:
   RouteStream(Routes& routes, const RpcLimits& limits, std::shared_ptr<const FoundRoute> found, bool covariance,
@@ -80,7 +80,7 @@ class RouteStream {
                                       : limits.route_steps_per_message),
         walk_(*found_->view, route_, covariance_) {}
 
-  // The summary, and steps that an earlier stream has brought.
+  // Skips the summary and the steps that an earlier stream has sent.
   Status skip(std::size_t steps) {
     summarised_ = true;
     for (; next_ < steps; ++next_) {
@@ -153,7 +153,7 @@ Result<Producer<v1::FindRouteReply>> resume(Routes& routes, const RpcLimits& lim
   const auto position = Position::parse(opened->position);
   if (!position || position->step == 0 || position->step >= opened->kept->answer.route.steps())
     return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
-  // The ends may be left out: the route is known.
+  // The ends may be left out, since the route is known.
   const bool has_ends =
       request.has_from() || request.has_to() || !request.or_from().empty() || !request.or_to().empty();
   if (position->fingerprint != route_fingerprint(request) ||
@@ -192,7 +192,7 @@ Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& requ
   found->view = map.view;
   auto answer = [&] {
     SearchWork work(mapper.budget(), limits.max_search_frames,
-                    deadline);  // its memory is given back before the route's is charged
+                    deadline);  // releases its memory before that of the route is charged
     return route::search_route(map, from->frames, to->frames, *options, limits.near_route_steps, work.limit());
   }();
   if (!answer.ok()) return answer.status();

@@ -14,17 +14,16 @@ namespace relmap::rpc {
 
 namespace {
 
-constexpr int kMaxEnds = 100;  // alternatives; of them few may be pictures, each of which takes its time
+constexpr int kMaxEnds = 100;  // alternatives; few of them may be pictures, since each takes time
 constexpr std::size_t kMaxPictures = 4;
 constexpr std::size_t kMaxFrames = 10'000;  // at an end, or to be avoided
 constexpr int kMaxLabels = 100, kMaxSessions = 10'000;
 
-Status too_many(const char* what, std::size_t most) {
-  return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(most) + ' ' + what};
+Status too_many(const char* what, std::size_t max_count) {
+  return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(max_count) + ' ' + what};
 }
 
-// The newest frame of all sessions of the robot: of those with two cameras, if there are any, since others have no
-// edges.
+// The newest frame of the robot's sessions. Stereo sessions are preferred, since mono sessions have no edges.
 Result<FrameId> newest_frame(const storage::Graph& map, const std::string& robot) {
   const auto rank = [](const storage::Session& session) {
     return std::pair(session.header.camera.is_stereo(), session.last_time_us);
@@ -78,11 +77,12 @@ Status add_end(map::Mapper& mapper, const storage::MapView& view, const v1::Rout
 Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
   if (request.has_weights()) {
     if (request.by() != v1::ROUTE_BY_UNSPECIFIED)
-      return {Reason::INVALID_ARGUMENT, "a route is by weights of its own or by one of the kinds, not both"};
+      return {Reason::INVALID_ARGUMENT, "a route is either by weights or by one of the kinds, not both"};
     const v1::RouteWeights& given = request.weights();
     const route::RouteWeights weights{given.metre(), given.driven_second(), given.standing_second(),
                                       given.square_metre_of_variance()};
-    if (!weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0, or 1e-9 to 1e9, and not all 0"};
+    if (!weights.valid())
+      return {Reason::INVALID_ARGUMENT, "each weight must be 0 or between 1e-9 and 1e9, and not all may be 0"};
     return weights;
   }
   switch (request.by()) {
@@ -94,7 +94,7 @@ Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
     case v1::ROUTE_BY_CERTAINTY:
       return route::kByCertainty;
     default:
-      return {Reason::INVALID_ARGUMENT, "routes are by distance, by time, by certainty, or by weights"};
+      return {Reason::INVALID_ARGUMENT, "a route is by distance, by time, by certainty or by weights"};
   }
 }
 

@@ -1,4 +1,4 @@
-// What a request for a route asks for. Internal to server/rpc: shows generated code.
+// Parses a request for a route. Internal to server/rpc, since it exposes generated code.
 #pragma once
 
 #include <map>
@@ -14,7 +14,7 @@ namespace relmap::rpc {
 
 struct RouteEnds {
   std::vector<FrameId> frames;
-  std::map<FrameId, v1::LocaliseReply> seen;  // those that are there because of a picture
+  std::map<FrameId, v1::LocaliseReply> seen;  // the frames that come from a picture, with their localisation
 
   std::optional<v1::LocaliseReply> view_at(FrameId frame) const {
     const auto found = seen.find(frame);
@@ -22,19 +22,19 @@ struct RouteEnds {
   }
 };
 
-// One end with its alternatives. `what`: "from" or "to", for messages. INVALID_ARGUMENT (there is none, or too many),
-// NO_SUCH_FRAME, NO_SUCH_LABEL, NO_SUCH_SESSION (a robot without frames), and what a localisation may say, of the first
-// that is not there.
+// Returns the frames of one end with its alternatives. `what` is "from" or "to", for messages. The reasons, of the
+// first alternative that fails: INVALID_ARGUMENT (no end, or too many), NO_SUCH_FRAME, NO_SUCH_LABEL, NO_SUCH_SESSION
+// (a robot without frames), and those of a localisation.
 Result<RouteEnds> route_ends(map::Mapper& mapper, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline);
 
-// INVALID_ARGUMENT (too many of anything, too), NO_SUCH_LABEL, NO_SUCH_SESSION, NO_SUCH_FRAME (to be avoided),
-// DEADLINE.
+// Returns weights, filter and limits. INVALID_ARGUMENT (also for too many labels, sessions or frames), NO_SUCH_LABEL,
+// NO_SUCH_SESSION, NO_SUCH_FRAME (one to be avoided), DEADLINE.
 Result<route::RouteOptions> route_options(const storage::Graph& map, const v1::FindRouteRequest& request,
                                           const Deadline& deadline);
 
-// Of all but the ends: a stream that breaks is resumed only by a request for the same.
+// Fingerprints of a request without its ends, and of the ends: a broken stream is resumed only by an equal request.
 std::uint32_t route_fingerprint(const v1::FindRouteRequest& request);
 std::uint32_t route_ends_fingerprint(const v1::FindRouteRequest& request);
 

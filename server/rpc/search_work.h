@@ -1,4 +1,4 @@
-// The WorkLimit of a search that a caller asked for: its deadline, and its memory from the budget.
+// The WorkLimit of a call's search: its deadline, and its memory from the budget.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace relmap::rpc {
 
-// Must outlive the limit that it gives.
+// Must outlive the limits that it returns.
 class SearchWork {
  public:
   SearchWork(storage::Budget& budget, std::size_t max_frames, const Deadline& deadline)

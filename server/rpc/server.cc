@@ -18,16 +18,16 @@ namespace relmap::rpc {
 
 namespace {
 
-// Two pictures and what stands around them.
+// Two pictures and the rest of their message.
 constexpr int kMaxRequestBytes = 2 * static_cast<int>(vision::kMaxPictureBytes) + (1 << 20);
 
-// What gRPC may hold of requests that are on their way in and replies that nobody takes. Beyond it gRPC reads no more.
+// Memory that gRPC may use for incoming requests and for replies that are not taken. Beyond it gRPC stops reading.
 constexpr std::size_t kTransportBytes = kMaxRequestBytes + (std::size_t{16} << 20);
 
-// For what is no call of ours (health watches, idle connections).
+// How long Shutdown() waits for what is not a call of ours (health watches, idle connections).
 constexpr std::chrono::milliseconds kGrace{50};
 
-// Plugins are global and read when a ServerBuilder is made.
+// Plugins are global, and a ServerBuilder reads them when it is constructed.
 void enable_plugins() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -49,7 +49,7 @@ struct RpcServer::Impl {
 
   Gateway gateway;
   std::vector<std::unique_ptr<grpc::Service>> services;
-  std::unique_ptr<grpc::Server> server;  // destroyed first
+  std::unique_ptr<grpc::Server> server;  // destroyed before the services
   int port = 0;
   bool stopped = false;
 };
@@ -66,10 +66,10 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOpti
   impl->services.push_back(make_admin_service(core, impl->gateway));
 
   grpc::ServerBuilder builder;
-  // Two daemons would share the port in silence otherwise.
+  // Otherwise two daemons would silently share the port.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
-  // A robot that drove out of reach leaves its stream behind: it is let go of in half a minute.
+  // The stream of a robot that drives out of radio range is closed after half a minute.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // any number
@@ -83,7 +83,8 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOpti
   impl->server = builder.BuildAndStart();
   if (!impl->server || impl->port == 0) {
     impl->stopped = true;
-    return {Reason::PORT_IN_USE, "cannot listen on " + address + ": another process does, or it is no address of ours"};
+    return {Reason::PORT_IN_USE,
+            "cannot listen on " + address + ": another process uses it, or it is not an address of this machine"};
   }
   return std::unique_ptr<RpcServer>(new RpcServer(std::move(impl)));
 }
@@ -95,7 +96,7 @@ void RpcServer::stop(std::chrono::milliseconds patience) {
   impl_->stopped = true;
   if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
   impl_->gateway.drain();
-  // Shutdown() would wait for idle connections, too, whose clients may take seconds to notice.
+  // Waits for calls only: Shutdown() would also wait for idle connections, whose clients may take seconds to notice.
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (impl_->gateway.calls() > 0 && std::chrono::steady_clock::now() < deadline)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -12,20 +12,20 @@ namespace relmap::rpc {
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 0;  // 0: any free one
+  std::uint16_t port = 0;  // 0 means any free port
 };
 
 class RpcServer {
  public:
-  // Serves from its return on. PORT_IN_USE. `core` must outlive it.
+  // Starts a server, which serves when this returns. `core` must outlive it. PORT_IN_USE.
   static Result<std::unique_ptr<RpcServer>> start(Core& core, const ServerOptions& options);
-  // As stop() without patience.
+  // Stops without patience.
   ~RpcServer();
 
   std::uint16_t port() const;
 
-  // Health says NOT_SERVING, new calls are refused, running ones see their deadline passed; those that have not ended
-  // after `patience` are cut off.
+  // Stops the server: health reports NOT_SERVING, new calls are refused, and running ones are interrupted. Calls that
+  // have not ended after `patience` are cut off.
   void stop(std::chrono::milliseconds patience);
 
  private:

@@ -45,7 +45,7 @@ class Server : public testing::Test {
     request.mutable_frame()->set_index(id.index);
     return map_stub_->GetFrame(in ? in : own.get(), request, reply);
   }
-  // A call by name and bytes, for services whose messages we have no code for.
+  // Makes a call by name and bytes, for services for whose messages we have no code.
   Result<std::string> call_raw(const std::string& method, const std::string& bytes) {
     grpc::GenericStub stub(channel_);
     grpc::CompletionQueue queue;
@@ -94,7 +94,7 @@ TEST_F(Server, RefusalsCarryTheirReasonAndTheRequestId) {
   EXPECT_EQ(call->GetServerInitialMetadata().find("x-request-id")->second, "robot-7.42");
 }
 
-TEST_F(Server, AnIdThatWouldSpoilTheLogIsReplaced) {
+TEST_F(Server, ARequestIdThatIsUnfitForTheLogIsReplaced) {
   const auto call = context();
   call->AddMetadata("x-request-id", "two words");
   v1::GetFrameReply reply;
@@ -142,7 +142,7 @@ TEST_F(Server, AMapIsReindexedWithoutIt) {
   EXPECT_THAT(error_of(status).message(), testing::HasSubstr("relmap-admin reindex"));
 }
 
-TEST_F(Server, WhatIsNotServedYetSaysSoByName) {
+TEST_F(Server, AnRpcThatIsNotServedYetIsRefusedByName) {
   const auto expect_unimplemented = [](const grpc::Status& status, const std::string& name) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
     EXPECT_EQ(error_of(status).reason(), v1::REASON_UNIMPLEMENTED);
@@ -166,7 +166,7 @@ TEST_F(Server, ARequestThatCannotBeReadIsRefusedByName) {
   EXPECT_EQ(error_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
   EXPECT_EQ(error_of(status).message(),
             "the request of Map.SetLabel cannot be read: its bytes are damaged, or a text is not UTF-8");
-  // The same of a stream of answers.
+  // The same for a streaming RPC.
   v1::FindRouteRequest route;
   route.mutable_to()->set_label("\xff");
   const auto asked = context();
@@ -231,7 +231,7 @@ TEST_F(Server, AnswersHealthAndReflection) {
     EXPECT_THAT(*services, testing::HasSubstr(name));
 }
 
-TEST_F(Server, WhatIsBeyondTheLimitsIsRefusedAtOnce) {
+TEST_F(Server, CallsBeyondTheLimitsAreRefusedAtOnce) {
   Core crowded(*map_.mapper, map_.core->facts, {.max_pictures = 0});
   const auto server = RpcServer::start(crowded, {}).or_throw();
   const auto stub = v1::Map::NewStub(
@@ -242,7 +242,7 @@ TEST_F(Server, WhatIsBeyondTheLimitsIsRefusedAtOnce) {
   EXPECT_EQ(error_of(status).reason(), v1::REASON_BUDGET_EXCEEDED);
   v1::GetStatusReply other;
   EXPECT_TRUE(stub->GetStatus(context().get(), {}, &other).ok());
-  // What a call held is given back a moment after its answer.
+  // A call releases its budget a moment after its answer.
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   while (map_.mapper->budget().used(storage::Share::kReplies) > 0 && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -265,7 +265,7 @@ TEST_F(Server, StoppingRefusesNewCallsAndEndsRunningOnes) {
   grpc::Status status;
   while ((status = get_frame({1, 1}, &reply)).ok()) {
   }
-  // Refused by us, or, a moment later, by gRPC itself.
+  // The call is refused by us or, a moment later, by gRPC itself.
   EXPECT_THAT(status.error_code(), testing::AnyOf(grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::CANCELLED));
   stopper.join();
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(4));

@@ -1,5 +1,5 @@
-// The three gRPC services over a Core: they name each RPC to the gateway and its handler, and do nothing else. What has
-// no handler answers UNIMPLEMENTED by name.
+// The three gRPC services over a Core. They only connect each RPC with the gateway and its handler. An RPC without a
+// handler answers UNIMPLEMENTED with its name.
 #pragma once
 
 #include <grpcpp/impl/codegen/service_type.h>

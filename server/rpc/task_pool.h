@@ -1,4 +1,4 @@
-// Threads that run handlers, so that no RPC blocks gRPC's own.
+// Threads that run handlers, so that no RPC blocks a thread of gRPC.
 #pragma once
 
 #include <condition_variable>
@@ -11,11 +11,11 @@
 
 namespace relmap::rpc {
 
-// Thread-safe. Tasks run in the order in which they were posted, each by one of the threads.
+// Tasks start in the order in which they were posted, each on one of the threads. Thread-safe.
 class TaskPool {
  public:
   explicit TaskPool(int threads);
-  // Runs what was posted, then joins.
+  // Runs all tasks that were posted, then joins the threads.
   ~TaskPool();
   TaskPool(const TaskPool&) = delete;
   TaskPool& operator=(const TaskPool&) = delete;

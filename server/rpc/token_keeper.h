@@ -1,4 +1,4 @@
-// What page and resume tokens refer to, kept for a while.
+// Keeps what page and resume tokens refer to for a while.
 #pragma once
 
 #include <algorithm>
@@ -16,24 +16,25 @@
 
 namespace relmap::rpc {
 
-// "BOOT-NUMBER-POSITION": which daemon, what of it, where to go on.
+// What a token refers to. A token is "BOOT-NUMBER-POSITION": the run of the daemon, the number of what is kept, and
+// where to continue.
 template <typename T>
 struct Continuation {
   std::shared_ptr<const T> kept;
-  std::string position;  // empty: from the start
+  std::string position;  // empty means from the start
 };
 
 // Thread-safe.
 template <typename T>
 class TokenKeeper {
  public:
-  static constexpr std::chrono::seconds kMaxAge{120};  // since a token last gave or took it
+  static constexpr std::chrono::seconds kMaxAge{120};  // since a token for it was last made or opened
 
-  // `name`: of what is kept, for messages; `most`: of them.
-  TokenKeeper(std::string_view boot_id, std::string name, std::size_t most)
-      : boot_(boot_id.substr(0, 8)), name_(std::move(name)), most_(most) {}
+  // `name` is what is kept, for messages. At most `max_kept` are kept.
+  TokenKeeper(std::string_view boot_id, std::string name, std::size_t max_kept)
+      : boot_(boot_id.substr(0, 8)), name_(std::move(name)), max_kept_(max_kept) {}
 
-  // A token for `position` in something that has this number, which is kept from now on.
+  // Keeps an object under this number and returns a token for `position` in it.
   std::string token(std::uint64_t number, std::shared_ptr<const T> kept, std::string_view position) {
     const std::lock_guard lock(mutex_);
     expire_locked();
@@ -41,9 +42,10 @@ class TokenKeeper {
     return boot_ + "-" + std::to_string(number) + "-" + std::string(position);
   }
 
-  // INVALID_ARGUMENT: no token of ours; VIEW_EXPIRED: of another run of the daemon, or too old.
+  // Returns what a token refers to. INVALID_ARGUMENT if it is not a token of this service; VIEW_EXPIRED if it is of
+  // another run of the daemon or too old.
   Result<Continuation<T>> open(const std::string& token) {
-    const Status not_ours(Reason::INVALID_ARGUMENT, "'" + token.substr(0, 64) + "' is no token of this service");
+    const Status not_ours(Reason::INVALID_ARGUMENT, "'" + token.substr(0, 64) + "' is not a token of this service");
     const std::size_t first = token.find('-');
     const std::size_t second = first == std::string::npos ? first : token.find('-', first + 1);
     if (second == std::string::npos) return not_ours;
@@ -62,14 +64,14 @@ class TokenKeeper {
     return Continuation<T>{std::move(kept), token.substr(second + 1)};
   }
 
-  // Lets go of what was used longest ago. False: nothing is kept.
+  // Drops the least recently used object. False if nothing is kept.
   bool drop_oldest() {
     const std::lock_guard lock(mutex_);
     if (kept_.empty()) return false;
     kept_.pop_back();
     return true;
   }
-  // Lets go of what is too old; called now and then.
+  // Drops what is too old. Must be called now and then.
   void expire() {
     const std::lock_guard lock(mutex_);
     expire_locked();
@@ -89,23 +91,23 @@ class TokenKeeper {
   void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) {
     kept_.remove_if([&](const Kept& k) { return k.number == number; });
     kept_.push_front({number, std::move(kept), Clock::now()});
-    if (kept_.size() > most_) kept_.pop_back();
+    if (kept_.size() > max_kept_) kept_.pop_back();
   }
 
   const std::string boot_, name_;
-  const std::size_t most_;
+  const std::size_t max_kept_;
   std::mutex mutex_;
   std::list<Kept> kept_;  // most recently used first
 };
 
-// Map versions, by their number.
+// Keeps map versions by their numbers.
 class ViewKeeper : public TokenKeeper<storage::MapView> {
  public:
   explicit ViewKeeper(std::string_view boot_id) : TokenKeeper(boot_id, "map version", 8) {}
   std::string token(const std::shared_ptr<const storage::MapView>& view, std::string_view position) {
     return TokenKeeper::token(view->version(), view, position);
   }
-  // Without a token: `newest`, from the start.
+  // With an empty token, returns `newest` from the start.
   Result<Continuation<storage::MapView>> open(const std::string& token,
                                               std::shared_ptr<const storage::MapView> newest) {
     if (token.empty()) return Continuation<storage::MapView>{std::move(newest), ""};

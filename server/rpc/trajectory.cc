@@ -29,7 +29,7 @@ Result<std::optional<TrajectoryPose>> TrajectoryReader::next() {
   next_ = storage::next_in_session(id, *hot);
   if (!next_ && id != last_)
     return {Reason::DATA_LOSS,
-            "nothing leads on from frame " + id.to_string() + ", and the session ends with frame " + last_.to_string()};
+            "no edge leads on from frame " + id.to_string() + ", but the session ends with frame " + last_.to_string()};
   previous_ = id;
   T_first_previous_ = T_first_this;
   const bool doubtful = step && (storage::is_unmeasured(*step) || !step->carried_by.empty());

@@ -1,6 +1,6 @@
-// The trajectory of one session in one frame: its odometry edges chained from its first keyframe. A picture of the map,
-// not the map: what loop closures say across the chain is not in it, and a step that nothing measured is a guess that
-// all later poses inherit.
+// The trajectory of one session in one coordinate frame: its odometry edges chained from its first keyframe. It is only
+// a projection of the map: transforms of loop closures do not enter it, and the error of a step that no sensor measured
+// affects all later poses.
 #pragma once
 
 #include <memory>
@@ -17,16 +17,17 @@ struct TrajectoryPose {
   FrameId frame;
   std::shared_ptr<const storage::FrameHot> hot;
   SE3 T_first_frame;  // p_first = T_first_frame p_frame
-  // Of `hot`, if nothing measured it (is_unmeasured()) or the robot was carried along it.
+  // The edge to this frame, an edge of `hot`, if no sensor measured it (is_unmeasured()) or the robot was carried along
+  // it; otherwise null.
   const storage::Edge* doubtful_step = nullptr;
 };
 
-// One pose after another; reads as far as it is asked. `graph` must outlive it.
+// Reads one pose after another, each when it is asked for. `graph` must outlive it.
 class TrajectoryReader {
  public:
   TrajectoryReader(const storage::Graph& graph, const storage::Session& session);
 
-  // nullopt at the end. DATA_LOSS if the chain of odometry is broken.
+  // The next pose; nullopt at the end. DATA_LOSS if the chain of odometry is broken.
   Result<std::optional<TrajectoryPose>> next();
 
  private:
@@ -37,9 +38,9 @@ class TrajectoryReader {
   SE3 T_first_previous_;
 };
 
-// TUM: "time tx ty tz qx qy qz qw" after '#' lines that name the session and the frame of the poses. KITTI has no
-// comments: the upper three rows of the matrix, row by row; header is then empty. A '#' line before a pose says that
-// its step is doubtful.
+// TUM: "time tx ty tz qx qy qz qw" after '#' lines that name the session and the frame of the poses; a '#' line before
+// a pose says that its step is doubtful. KITTI has no comments: a line holds the upper three rows of the matrix, row by
+// row, and the header is empty.
 std::string trajectory_header(TrajectoryFormat format, const storage::Session& session);
 std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose);
 

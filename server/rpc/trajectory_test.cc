@@ -62,15 +62,15 @@ TEST_F(Trajectory, HeadersNameSessionAndFrameWhereTheFormatCan) {
   EXPECT_EQ(trajectory_header(TrajectoryFormat::kKitti, session()), "");
 }
 
-TEST_F(Trajectory, AFrameThatNothingLeadsToIsALossToo) {
+TEST_F(Trajectory, AFrameThatNoEdgeLeadsToIsDataLoss) {
   map_.editable(map_.id('B')).incoming.clear();
   TrajectoryReader reader(map_, session());
   EXPECT_TRUE(reader.next().ok());
   EXPECT_EQ(reader.next().reason(), Reason::DATA_LOSS);
 }
 
-// Frame by frame through the billion of sequences between, this would take hours.
-TEST_F(Trajectory, GapsCostNothing) {
+// Stepping through the billions of missing sequences one by one would take hours.
+TEST_F(Trajectory, GapsAreSkippedInOneStep) {
   constexpr FrameId kLate{1, 4'000'000'000};
   map_.leave_a_gap('B', 'C', kLate);
   storage::Session session = this->session();
@@ -84,7 +84,7 @@ TEST_F(Trajectory, GapsCostNothing) {
   EXPECT_FALSE(reader.next().or_throw().has_value());
 }
 
-TEST_F(Trajectory, ABrokenChainIsALossAndNotAGuess) {
+TEST_F(Trajectory, ABrokenChainIsDataLoss) {
   map_.editable(map_.id('B')).edges.clear();
   TrajectoryReader reader(map_, session());
   EXPECT_TRUE(reader.next().ok());

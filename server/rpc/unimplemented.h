@@ -1,4 +1,5 @@
-// RPCs that are defined but not served yet: they answer UNIMPLEMENTED by name, through the gateway like all others.
+// RPCs that are defined but not served yet. They answer UNIMPLEMENTED with their name, through the gateway like all
+// others.
 #pragma once
 
 #include "server/rpc/gateway.h"

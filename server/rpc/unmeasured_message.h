@@ -1,4 +1,4 @@
-// What of a way nothing measured, in any reply that tells of one. Internal to server/rpc: shows generated code.
+// Writes the unmeasured stretches of a path into a reply. Internal to server/rpc, since it exposes generated code.
 #pragma once
 
 #include "proto/wire/convert.h"
@@ -7,9 +7,9 @@
 
 namespace relmap::rpc {
 
-// A RouteSummary, or a TransformBetweenReply.
-template <typename Way>
-void tell_unmeasured(const route::UnmeasuredStretches& stretches, Way& message) {
+// `Message` is a RouteSummary or a TransformBetweenReply.
+template <typename Message>
+void tell_unmeasured(const route::UnmeasuredStretches& stretches, Message& message) {
   for (const route::UnmeasuredStretch& stretch : stretches.list()) {
     v1::UnmeasuredStretch& told = *message.add_unmeasured();
     *told.mutable_first() = to_wire(stretch.first);

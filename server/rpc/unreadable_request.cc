@@ -27,7 +27,7 @@ class NamesIt final : public grpc::experimental::Interceptor {
   void Intercept(grpc::experimental::InterceptorBatchMethods* batch) override {
     if (batch->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       const grpc::Status status = batch->GetSendStatus();
-      // What we say ourselves has words.
+      // Statuses of our own have a message.
       if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && status.error_message().empty())
         batch->ModifySendStatus(
             to_grpc({Reason::INVALID_ARGUMENT,
@@ -46,7 +46,7 @@ class Factory final : public grpc::experimental::ServerInterceptorFactoryInterfa
   grpc::experimental::Interceptor* CreateServerInterceptor(grpc::experimental::ServerRpcInfo* info) override {
     if (info->type() == grpc::experimental::ServerRpcInfo::Type::BIDI_STREAMING) return nullptr;
     std::string method = name_of(info->method());
-    return required_role(method) ? new NamesIt(std::move(method)) : nullptr;  // gRPC takes it
+    return required_role(method) ? new NamesIt(std::move(method)) : nullptr;  // gRPC takes ownership
   }
 };
 

@@ -16,8 +16,8 @@ namespace relmap::rpc {
 
 namespace {
 
-// The camera that took the view's picture, of a session whose front-end rectified what it took. Features are of
-// rectified pictures.
+// The session's camera that took the view's picture: the raw one or, if the picture is rectified or the view holds
+// features, the rectified one.
 Result<PictureCalibration> camera_of(const storage::Session& session, const v1::View& view) {
   const StereoCamera& camera = session.header.camera;
   const auto& raw = session.header.raw;
@@ -34,9 +34,9 @@ Result<PictureCalibration> camera_of(const storage::Session& session, const v1::
 
 Result<PictureCalibration> calibration_of(const v1::View& view, const storage::Graph& graph) {
   if (view.rectified() && view.calibration_case() != v1::View::kSession)
-    return {Reason::INVALID_ARGUMENT, "whether pictures are rectified is said of the camera of a session only"};
+    return {Reason::INVALID_ARGUMENT, "rectified can only be said of pictures of a session's camera"};
   if (view.either_eye() && view.calibration_case() != v1::View::kSession)
-    return {Reason::INVALID_ARGUMENT, "that either eye may have taken a picture is said of the rig of a session only"};
+    return {Reason::INVALID_ARGUMENT, "either_eye can only be said of pictures of a session's camera"};
   switch (view.calibration_case()) {
     case v1::View::kCamera: {
       const auto camera = from_wire(view.camera());
@@ -71,7 +71,7 @@ Result<SeenView> see_features(const v1::View& view, const PictureCalibration& ca
   auto features = from_wire(view.features());
   if (!features.ok()) return features.status();
   if (std::holds_alternative<StereoCalibration>(calibration))
-    return {Reason::INVALID_ARGUMENT, "features are those of a rectified picture: give its rectified camera"};
+    return {Reason::INVALID_ARGUMENT, "features must be of a rectified picture: give its rectified camera"};
   SeenView seen;
   seen.features = std::move(features).value();
   if (const auto* camera = std::get_if<StereoCamera>(&calibration)) seen.camera = *camera;
@@ -81,7 +81,7 @@ Result<SeenView> see_features(const v1::View& view, const PictureCalibration& ca
 
 Result<SeenView> see_frame(const v1::View& view, const storage::Graph& graph) {
   if (view.has_right() || view.calibration_case() != v1::View::CALIBRATION_NOT_SET)
-    return {Reason::INVALID_ARGUMENT, "a frame of the map was seen by its session's camera: name no other"};
+    return {Reason::INVALID_ARGUMENT, "the camera of a frame of the map is that of its session: name no other"};
   const auto frame = existing_frame(graph, true, view.frame(), "frame");
   if (!frame.ok()) return frame.status();
   const auto session = graph.session(frame->session);

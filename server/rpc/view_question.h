@@ -1,4 +1,5 @@
-// relmap.v1.View to what localise.h asks: features and a camera. Internal to server/rpc: shows generated code.
+// Converts relmap.v1.View to the features and camera that localise.h needs. Internal to server/rpc, since it exposes
+// generated code.
 #pragma once
 
 #include <optional>
@@ -15,16 +16,17 @@ namespace relmap::rpc {
 
 struct SeenView {
   std::vector<AppearanceFeature> features;
-  std::optional<StereoCamera> camera;       // f 0: of unknown focal length; nothing: not even the size is known
-  double scale = 1;                         // pixels of `camera` per pixel of the picture as it was given
-  std::vector<storage::FrameRange> masked;  // no answers: the recent past of a frame that asks
-  bool pair = false;                        // both eyes' pictures were given, and the right one shows something
+  std::optional<StereoCamera> camera;       // f is 0 if unknown; nullopt if not even the size is known
+  double scale = 1;                         // pixels of `camera` per pixel of the given picture
+  std::vector<storage::FrameRange> masked;  // frames that are no answers: the recent past if the view is a map frame
+  bool pair = false;                        // both pictures of a pair were given, and the right one shows something
   place::CameraKnown known = place::CameraKnown::kMeasuredWith;
   Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
 };
 
-// Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see; a frame with a camera),
-// NO_SUCH_SESSION, SESSION_DELETED, NO_SUCH_FRAME, and the reasons of describe_picture() and from_wire().
+// Decodes and describes pictures, and checks features. INVALID_ARGUMENT (an empty view, a frame with a camera, options
+// that do not fit), NO_CALIBRATION (the session has no camera), NO_SUCH_SESSION, SESSION_DELETED, NO_SUCH_FRAME, and
+// the reasons of describe_picture() and from_wire().
 Result<SeenView> see(const v1::View& view, const storage::Graph& graph);
 
 }  // namespace relmap::rpc

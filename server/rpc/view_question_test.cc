@@ -51,7 +51,7 @@ TEST_F(ViewQuestion, APictureOfASessionsCameraIsRectifiedAsItsFrontEndDid) {
   EXPECT_EQ(seen->camera, one_eye);
 }
 
-TEST_F(ViewQuestion, APictureThatIsSaidToBeRectifiedIsTakenAsItIs) {
+TEST_F(ViewQuestion, APictureThatIsSaidToBeRectifiedIsNotRectified) {
   v1::View rectified = question(kRaw);
   rectified.set_rectified(true);
   for (const v1::View& view : {rectified, question(kRectified)}) {
@@ -70,7 +70,7 @@ TEST_F(ViewQuestion, APictureOfTheRectifiedSizeOnlyIsTakenAsRectified) {
   EXPECT_EQ(seen->camera->f, 310);
 }
 
-TEST_F(ViewQuestion, ADeletedSessionsCameraIsNobodysAnyMore) {
+TEST_F(ViewQuestion, TheCameraOfADeletedSessionIsRefused) {
   graph_.edit_session(kRectified).state = storage::SessionState::kDeleting;
   EXPECT_EQ(see(question(kRectified), graph_).reason(), Reason::SESSION_DELETED);
 }
@@ -105,7 +105,7 @@ TEST_F(ViewQuestion, APictureOfEitherEyeMayBeTurnedUnlessItIsRectified) {
   EXPECT_EQ(see(view, graph_).reason(), Reason::INVALID_ARGUMENT);
 }
 
-TEST_F(ViewQuestion, RectifiedIsSaidOfASessionsCameraOnly) {
+TEST_F(ViewQuestion, RectifiedNeedsTheCameraOfASession) {
   v1::View view = question(kRaw);
   view.set_rectified(true);
   *view.mutable_camera() = to_wire(graph_.session(kRectified)->header.camera);

@@ -1,4 +1,4 @@
-// One edit of a caller: durable, then applied and visible.
+// Makes an edit durable, and waits until it is applied and visible.
 #pragma once
 
 #include <functional>
@@ -10,13 +10,13 @@
 
 namespace relmap::rpc {
 
-// `make_record` is asked unless the edit of this key and content was done before. `sequence`: of its journal record.
-// What `make_record` refuses with, EditLog::once(), Mapper::submit() and wait_applied().
+// Calls `make_record` unless the edit with this key and content was done before, and sets `sequence` to that of the
+// journal record. The reasons are those of `make_record`, EditLog::once(), Mapper::submit() and wait_applied().
 Status write_and_wait(map::Mapper& mapper, EditLog& edits, const std::string& key, const std::string& content,
                       const Deadline& deadline, const std::function<Result<storage::JournalRecord>()>& make_record,
                       std::uint64_t& sequence);
 
-// INVALID_ARGUMENT
+// INVALID_ARGUMENT if the note is too long.
 Status check_note(const std::string& note);
 
 }  // namespace relmap::rpc

@@ -475,7 +475,7 @@ void run_fleet(const Options& options, Report& report) {
       [&](std::uint64_t version, std::span<const storage::ChunkId> chunks) { index.changed(version, chunks); });
   index.start();
   const auto settle = [&] {
-    if (!index.wait_settled(Clock::now() + std::chrono::hours(1)) || !index.snapshot().overlay)
+    if (!index.wait_current(Clock::now() + std::chrono::hours(1)) || !index.snapshot().overlay)
       throw std::runtime_error("no cells: " + index.snapshot().missing_because);
   };
   settle();

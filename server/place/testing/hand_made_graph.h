@@ -1,4 +1,4 @@
-// A graph put together by hand, all in memory: for tests and measurements.
+// A graph in memory that tests and benchmarks put together by hand.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,7 @@ class HandMadeGraph final : public storage::Graph {
     session.last = std::max(session.last, id.index);
     ++session.frames;
   }
-  // Stored with `b`, the newer; both frames exist.
+  // Both frames must exist. The edge is stored with `b`, the newer one.
   void add_edge(FrameId a, FrameId b, std::uint32_t ordinal, const SE3& T_ab = {},
                 const Matrix6& covariance = 1e-6 * Matrix6::Identity()) {
     storage::Edge edge;

@@ -1,4 +1,4 @@
-// For tests: a valid vocabulary without training pictures.
+// For tests: a valid vocabulary that needs no training pictures.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// For tests: a chain of stereo keyframes past random points, with tracks, landmarks and an appearance set, and pictures
-// of it from anywhere; measured with Gaussian noise of the sigma that the map believes in.
+// For tests: a chain of stereo keyframes past random points, with tracks, landmarks and appearance, and pictures of it
+// from any pose. Measurements have Gaussian noise of the sigma that the map assumes.
 #pragma once
 
 #include <cmath>
@@ -33,7 +33,7 @@ class SyntheticStreet {
 
   SE3 pose(std::uint32_t frame) const { return {Matrix3::Identity(), Vector3(0, 0, 0.3 * frame)}; }
 
-  // What a camera at T_street_camera sees; `points` tells which point each feature is.
+  // Returns the features that a camera at T_street_camera sees, and appends the index of each one's point to `points`.
   std::vector<AppearanceFeature> picture(const SE3& T_street_camera, bool stereo, std::vector<std::size_t>& points) {
     std::vector<AppearanceFeature> features;
     const SE3 T_camera_street = T_street_camera.inverse();

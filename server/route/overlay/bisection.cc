@@ -11,9 +11,9 @@ namespace {
 
 constexpr std::uint32_t kNone = ~0u;
 constexpr std::uint32_t kCoarsest = 60;  // nodes
-constexpr int kStarts = 6;               // of growing a side
-constexpr int kPasses = 4;               // of refinement, at each level
-constexpr std::size_t kPatience = 120;   // moves without gain before a pass ends
+constexpr int kStarts = 6;               // nodes from which a side is grown; the best result is kept
+constexpr int kPasses = 4;               // passes of refinement at each level
+constexpr std::size_t kPatience = 120;   // moves without gain after which a pass ends
 
 using Sides = std::vector<std::uint8_t>;
 
@@ -21,7 +21,8 @@ std::uint64_t total(const std::vector<std::uint32_t>& sizes) {
   return std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0});
 }
 
-// Joins each node to the neighbour that it is tied to most, for its size; what is alone stays. The coarse node of each.
+// Matches each node with the neighbour to which it has the heaviest arc for the neighbour's size; nodes without a free
+// neighbour stay alone. Returns the coarse node of each node.
 std::vector<std::uint32_t> match(const WeightedGraph& graph, std::uint64_t max_size, std::mt19937& random,
                                  std::uint32_t& coarse_nodes) {
   std::vector<std::uint32_t> order(graph.nodes()), coarse(graph.nodes(), kNone);
@@ -58,10 +59,11 @@ WeightedGraph contract(const WeightedGraph& graph, const std::vector<std::uint32
   return make_weighted_graph(std::move(sizes), std::move(pairs));
 }
 
-// Moves nodes, the best first and each at most once a pass, and takes back what came after the best moment.
+// Moves nodes between the sides, best gain first and each at most once a pass, and takes back the moves after the best
+// state.
 class Refinement {
  public:
-  Refinement(const WeightedGraph& graph, std::uint64_t most) : graph_(graph), most_(most) {}
+  Refinement(const WeightedGraph& graph, std::uint64_t max_size) : graph_(graph), max_size_(max_size) {}
 
   void run(Sides& side) {
     for (int pass = 0; pass < kPasses; ++pass)
@@ -85,12 +87,12 @@ class Refinement {
   }
   std::uint64_t excess(const std::uint64_t* sizes) const {
     const std::uint64_t larger = std::max(sizes[0], sizes[1]);
-    return larger > most_ ? larger - most_ : 0;
+    return larger > max_size_ ? larger - max_size_ : 0;
   }
 
   bool improve(Sides& side) {
     std::uint64_t sizes[2] = {0, 0};
-    std::priority_queue<Entry> queues[2];  // by the side that a node is on
+    std::priority_queue<Entry> queues[2];  // by the side on which a node is
     std::vector<std::int64_t> gains(graph_.nodes());
     for (std::uint32_t v = 0; v < graph_.nodes(); ++v) {
       sizes[side[v]] += graph_.size[v];
@@ -134,7 +136,7 @@ class Refinement {
     return best_excess < excess_before || best_gained > 0;
   }
 
-  // The side from which the best node may move; -1: none may.
+  // The side from which the best node may move; -1 if none may.
   int choose(std::priority_queue<Entry>* queues, const std::vector<std::int64_t>& gains, const std::vector<bool>& moved,
              const Sides& side, const std::uint64_t* sizes) const {
     int best = -1;
@@ -145,9 +147,9 @@ class Refinement {
         queue.pop();
       if (queue.empty()) continue;
       const std::uint32_t size = graph_.size[queue.top().node];
-      if (sizes[from] <= size) continue;  // nothing would be left
-      const bool heavy = sizes[from] > most_;
-      if (sizes[1 - from] + size > most_ && !heavy) continue;
+      if (sizes[from] <= size) continue;  // the side would be empty
+      const bool heavy = sizes[from] > max_size_;
+      if (sizes[1 - from] + size > max_size_ && !heavy) continue;
       if (heavy) return from;
       if (best < 0 || queues[best].top() < queue.top()) best = from;
     }
@@ -155,10 +157,10 @@ class Refinement {
   }
 
   const WeightedGraph& graph_;
-  const std::uint64_t most_;
+  const std::uint64_t max_size_;
 };
 
-// One side grows from a node until it has half of the whole; of what could come next, that which is tied most.
+// Grows one side from a node until it has half of the whole, each time by the node that increases the cut least.
 Sides grow(const WeightedGraph& graph, std::uint32_t start, std::uint64_t half) {
   Sides side(graph.nodes(), 0);
   std::vector<std::int64_t> tie(graph.nodes(), 0);
@@ -192,16 +194,16 @@ Sides grow(const WeightedGraph& graph, std::uint32_t start, std::uint64_t half) 
   return side;
 }
 
-Sides bisect_coarsest(const WeightedGraph& graph, std::uint64_t most, std::mt19937& random) {
+Sides bisect_coarsest(const WeightedGraph& graph, std::uint64_t max_size, std::mt19937& random) {
   const std::uint64_t half = (total(graph.size) + 1) / 2;
   Sides best;
   std::uint64_t best_cut = 0, best_excess = 0;
   for (int i = 0; i < kStarts; ++i) {
     Sides side = grow(graph, static_cast<std::uint32_t>(random() % graph.nodes()), half);
-    Refinement(graph, most).run(side);
+    Refinement(graph, max_size).run(side);
     std::uint64_t sizes[2] = {0, 0};
     for (std::uint32_t v = 0; v < graph.nodes(); ++v) sizes[side[v]] += graph.size[v];
-    const std::uint64_t larger = std::max(sizes[0], sizes[1]), excess = larger > most ? larger - most : 0;
+    const std::uint64_t larger = std::max(sizes[0], sizes[1]), excess = larger > max_size ? larger - max_size : 0;
     const std::uint64_t cut = cut_of(graph, side);
     if (!best.empty() && (excess > best_excess || (excess == best_excess && cut >= best_cut))) continue;
     best = std::move(side);
@@ -246,9 +248,9 @@ std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double max_share) {
   if (graph.nodes() < 2) return Sides(graph.nodes(), 0);
   std::mt19937 random(graph.nodes());
   const std::uint64_t whole = total(graph.size);
-  const auto most = static_cast<std::uint64_t>(max_share * static_cast<double>(whole));
+  const auto max_size = static_cast<std::uint64_t>(max_share * static_cast<double>(whole));
   std::vector<WeightedGraph> levels;
-  std::vector<std::vector<std::uint32_t>> coarse;  // node of levels[i + 1] of each of levels[i]
+  std::vector<std::vector<std::uint32_t>> coarse;  // for each node of level i, its node of level i + 1
   const auto finest = [&](std::size_t level) -> const WeightedGraph& { return level == 0 ? graph : levels[level - 1]; };
   while (finest(levels.size()).nodes() > kCoarsest) {
     const WeightedGraph& fine = finest(levels.size());
@@ -259,13 +261,13 @@ std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double max_share) {
     coarse.push_back(std::move(joined));
     levels.push_back(std::move(contracted));
   }
-  Sides side = bisect_coarsest(finest(levels.size()), most, random);
+  Sides side = bisect_coarsest(finest(levels.size()), max_size, random);
   for (std::size_t level = levels.size(); level-- > 0;) {
     const WeightedGraph& fine = finest(level);
     Sides finer(fine.nodes());
     for (std::uint32_t v = 0; v < fine.nodes(); ++v) finer[v] = side[coarse[level][v]];
     side = std::move(finer);
-    Refinement(fine, most).run(side);
+    Refinement(fine, max_size).run(side);
   }
   return side;
 }

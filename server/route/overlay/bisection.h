@@ -1,5 +1,5 @@
-// Divides a graph into two parts of about the same size with few edges between them: multilevel bisection (Karypis and
-// Kumar, SIAM J. Sci. Comput. 1998), refined as Fiduccia and Mattheyses (DAC 1982) do.
+// Divides a graph into two parts of about the same size with few edges between them, by multilevel bisection (Karypis
+// and Kumar, SIAM J. Sci. Comput. 1998) with the refinement of Fiduccia and Mattheyses (DAC 1982).
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace relmap::route {
 
-// Undirected, in rows: what v is joined to stands in arcs[begin[v]] .. arcs[begin[v + 1]], each neighbour once, and not
-// v itself; u is a neighbour of v with the weight that v is one of u with.
+// An undirected graph in compressed rows: the neighbours of v are in arcs[begin[v]] .. arcs[begin[v + 1]], each once
+// and without v itself. Arcs are symmetric: v is a neighbour of u with the weight with which u is one of v.
 struct WeightedGraph {
   struct Arc {
     std::uint32_t to;
@@ -22,17 +22,19 @@ struct WeightedGraph {
   std::uint32_t nodes() const { return static_cast<std::uint32_t>(size.size()); }
 };
 
-// From pairs, of which each may be given several times, in either order: their weights are added.
+// A pair of nodes that are joined.
 struct WeightedPair {
   std::uint32_t a, b;
   std::uint32_t weight;
 };
+// A pair may be given several times, in either order; its weights are added.
 WeightedGraph make_weighted_graph(std::vector<std::uint32_t> sizes, std::vector<WeightedPair> pairs);
 
-// The side of each node, 0 or 1. Neither side is larger than `max_share` (0.5 .. 1) of the whole, but by what one node
-// takes; neither is empty where there are two nodes. The same graph gives the same sides.
+// Returns the side of each node, 0 or 1. Neither side exceeds the share `max_share` (0.5 .. 1) of the whole by more
+// than the size of one node, and neither is empty if there are at least two nodes. Deterministic.
 std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double max_share = 0.6);
 
+// The total weight of the arcs between the two sides.
 std::uint64_t cut_of(const WeightedGraph& graph, const std::vector<std::uint8_t>& side);
 
 }  // namespace relmap::route

@@ -25,7 +25,7 @@ std::uint64_t larger_side(const WeightedGraph& graph, const std::vector<std::uin
   return std::max(sizes[0], sizes[1]);
 }
 
-TEST(Bisection, PairsAreAddedWhateverTheirOrder) {
+TEST(Bisection, PairsAreAddedInAnyOrder) {
   const WeightedGraph graph = make_weighted_graph({1, 1, 1}, {{0, 1, 2}, {1, 0, 3}, {2, 2, 7}});
   ASSERT_EQ(graph.arcs.size(), 2u);
   EXPECT_EQ(graph.arcs[graph.begin[0]].to, 1u);

@@ -1,6 +1,6 @@
-// Part of the map as a search sees it that only wants to pass: the frames at which the part can be entered or left, the
-// edges that lead out, and what it costs to get from one of these frames to another within the part. Delling, Goldberg,
-// Pajor and Werneck, "Customizable route planning", SEA 2011.
+// A cell is a part of the map as a search sees it that passes through: its border frames, at which it can be entered or
+// left, the edges that lead out of it, and the costs of the cheapest paths between border frames within it (Delling,
+// Goldberg, Pajor and Werneck, "Customizable route planning", SEA 2011).
 #pragma once
 
 #include <algorithm>
@@ -26,10 +26,11 @@ struct Link {
   std::uint32_t support = 0;
   bool loop = false;     // a loop edge
   bool forward = false;  // `to` is Edge::b
-  bool out = false;      // it may be travelled to `to`,
-  bool in = false;       // and from there
+  bool out = false;      // the edge may be travelled to `to`
+  bool in = false;       // the edge may be travelled from `to`
 
-  // Where searches met `to` last: a cell's number and a node of it, packed; to be checked by whoever follows it.
+  // Where a search last found `to`: the number of a cell and a node of it, packed. It may be outdated, so its user must
+  // check it.
   class Hint {
    public:
     Hint() = default;
@@ -52,14 +53,15 @@ struct Link {
   bool operator==(const Link&) const = default;
 };
 
-// Frames at which a search meets a part of the map, and their edges: those that lead out of it, or all.
+// Frames of a part of the map and their edges: the border frames with the edges that lead out, or all frames with all
+// edges.
 struct CellFrames {
   std::vector<FrameId> nodes;        // ascending
   std::vector<std::uint32_t> begin;  // links of nodes[i]: links[begin[i]] .. links[begin[i + 1]]
   std::vector<Link> links;
 
   static constexpr std::uint32_t kNone = ~0u;
-  std::uint32_t find(FrameId frame) const;  // its place among the nodes, or kNone
+  std::uint32_t find(FrameId frame) const;  // index among the nodes, or kNone
   std::span<const Link> links_of(std::uint32_t node) const {
     return std::span(links).subspan(begin[node], begin[node + 1] - begin[node]);
   }
@@ -67,13 +69,13 @@ struct CellFrames {
   bool operator==(const CellFrames&) const = default;
 };
 
-// What is asked of a cell before it is looked into.
+// Facts about a cell that are known without reading it.
 struct CellFacts {
-  bool oneway = false;  // not all of it may be travelled both ways
-  // Its edges lead from each of its frames to each other, some perhaps against the traffic; frames of parts that no
-  // edge leads into apart.
+  bool oneway = false;  // whether some of its edges may be travelled in one direction only
+  // Whether its edges, whatever their directions, connect all of its frames; parts into which no edge leads do not
+  // count.
   bool joined = false;
-  // Of the edges between two of its frames: what a filter (passage.h) may refuse.
+  // Extremes over the edges between two of its frames, which a filter (passage.h) may refuse.
   std::uint32_t min_support = std::numeric_limits<std::uint32_t>::max();
   double longest_loop_m = 0;
 
@@ -92,17 +94,17 @@ struct CellFacts {
 struct Cell {
   CellFacts facts;
   CellFrames frames;
-  std::vector<CostMatrix> within;  // between the frames, from row to column, one for each metric
+  std::vector<CostMatrix> within;  // for each metric, the costs from border frame (row) to border frame (column)
 };
 
-// Where links of one lead that the other does not have just so: both are a chunk's, then and now.
+// The ends of links that differ between two states of a chunk, of those that only one of the two has.
 std::vector<FrameId> ends_of_changed_links(const CellFrames& then, const CellFrames& now);
 
-// The chunk opened: all its frames and their edges. `border`: of its cell, if that is known; then no other chunk is
+// Returns all frames of a chunk and their edges. If the border frames of the chunk's cell are given, no other chunk is
 // read. Throws StatusError where reads of the graph do.
 CellFrames frames_of(const storage::Graph& graph, storage::ChunkId chunk, const CellFrames* border = nullptr);
 
-// A chunk, of what frames_of() gives.
+// Makes the cell of a chunk from the result of frames_of().
 Cell make_cell(const CellFrames& frames, storage::ChunkId chunk, std::span<const RouteWeights> metrics);
 
 }  // namespace relmap::route

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::uint64_t kCrcBytes = 4;
 constexpr std::uint64_t kLinkBytes = 44;
-constexpr std::size_t kFlushBytes = std::size_t{1} << 18;  // of a cell, written at once
+constexpr std::size_t kFlushBytes = std::size_t{1} << 18;  // bytes of a cell that are written at once
 
 enum LinkFlags : std::uint32_t { kLoop = 1, kForward = 2, kOut = 4, kIn = 8 };
 
@@ -90,7 +90,7 @@ struct CellStore::Impl {
   Impl(std::unique_ptr<storage::RandomFile> f, std::string d, std::shared_ptr<storage::Budget> b, std::uint64_t room)
       : file(std::move(f)), folder(std::move(d)), budget(std::move(b)), room_for_others(room) {}
 
-  // A part of a cell in memory, charged for as long as anybody holds it.
+  // A part of a cell in memory, charged to the budget as long as anybody holds it.
   template <typename T>
   struct Held {
     Held(T v, std::shared_ptr<storage::Budget> b, std::size_t n)
@@ -108,7 +108,7 @@ struct CellStore::Impl {
     std::size_t bytes;
   };
 
-  // What stands at `offset`, of memory or else of the disk.
+  // The part at `offset`, from memory or else from the disk.
   template <typename Load>
   auto part(std::uint64_t offset, std::size_t bytes, const Load& load)
       -> std::shared_ptr<const std::invoke_result_t<Load>>;
@@ -128,13 +128,13 @@ struct CellStore::Impl {
   Status look_for_room(std::uint64_t bytes) const;
 
   const std::unique_ptr<storage::RandomFile> file;
-  const std::string folder;  // empty: nobody minds how large the file is
+  const std::string folder;  // empty: the size of the file is not limited
   const std::shared_ptr<storage::Budget> budget;
   const std::uint64_t room_for_others;
   std::atomic<bool> damaged = false;
 
   std::mutex mutex;
-  std::list<Kept> kept;  // asked for last: first
+  std::list<Kept> kept;  // most recently used first
   std::unordered_map<std::uint64_t, std::list<Kept>::iterator> places;
   Extents extents;
   std::uint64_t file_end = 0;
@@ -167,7 +167,7 @@ auto CellStore::Impl::part(std::uint64_t offset, std::size_t bytes, const Load& 
   return made;
 }
 
-// What was just written, if there is room.
+// Caches what was just written if there is room.
 template <typename T>
 void CellStore::Impl::keep(std::uint64_t offset, T value, std::size_t bytes) {
   if (!budget->try_charge(storage::Share::kRoutes, bytes)) return;
@@ -210,18 +210,18 @@ void CellStore::Impl::charge(std::size_t bytes) {
   while (!budget->try_charge(storage::Share::kRoutes, bytes))
     if (evict(bytes) == 0)
       throw StatusError(
-          Status(Reason::BUDGET_EXCEEDED, "cells that this search passes find no room in the " +
+          Status(Reason::BUDGET_EXCEEDED, "the cells that this search passes need more than the " +
                                               std::to_string(budget->allowance(storage::Share::kRoutes) >> 20) +
                                               " MB that memory_budget_mb leaves for them"));
 }
 
 std::size_t CellStore::Impl::evict(std::size_t bytes) {
-  std::vector<std::shared_ptr<const void>> gone;  // freed where nothing is locked
+  std::vector<std::shared_ptr<const void>> gone;  // freed after the lock is released
   std::size_t freed = 0;
   const std::lock_guard lock(mutex);
   for (auto at = kept.end(); freed < bytes && at != kept.begin();) {
     --at;
-    if (at->part.use_count() > 1) continue;  // another would only be read again beside it
+    if (at->part.use_count() > 1) continue;  // its memory would not be freed
     freed += at->bytes;
     gone.push_back(std::move(at->part));
     places.erase(at->offset);
@@ -242,7 +242,7 @@ Status CellStore::Impl::look_for_room(std::uint64_t bytes) const {
   const auto room = storage::posix_file_system()->room(folder);
   if (!room.ok()) return room.status();
   if (room->free < room_for_others + bytes)
-    return {Reason::DISK_FULL, "what is free on the disk is left to the map: cells of routes have no room"};
+    return {Reason::DISK_FULL, "the disk has no room for cells of routes beside what is reserved for the map"};
   return {};
 }
 
@@ -255,7 +255,7 @@ Result<std::shared_ptr<CellStore>> CellStore::open(const std::string& data_folde
   const std::string folder = data_folder + "/routes";
   if (Status made = storage::posix_file_system()->create_directory(folder); !made.ok()) return made;
   const std::string path = folder + "/cells";
-  // Another file: searches may still read the one that was there.
+  // The file is replaced, not emptied, since searches may still read the earlier one.
   if (Status gone = storage::posix_file_system()->remove(path); !gone.ok() && gone.reason() != Reason::NO_SUCH_FILE)
     return gone;
   return open_file(folder, std::move(budget), room_for_others);
@@ -327,7 +327,7 @@ std::shared_ptr<const StoredCell> CellStore::write(const CellFacts& facts, const
     written += w.size();
     w = {};
   };
-  // What searches have in memory of the one before they will want of this.
+  // Caches the same parts of this cell as searches have in memory of the earlier one.
   std::vector<std::pair<std::uint64_t, SplitCostMatrix>> wanted;
   const auto put = [&](SplitCostMatrix matrix, std::size_t metric, bool backward) {
     flush(kFlushBytes);

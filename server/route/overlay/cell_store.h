@@ -1,8 +1,8 @@
-// Cells on disk, DIR/routes/cells, and in memory as much of them as searches need and the budget has room for. They can
-// be made again from the map: only when a run ends in order is anything synced.
+// Stores cells on disk, in DIR/routes/cells, and caches what searches need of them in memory as far as the budget has
+// room. Cells can be made again from the map, so the file is synced only when a run ends in order.
 //
-// A cell lies in one piece: its frames, and for each metric the costs between them, in both directions where that makes
-// a difference. Each of these parts has a checksum, is read by itself, and is the first to go when the room is needed.
+// A cell is stored in one piece: its frames, and for each metric the costs between them, in both directions if these
+// differ. Each of these parts has a checksum and is read by itself; parts in memory are evicted as others need room.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace relmap::route {
 
 class CellStore;
 
-// Where a cell lies. With the last of those who hold it the cell is gone from the disk. Thread-safe.
+// A cell on disk. The destructor frees its space in the file. Thread-safe.
 class StoredCell {
  public:
   ~StoredCell();
@@ -28,12 +28,12 @@ class StoredCell {
 
   const CellFacts& facts() const { return facts_; }
   std::uint32_t nodes() const { return nodes_; }
-  // They stay as long as they are held. All reads throw StatusError: IO_ERROR, DATA_LOSS; and these two BUDGET_EXCEEDED
-  // (no room, though all that nobody holds has gone).
+  // These two cache what they read, and what they return stays in memory as long as it is held. They throw StatusError:
+  // IO_ERROR, DATA_LOSS, and BUDGET_EXCEEDED if there is no room even after everything that nobody holds was evicted.
   std::shared_ptr<const CellFrames> frames() const;
-  // From a frame to each (row to column); `backward`: to it from each.
+  // Costs from row to column or, if `backward`, from column to row.
   std::shared_ptr<const SplitCostMatrix> within(std::size_t metric, bool backward) const;
-  // The same beside the budget, for whoever needs it once.
+  // The same without cache and budget, for callers that need them once. They throw StatusError: IO_ERROR, DATA_LOSS.
   CellFrames read_frames() const;
   CostMatrix read_within(std::size_t metric) const;
 
@@ -55,37 +55,37 @@ class StoredCell {
 // Thread-safe.
 class CellStore : public std::enable_shared_from_this<CellStore> {
  public:
-  // Without cells, in a folder that exists: what stood there is gone. So many bytes of the disk are left to others.
-  // Errors: NO_SUCH_FILE, IO_ERROR, DISK_FULL, READ_ONLY.
+  // Opens an empty store in a folder that exists; an earlier file of cells is removed. The store leaves
+  // `room_for_others` bytes of the disk free. Errors: NO_SUCH_FILE, IO_ERROR, DISK_FULL, READ_ONLY.
   static Result<std::shared_ptr<CellStore>> open(const std::string& data_folder,
                                                  std::shared_ptr<storage::Budget> budget,
                                                  std::uint64_t room_for_others);
-  // In a file without a name. No budget: one that never ends.
+  // Opens a store in an unnamed file. Without a budget its memory is unlimited.
   static Result<std::shared_ptr<CellStore>> open_temporary(std::shared_ptr<storage::Budget> budget = nullptr);
   ~CellStore();
 
-  // Throws StatusError: IO_ERROR, DISK_FULL (there is no more room than is left to others). `known`: another of the
-  // same part of the map; where the two are the same, it is given back.
+  // Writes a cell. `known` is an earlier cell of the same part of the map; it is returned if the two are identical.
+  // Throws StatusError: IO_ERROR, DISK_FULL (also if only `room_for_others` is left).
   std::shared_ptr<const StoredCell> write(const Cell& cell, std::shared_ptr<const StoredCell> known = nullptr);
-  // Of a large one: `within` gives each matrix when it is due.
+  // The same for a large cell: `within` is called for each matrix when it is about to be written.
   using Within = std::function<CostMatrix(std::size_t metric)>;
   std::shared_ptr<const StoredCell> write(const CellFacts& facts, const CellFrames& frames, std::size_t metrics,
                                           const Within& within, std::shared_ptr<const StoredCell> known);
-  // For cells that were put(): what stands there is kept. Errors as those of open().
+  // Opens the file that an earlier run left, for cells that were put(). Errors as for open().
   static Result<std::shared_ptr<CellStore>> reopen(const std::string& data_folder,
                                                    std::shared_ptr<storage::Budget> budget,
                                                    std::uint64_t room_for_others);
   void put(ByteWriter& w, const StoredCell& cell) const;
-  // What put() put; null: the bytes are not that.
+  // Reads what put() wrote; null if the bytes are invalid.
   std::shared_ptr<const StoredCell> get(ByteReader& r);
-  // What was written is durable on return. IO_ERROR, DISK_FULL.
+  // Makes all that was written durable. IO_ERROR, DISK_FULL.
   Status sync();
-  // Of what is in memory, and nobody holds, so many bytes go, those first that were not asked for for the longest time.
-  // Returns how many went.
+  // Evicts at least `bytes` bytes from memory of what nobody holds, least recently used first. Returns how many bytes
+  // were freed, which may be fewer.
   std::size_t evict(std::size_t bytes);
-  // Gives the end of the file back to the disk where nothing stands any more.
+  // Truncates the file behind the last cell.
   void trim();
-  // A cell could not be read as it was written: what is there is of no use.
+  // Whether a cell could not be read as it was written; then the store is of no use.
   bool is_damaged() const;
   std::uint64_t bytes_in_use() const;  // of the disk
 

@@ -55,7 +55,7 @@ void expect_same(const StoredCell& stored, const Cell& cell) {
   }
 }
 
-TEST(CellStore, GivesWhatItTook) {
+TEST(CellStore, ReturnsWhatWasWritten) {
   const auto store = CellStore::open_temporary().or_throw();
   std::mt19937 random(1);
   std::vector<std::pair<Cell, std::shared_ptr<const StoredCell>>> cells;
@@ -87,15 +87,15 @@ TEST(CellStore, HoldsInMemoryWhatTheBudgetAllows) {
     auto stored = store->write(cell);
     cells.emplace_back(std::move(cell), std::move(stored));
   }
-  std::size_t most = 0;
+  std::size_t max_used = 0;
   for (int i = 0; i < 2000; ++i) {
     const auto& [cell, stored] = cells[random() % cells.size()];
     EXPECT_EQ(*stored->within(1, false), SplitCostMatrix(cell.within[1]));
-    most = std::max(most, budget->used(storage::Share::kRoutes));
+    max_used = std::max(max_used, budget->used(storage::Share::kRoutes));
   }
-  EXPECT_LE(most, budget->allowance(storage::Share::kRoutes));
-  EXPECT_GT(most, budget->allowance(storage::Share::kRoutes) / 2);
-  // What is held does not go.
+  EXPECT_LE(max_used, budget->allowance(storage::Share::kRoutes));
+  EXPECT_GT(max_used, budget->allowance(storage::Share::kRoutes) / 2);
+  // What somebody holds is not evicted.
   std::vector<std::shared_ptr<const SplitCostMatrix>> held;
   const auto hold_all = [&] {
     for (const auto& [cell, stored] : cells) held.push_back(stored->within(0, false));
@@ -110,7 +110,7 @@ TEST(CellStore, HoldsInMemoryWhatTheBudgetAllows) {
   EXPECT_EQ(budget->used(storage::Share::kRoutes), 0u);
 }
 
-TEST(CellStore, WhatSearchesHadOfACellTheyHaveOfTheNext) {
+TEST(CellStore, CachesTheSamePartsOfACellThatReplacesAnother) {
   const auto budget = std::make_shared<storage::Budget>(10'000'000);
   const auto store = CellStore::open_temporary(budget).or_throw();
   std::mt19937 random(6);
@@ -132,7 +132,7 @@ TEST(CellStore, WhatSearchesHadOfACellTheyHaveOfTheNext) {
   expect_same(*second, other);
 }
 
-TEST(CellStore, DamageIsSeen) {
+TEST(CellStore, DetectsDamage) {
   const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
@@ -152,14 +152,14 @@ TEST(CellStore, DamageIsSeen) {
   EXPECT_THROW(stored->frames(), StatusError);
   EXPECT_TRUE(store->is_damaged());
   EXPECT_EQ(*stored->within(0, false), SplitCostMatrix(cell.within[0])) << "the rest is whole";
-  // Another begins anew, beside what is still read.
+  // A new store begins empty while the earlier file can still be read.
   const auto other = CellStore::open(folder, std::make_shared<storage::Budget>(1'000'000), 0).or_throw();
   expect_same(*other->write(cell), cell);
   EXPECT_EQ(*stored->within(1, false), SplitCostMatrix(cell.within[1]));
   EXPECT_EQ(CellStore::open(folder + "/nowhere", nullptr, 0).reason(), Reason::NO_SUCH_FILE);
 }
 
-TEST(CellStore, LeavesTheMapItsRoomOnTheDisk) {
+TEST(CellStore, LeavesRoomOnTheDiskForTheMap) {
   const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
@@ -180,11 +180,11 @@ TEST(CellStore, LeavesTheMapItsRoomOnTheDisk) {
   EXPECT_EQ(other->bytes_in_use(), 0u);
 }
 
-TEST(Extents, NoTwoOverlapAndAllIsGivenOutAgain) {
+TEST(Extents, DoNotOverlapAndAreReused) {
   std::mt19937 random(4);
   Extents extents;
   std::map<std::uint64_t, std::uint64_t> taken;
-  std::uint64_t most = 0;
+  std::uint64_t max_end = 0;
   for (int step = 0; step < 20'000; ++step) {
     if (random() % 2 == 0 && !taken.empty()) {
       const auto at = std::next(taken.begin(), static_cast<std::ptrdiff_t>(random() % taken.size()));
@@ -201,10 +201,10 @@ TEST(Extents, NoTwoOverlapAndAllIsGivenOutAgain) {
         ASSERT_LE(offset + bytes, after->first);
       }
       ASSERT_LE(offset + bytes, extents.end());
-      most = std::max(most, extents.end());
+      max_end = std::max(max_end, extents.end());
     }
   }
-  EXPECT_LT(most, 2u * 100 * 5120);
+  EXPECT_LT(max_end, 2u * 100 * 5120);
   for (const auto& [offset, bytes] : taken) extents.give_back(offset, bytes);
   EXPECT_EQ(extents.end(), 0u);
   EXPECT_EQ(extents.in_use(), 0u);

@@ -7,11 +7,11 @@
 namespace relmap::route {
 namespace {
 
-constexpr double kFanout = 8;  // about
+constexpr double kFanout = 8;  // approximate number of parts of a cell that is made
 
 }  // namespace
 
-// Chunks, as nodes of the tree, and what joins them.
+// Chunks, as nodes of the tree, and the edges between them.
 struct CellTree::Part {
   std::vector<std::uint32_t> chunks;
   WeightedGraph graph;
@@ -88,7 +88,7 @@ std::optional<CellTree> CellTree::get(ByteReader& r) {
       tree.parents_[child] = number;
     }
   }
-  // Each but the root is in one of the next level: no way up goes round.
+  // Each node except the root must have a parent on the next level, so the parents have no cycle.
   if (!r.ok() || (size == 0) != (tree.root_ == kNone) || (size > 0 && tree.root_ >= size)) return std::nullopt;
   for (std::uint32_t number = 0; number < size; ++number) {
     const std::uint32_t parent = tree.parents_[number];
@@ -101,7 +101,7 @@ std::optional<CellTree> CellTree::get(ByteReader& r) {
 std::uint32_t CellTree::find(storage::ChunkId chunk) const {
   if (chunk.session >= sessions_.size() || sessions_[chunk.session].chunks.empty()) return kNone;
   const auto& [chunks, numbers] = sessions_[chunk.session];
-  // Mostly none is missing between them.
+  // As a rule a session's chunks are consecutive.
   const std::uint32_t place = chunk.chunk - chunks.front();
   if (place < chunks.size() && chunks[place] == chunk.chunk) return numbers[place];
   const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk);
@@ -115,7 +115,7 @@ std::span<const std::uint32_t> CellTree::chunks_of(SessionNumber session) const 
 }
 
 std::size_t CellTree::memory_bytes() const {
-  // A node; in its parent, and where its session's are; vectors that grow are half empty.
+  // A node, and its number in its parent and in its session; allows for the unused capacity of vectors that grow.
   return nodes_.capacity() * (sizeof(Node) + 3 * sizeof(std::uint32_t)) + std::size_t{chunks_} * 16;
 }
 

@@ -1,6 +1,5 @@
-// Which chunks lie together: cells within cells, of chunks at the bottom, divided where few edges cross. It grows with
-// the map as a B-tree does: a new chunk goes to the cell that it is joined to, and a cell with too many parts becomes
-// two.
+// The tree of nested cells, with chunks as its leaves, divided where few edges cross. It grows with the map like a
+// B-tree: a new chunk is added to a cell to which edges join it, and a cell with too many parts is split in two.
 #pragma once
 
 #include <cstdint>
@@ -26,26 +25,27 @@ class CellTree {
   };
 
   CellTree() = default;
-  // `chunks`: each once, ascending. `ties`: how many edges join two chunks, by their places in `chunks`.
+  // Builds a tree. `chunks` are ascending, each once. `ties` say how many edges join two chunks, by their indices in
+  // `chunks`.
   CellTree(std::span<const storage::ChunkId> chunks, std::vector<WeightedPair> ties);
 
-  // Cells keep their numbers. Of a tree without chunks there is no root.
+  // Cells keep their numbers as the tree grows. A tree without chunks has no root.
   std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
   std::uint32_t root() const { return root_; }
   const Node& node(std::uint32_t cell) const { return nodes_[cell]; }
-  // kNone: it is the root.
+  // The cell around a cell; kNone for the root.
   std::uint32_t parent(std::uint32_t cell) const { return parents_[cell]; }
-  // kNone: the tree does not know the chunk.
+  // The number of a chunk; kNone if the tree does not hold it.
   std::uint32_t find(storage::ChunkId chunk) const;
-  // Chunks of a session that the tree knows, ascending.
+  // The numbers of a session's chunks, ascending by chunk.
   std::span<const std::uint32_t> chunks_of(SessionNumber session) const;
   std::uint32_t chunks() const { return chunks_; }
-  SessionNumber sessions() const { return static_cast<SessionNumber>(sessions_.size()); }  // numbers are below it
+  SessionNumber sessions() const { return static_cast<SessionNumber>(sessions_.size()); }  // above all their numbers
   std::size_t memory_bytes() const;
   void put(ByteWriter& w) const;
-  // What put() put; nullopt: the bytes are not that.
+  // Reads what put() wrote; nullopt if the bytes are invalid.
   static std::optional<CellTree> get(ByteReader& r);
-  // Levels below the root's.
+  // The number of levels below the root.
   std::uint32_t levels() const { return chunks_ == 0 ? 0 : node(root_).level; }
   // The cell of this level around a cell.
   std::uint32_t around(std::uint32_t cell, std::uint32_t level) const {
@@ -53,11 +53,12 @@ class CellTree {
     return cell;
   }
 
-  // A chunk that the tree does not know, into the cell of one that it knows; kNone: it is joined to none. The cell may
-  // have too many parts then. Returns the chunk's number.
+  // Adds a chunk to the cell of the chunk `beside`, or, if `beside` is kNone, to some cell. The tree must not hold the
+  // chunk yet. Afterwards the cell may have too many parts. Returns the chunk's number.
   std::uint32_t add(storage::ChunkId chunk, std::uint32_t beside);
   bool has_too_many_parts(std::uint32_t cell) const { return nodes_[cell].children.size() > kMaxParts; }
-  // Into two: `side` of each of its children, both of which occur. Returns the new one, which has those of side 1.
+  // Splits a cell in two by the side, 0 or 1, of each of its children; both sides must occur. Returns the new cell,
+  // which has the children of side 1.
   std::uint32_t split(std::uint32_t cell, const std::vector<std::uint8_t>& side);
 
  private:
@@ -68,15 +69,15 @@ class CellTree {
   std::uint32_t add_chunk(storage::ChunkId chunk);  // without a parent yet
   void note_chunk(std::uint32_t number);
 
-  double fanout_ = 1;  // a cell that is made has at most fanout_^level chunks
+  double fanout_ = 1;  // the constructor makes cells of at most fanout_^level chunks
   std::uint32_t root_ = kNone, chunks_ = 0;
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> parents_;  // searches climb them
+  std::vector<std::uint32_t> parents_;  // by cell; apart from the nodes, since searches read only these
   struct SessionChunks {
     std::vector<std::uint32_t> chunks;  // ascending
     std::vector<std::uint32_t> numbers;
   };
-  std::vector<SessionChunks> sessions_;  // by number
+  std::vector<SessionChunks> sessions_;  // by session number
 };
 
 }  // namespace relmap::route

@@ -71,12 +71,12 @@ SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whol
   auto* rests = reinterpret_cast<std::uint16_t*>(floors + n_ * n_);
   for (std::size_t i = 0; i < n_; ++i)
     for (std::size_t j = 0; j < n_; ++j, ++floors, ++rests) {
-      constexpr double kMaxCost = std::numeric_limits<float>::max();  // a broken covariance may give more
+      constexpr double kMaxCost = std::numeric_limits<float>::max();  // an invalid covariance may give more
       const double cost = whole(i, j) < kUnreachable ? std::min(whole(i, j), kMaxCost) : kUnreachable;
       auto floor = static_cast<float>(cost);
       if (double{floor} > cost) floor = std::nextafter(floor, 0.0f);
       *floors = floor;
-      const double unit = joined(floor, 1) - double{floor};  // 0: it is as small as a float can be
+      const double unit = joined(floor, 1) - double{floor};  // 0 if the floor is denormal
       *rests = cost < kUnreachable && unit > 0
                    ? static_cast<std::uint16_t>(std::min(std::floor((cost - double{floor}) / unit + 0.5), 65535.0))
                    : std::uint16_t{0};

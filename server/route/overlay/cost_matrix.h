@@ -1,4 +1,4 @@
-// Costs of the cheapest ways between n nodes, in the algebra of (min, +).
+// Matrices of the costs of the cheapest paths between n nodes, in the (min, +) algebra.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class CostMatrix {
   double* row(std::size_t i) { return values_.data() + i * n_; }
   const double* row(std::size_t i) const { return values_.data() + i * n_; }
   double operator()(std::size_t i, std::size_t j) const { return values_[i * n_ + j]; }
-  // By another way.
+  // Takes `cost` if it is lower than the known one.
   void offer(std::size_t i, std::size_t j, double cost) {
     double& best = values_[i * n_ + j];
     if (cost < best) best = cost;
@@ -33,9 +33,10 @@ class CostMatrix {
 
   CostMatrix transposed() const;
 
-  // The Schur complement: of ways over the nodes from `kept` on only their cost is left, between the nodes before.
+  // Eliminates the nodes from index `kept` on (the Schur complement): the costs between the nodes before account for
+  // paths over the eliminated ones.
   void eliminate(std::size_t kept);
-  // Every entry becomes that of the cheapest way over any of the nodes (Floyd 1962).
+  // Makes every entry the cost of the cheapest path over any nodes (Floyd 1962).
   void close();
 
   std::size_t memory_bytes() const { return values_.capacity() * sizeof(double); }
@@ -46,12 +47,13 @@ class CostMatrix {
   std::vector<double> values_;
 };
 
-// The same, to be searched and stored in 6 bytes a cost: what single precision has of it, rounded down, and the rest in
-// 16 bits (40 in all: 1e-12 of it). A search reads the rest only where the first does not rule the way out.
+// A cost matrix in 6 bytes a cost, for searching and storing: the cost in single precision, rounded down (the floor),
+// and the rest in 16 bits. The relative precision is 40 bits, 1e-12. A search reads the rest only if the floor does not
+// rule the path out.
 class SplitCostMatrix {
  public:
   explicit SplitCostMatrix(const CostMatrix& whole);
-  // Of no particular values.
+  // A matrix with undefined values.
   explicit SplitCostMatrix(std::size_t n)
       : n_(n), bytes_(std::make_unique_for_overwrite<std::uint8_t[]>(memory_bytes(n))) {}
   CostMatrix whole() const;
@@ -62,18 +64,18 @@ class SplitCostMatrix {
     return reinterpret_cast<const std::uint16_t*>(floors(n_)) + i * n_;
   }
   double operator()(std::size_t i, std::size_t j) const { return joined(floors(i)[j], rests(i)[j]); }
-  // The unit of a rest is 2^-39 of the power of two below the floor.
+  // The cost. The unit of the rest is 2^-39 of the power of two below the floor.
   static double joined(float floor, std::uint16_t rest) {
     if (rest == 0) return floor;
     const auto power = std::bit_cast<float>(std::bit_cast<std::uint32_t>(floor) & kExponentBits);
     return double{floor} + double{power} * kRestUnit * rest;
   }
-  // By how much a cost and the sum along its way may differ: a share of it.
+  // The largest relative difference between a stored cost and the sum along its path.
   static constexpr double kPrecision = 4e-12;
   static constexpr std::uint32_t kExponentBits = 0x7f800000;
   static constexpr double kRestUnit = 0x1p-39;
 
-  // All of it, the floors first.
+  // The memory of the matrix, floors first.
   std::span<std::uint8_t> bytes() { return {bytes_.get(), memory_bytes(n_)}; }
   std::span<const std::uint8_t> bytes() const { return {bytes_.get(), memory_bytes(n_)}; }
   static constexpr std::size_t memory_bytes(std::size_t n) { return n * n * (sizeof(float) + sizeof(std::uint16_t)); }

@@ -1,4 +1,4 @@
-// Sets that grow together (Tarjan 1975), of numbers 0 .. n - 1.
+// Disjoint sets (union-find, Tarjan 1975) of the numbers 0 .. n - 1.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ class DisjointSets {
  public:
   explicit DisjointSets(std::uint32_t n = 0) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
   std::uint32_t size() const { return static_cast<std::uint32_t>(parent_.size()); }
-  // So many more, each alone; the first of them.
+  // Adds n numbers, each in a set of its own. Returns the first of them.
   std::uint32_t add(std::size_t n) {
     const std::uint32_t first = size();
     parent_.resize(first + n);
@@ -22,7 +22,7 @@ class DisjointSets {
     while (parent_[x] != x) x = parent_[x] = parent_[parent_[x]];
     return x;
   }
-  // False: they were one already.
+  // Unites the sets of x and y. False if they were one set already.
   bool join(std::uint32_t x, std::uint32_t y) {
     x = find(x);
     y = find(y);

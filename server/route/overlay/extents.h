@@ -1,4 +1,4 @@
-// Which parts of a file are in use: parts that are given back are given out again.
+// Allocates parts of a file and reuses those that are given back.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ class Extents {
   static constexpr std::uint64_t kGrain = 512;  // parts begin and end at multiples of it
   static std::uint64_t round_up(std::uint64_t bytes) { return (bytes + kGrain - 1) / kGrain * kGrain; }
 
-  // Of the smallest free part that is large enough, or at the end of the file. Returns where it begins.
+  // Takes bytes from the smallest free part that is large enough, or else at the end of the file. Returns their offset.
   std::uint64_t take(std::uint64_t bytes) {
     bytes = round_up(bytes);
     in_use_ += bytes;
@@ -26,7 +26,7 @@ class Extents {
     return offset;
   }
 
-  // As it was taken in another run; no two of these overlap.
+  // Takes a part that was taken in an earlier run. It must be free (is_free()).
   void retake(std::uint64_t offset, std::uint64_t bytes) {
     bytes = round_up(bytes);
     in_use_ += bytes;
@@ -50,7 +50,7 @@ class Extents {
     return offset + round_up(bytes) <= around->first + around->second;
   }
 
-  // As it was taken.
+  // Frees a part; offset and size must be those with which it was taken.
   void give_back(std::uint64_t offset, std::uint64_t bytes) {
     bytes = round_up(bytes);
     in_use_ -= bytes;
@@ -72,11 +72,11 @@ class Extents {
       add(offset, bytes);
   }
 
-  std::uint64_t end() const { return end_; }  // behind all that is in use
+  std::uint64_t end() const { return end_; }  // offset behind the last part in use
   std::uint64_t in_use() const { return in_use_; }
 
  private:
-  using Free = std::map<std::uint64_t, std::uint64_t>;  // bytes by offset; no two touch
+  using Free = std::map<std::uint64_t, std::uint64_t>;  // size by offset; adjacent parts are merged
   void add(std::uint64_t offset, std::uint64_t bytes) {
     free_.emplace(offset, bytes);
     by_size_.emplace(bytes, offset);

@@ -8,15 +8,15 @@
 namespace relmap::route {
 namespace {
 
-// Ways through a chunk by its own frames and edges.
+// Finds paths through a chunk by its own frames and edges.
 class Inside {
  public:
-  // `passage`: the chunk's cell.
+  // `passage` holds the border frames of the chunk's cell.
   Inside(const storage::Graph& graph, storage::ChunkId chunk, const CellFrames& passage, const RouteWeights& weights,
          Passage& open)
       : chunk_(chunk), frames_(graph.hot_frames(chunk)), passage_(passage), weights_(weights), open_(open) {}
 
-  // Onto the route, from one border frame to another. False: no way leads there.
+  // Appends the path from one border frame to another to the route. False if there is none.
   bool follow(FrameId from, FrameId to, double cost, Route& route) {
     if (!as_driven(storage::slot_of(from), storage::slot_of(to), cost) &&
         !search(storage::slot_of(from), storage::slot_of(to)))
@@ -30,7 +30,7 @@ class Inside {
 
  private:
   struct Step {
-    std::uint32_t slot;  // from where
+    std::uint32_t slot;  // the frame before the edge
     const storage::Edge* edge;
     double cost;
   };
@@ -40,7 +40,7 @@ class Inside {
   }
   bool leaves(const storage::Edge& edge) const { return storage::chunk_id(edge.a) != chunk_; }
 
-  // One frame after the other, as the robot came or back: whether that is what the cell's cost was made of.
+  // Whether the path along the robot's motion, forward or back, has the cost of the cell; if so, sets steps_ to it.
   bool as_driven(std::uint32_t from, std::uint32_t to, double cost) {
     steps_.clear();
     double driven = 0;
@@ -57,7 +57,7 @@ class Inside {
     return true;
   }
 
-  // Calls `visit` with each edge of the graph between a frame and another of the chunk.
+  // Calls `visit` with each edge of the graph between this frame and another of the chunk.
   template <typename Visit>
   void visit_edges(std::uint32_t slot, const Visit& visit) const {
     const storage::FrameHot& frame = *frames_[slot];
@@ -97,7 +97,7 @@ class Inside {
     return true;
   }
 
-  // The edge's place among the neighbours() of the frame.
+  // The edge's index among the neighbours() of the frame.
   std::uint16_t turn(const Step& step) const {
     std::uint16_t before = 0;
     visit_edges(step.slot, [&](const storage::Edge& edge, bool) { before += edge.id < step.edge->id; });
@@ -120,7 +120,7 @@ class Inside {
 Result<Route> follow(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, const OverlayRoute& route,
                      bool count_standing, const WorkLimit& work) {
   const RouteWeights& weights = overlay.metrics()[metric];
-  const RouteFilter all;  // what is refused was seen by the search, frame by frame
+  const RouteFilter all;  // the search has opened cells that hold anything refused
   Passage open(graph, all);
   Route found;
   found.path.from = route.from;
@@ -145,8 +145,8 @@ Result<Route> follow(const Overlay& overlay, const storage::Graph& graph, std::s
     }
     const auto passage = overlay.cell(hop.cell)->frames();
     if (!Inside(graph, storage::chunk_id(hop.from), *passage, weights, open).follow(hop.from, hop.to, hop.cost, found))
-      return {Reason::DATA_LOSS, "no way from frame " + hop.from.to_string() + " to " + hop.to.to_string() +
-                                     " as it was when their chunk's cell was made"};
+      return {Reason::DATA_LOSS, "the path from frame " + hop.from.to_string() + " to " + hop.to.to_string() +
+                                     " is gone that their chunk's cell was made of"};
   }
   std::reverse(turns.begin(), turns.end());
   turns.shrink_to_fit();

@@ -29,7 +29,7 @@ Joining::Joining(std::vector<CellFrames> frames, std::span<const CellFacts> fact
   }
   while (merge_best()) {
   }
-  std::size_t apart = 0;  // of the parts that anything leads into
+  std::size_t apart = 0;  // fronts left of the parts into which an edge leads
   facts_.joined = true;
   for (std::uint32_t p = 0; p < parts_.size(); ++p) {
     if (parts_[p].nodes.empty()) continue;

@@ -1,6 +1,6 @@
-// Several cells that lie beside each other, as one. They are joined two by two, each time those that most edges tie for
-// their size: the nested order of elimination of sparse solvers, so that no matrix is larger than two neighbouring
-// parts' borders. Which, is found once; then it is done for one metric after another.
+// Joins several neighbouring cells to one. They are merged two by two, each time the pair with the most edges between
+// them for their size, as sparse solvers eliminate in nested order: no matrix is larger than the borders of two
+// neighbouring parts. The order is found once and then applied to one metric after another.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@ namespace relmap::route {
 
 class Joining {
  public:
-  // Of the parts.
+  // `frames` and `facts` are those of the parts.
   Joining(std::vector<CellFrames> frames, std::span<const CellFacts> facts);
   Joining(const Joining&) = delete;
   Joining& operator=(const Joining&) = delete;
 
   const CellFacts& facts() const { return facts_; }
   const CellFrames& frames() const { return frames_; }
-  // Between the frames, of the same between those of each part.
+  // The costs between the frames, given the matrices of the parts.
   CostMatrix within(const RouteWeights& metric, std::vector<CostMatrix> parts) const;
 
  private:
@@ -29,13 +29,13 @@ class Joining {
     std::uint32_t part, in_part;
     std::uint32_t front;
     bool border = false;      // a link leads out of all parts
-    bool eliminated = false;  // it lies in the midst of its front
+    bool eliminated = false;  // no link leads out of its front any more
   };
   struct InnerLink {
     std::uint32_t to;  // node
     const Link* link;
   };
-  // One becomes another's: first the nodes that stay on its border, then those that end here.
+  // Front b is merged into front a. The nodes that stay on the border come first, then those that are eliminated.
   struct Merge {
     std::uint32_t a, b;
     std::size_t nodes, kept;
@@ -55,11 +55,11 @@ class Joining {
   const std::vector<CellFrames> parts_;
   std::vector<Node> nodes_;                              // by frame
   std::vector<std::vector<InnerLink>> links_;            // by node
-  std::vector<std::vector<std::uint32_t>> front_nodes_;  // of the parts joined so far; none: joined to another
+  std::vector<std::vector<std::uint32_t>> front_nodes_;  // the nodes of each front; empty once it is merged
   std::vector<bool> alive_;
-  std::vector<std::vector<std::uint32_t>> tied_;  // how many links lead from one to another
+  std::vector<std::vector<std::uint32_t>> tied_;  // how many links lead from one front to another
   std::vector<Merge> merges_;
-  std::vector<std::vector<std::uint32_t>> places_;  // of what is left of each, in frames_
+  std::vector<std::vector<std::uint32_t>> places_;  // for each front, the indices of its nodes in frames_
   CellFacts facts_;
   CellFrames frames_;
 };

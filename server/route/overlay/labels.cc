@@ -26,17 +26,17 @@ double relax_portably(const float* floors, const std::uint16_t* rests, double co
 }
 
 void take_portably(double until, Labels& labels, std::vector<std::uint32_t>& nodes, std::size_t begin) {
-  double least = labels.min_pending;
+  double min_pending = labels.min_pending;
   for (std::size_t j = begin; j < labels.pending.size(); ++j) {
     double& pending = labels.pending[j];
     if (pending <= until) {
       pending = kUnreachable;
       nodes.push_back(static_cast<std::uint32_t>(j));
     } else {
-      least = std::min(least, pending);
+      min_pending = std::min(min_pending, pending);
     }
   }
-  labels.min_pending = least;
+  labels.min_pending = min_pending;
 }
 
 #if defined(__x86_64__)
@@ -53,14 +53,14 @@ __attribute__((target("avx2"))) double relax_avx2(const float* floors, const std
   const __m128 exponent = _mm_castsi128_ps(_mm_set1_epi32(SplitCostMatrix::kExponentBits));
   const __m256d rest_unit = _mm256_set1_pd(SplitCostMatrix::kRestUnit);
   const __m256i origin = _mm256_set1_epi64x(static_cast<long long>(from));
-  __m256d whole = never, least = never;
+  __m256d whole = never, min_pending = never;
   std::size_t j = 0;
   for (; j + 4 <= n; j += 4) {
     const __m128 single = _mm_loadu_ps(floors + j);
     const __m256d floor = _mm256_cvtps_pd(single);
     const __m256d known = _mm256_loadu_pd(labels.cost.data() + j);
     if (_mm256_movemask_pd(_mm256_cmp_pd(_mm256_add_pd(costs, floor), known, _CMP_LT_OQ)) == 0) continue;
-    // Not a number where the floor is infinite: never better.
+    // NaN where the floor is infinite, which compares as not better.
     const __m256d unit = _mm256_mul_pd(_mm256_cvtps_pd(_mm_and_ps(single, exponent)), rest_unit);
     const __m128i units = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(rests + j)));
     const __m256d way = _mm256_add_pd(costs, _mm256_add_pd(floor, _mm256_mul_pd(unit, _mm256_cvtepi32_pd(units))));
@@ -69,31 +69,31 @@ __attribute__((target("avx2"))) double relax_avx2(const float* floors, const std
     double* pending = labels.pending.data() + j;
     _mm256_storeu_pd(pending, _mm256_blendv_pd(_mm256_loadu_pd(pending), way, better));
     const __m256d if_better = _mm256_blendv_pd(never, way, better);
-    least = _mm256_min_pd(least, if_better);
+    min_pending = _mm256_min_pd(min_pending, if_better);
     whole = _mm256_min_pd(whole, _mm256_add_pd(if_better, _mm256_loadu_pd(other + j)));
     auto* came = reinterpret_cast<__m256i*>(labels.came.data() + j);
     _mm256_storeu_si256(came, _mm256_blendv_epi8(_mm256_loadu_si256(came), origin, _mm256_castpd_si256(better)));
   }
-  labels.min_pending = std::min(labels.min_pending, min_of(least));
+  labels.min_pending = std::min(labels.min_pending, min_of(min_pending));
   return std::min(min_of(whole), relax_portably(floors, rests, cost, from, other, labels, j));
 }
 
 __attribute__((target("avx2"))) void take_avx2(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
   const __m256d untils = _mm256_set1_pd(until), never = _mm256_set1_pd(kUnreachable);
-  __m256d least = never;
+  __m256d min_pending = never;
   std::size_t j = 0;
   for (; j + 4 <= labels.pending.size(); j += 4) {
     const __m256d pending = _mm256_loadu_pd(labels.pending.data() + j);
     const __m256d due = _mm256_cmp_pd(pending, untils, _CMP_LE_OQ);
     const __m256d rest = _mm256_blendv_pd(pending, never, due);
-    least = _mm256_min_pd(least, rest);
+    min_pending = _mm256_min_pd(min_pending, rest);
     auto mask = static_cast<unsigned>(_mm256_movemask_pd(due));
     if (mask == 0) continue;
     _mm256_storeu_pd(labels.pending.data() + j, rest);
     for (; mask != 0; mask &= mask - 1)
       nodes.push_back(static_cast<std::uint32_t>(j) + static_cast<std::uint32_t>(std::countr_zero(mask)));
   }
-  labels.min_pending = min_of(least);
+  labels.min_pending = min_of(min_pending);
   take_portably(until, labels, nodes, j);
 }
 #endif

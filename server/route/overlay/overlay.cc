@@ -17,8 +17,8 @@ Overlay::Overlay(std::vector<RouteWeights> metrics, std::shared_ptr<CellStore> s
 
 namespace {
 
-// The chunk after one of which these are the frames; a gap that motion bridges is stepped over at once. Nullopt: it is
-// the last.
+// The chunk after `chunk`, whose frames are given; a gap that a motion edge bridges is skipped in one step. nullopt if
+// it is the last.
 std::optional<storage::ChunkId> next_chunk(const storage::Graph& graph, const storage::Session& session,
                                            storage::ChunkId chunk, const CellFrames& frames) {
   const storage::ChunkId next{chunk.session, chunk.chunk + 1};
@@ -28,7 +28,7 @@ std::optional<storage::ChunkId> next_chunk(const storage::Graph& graph, const st
         on && storage::chunk_id(*on) > chunk)
       return storage::chunk_id(*on);
   }
-  // Frames of one camera are joined by nothing.
+  // Frames of mono sessions have no edges.
   return next.chunk <= storage::chunk_of({session.number, session.last}) ? std::optional(next) : std::nullopt;
 }
 
@@ -98,7 +98,7 @@ std::shared_ptr<const StoredCell> Overlay::make(std::uint32_t number, std::share
       std::move(known));
 }
 
-// A part of the cell has changed.
+// Marks a cell as outdated, since a part of it has changed.
 void Overlay::outdate(std::uint32_t number) {
   if (number == tree_->root()) return;
   outdated_.insert(number);
@@ -132,7 +132,7 @@ std::size_t Overlay::refresh(const storage::Graph& graph, std::span<const storag
   return made.size() + came.size();
 }
 
-// Each to the chunk that most edges join it to, of those that the tree knows by then.
+// Adds each chunk beside the one to which most of its edges lead, of the chunks that the tree holds by then.
 void Overlay::add(const std::map<storage::ChunkId, NewChunk>& came) {
   if (came.empty()) return;
   std::vector<storage::ChunkId> chunks;
@@ -151,9 +151,9 @@ void Overlay::add(const std::map<storage::ChunkId, NewChunk>& came) {
     std::map<std::uint32_t, int> ties;
     for (const storage::ChunkId other : came.at(chunk).ties)
       if (const std::uint32_t to = tree_->find(other); to != CellTree::kNone) ++ties[to];
-    const auto most =
+    const auto max_ties =
         std::max_element(ties.begin(), ties.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
-    return most == ties.end() ? CellTree::kNone : most->first;
+    return max_ties == ties.end() ? CellTree::kNone : max_ties->first;
   };
   while (!chunks.empty()) {
     const std::size_t before = chunks.size();
@@ -211,7 +211,7 @@ bool Overlay::make_next() {
   if (waiting_.empty()) return false;
   const std::uint32_t number = waiting_.begin()->second;
   std::shared_ptr<const StoredCell> cell = cells_[number];
-  // Otherwise what changed in it makes no difference here.
+  // If no direct part has changed, the changes within it make no difference to this cell.
   if (outdated_.contains(number)) cell = make(number, cell);
   waiting_.erase(waiting_.begin());
   waits_[number] = false;
@@ -223,8 +223,8 @@ bool Overlay::make_next() {
 }
 
 std::size_t Overlay::memory_bytes() const {
-  // Of a cell its place in the store, with what counts those who hold it. The vectors are there twice: here, and in the
-  // copy that searches use.
+  // Counts a StoredCell and its shared count for each cell, and the vectors twice: here and in the copy that searches
+  // use.
   return cells_.size() * (sizeof(StoredCell) + 32) +
          2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + tree_->memory_bytes());
 }

@@ -1,6 +1,6 @@
-// Shortest routes through maps of millions of frames: nested cells, each with the costs of passing it ("Customizable
-// route planning", Delling et al., SEA 2011). A search walks frames where it begins and ends, and cells, the larger
-// the further, between.
+// Nested cells for shortest routes through maps of millions of frames, each with the costs of passing through it
+// ("Customizable route planning", Delling et al., SEA 2011). A search walks frames near its ends and passes cells
+// between, larger ones the further it is from the ends.
 #pragma once
 
 #include <cstdint>
@@ -20,38 +20,38 @@
 
 namespace relmap::route {
 
-// All cells of a map. What is outdated is not there until it is made anew: a search opens it, and passes its parts.
-// A copy shares the cells.
+// All cells of a map. A cell whose parts have changed is outdated and is not used until it is made anew: a search
+// passes its parts instead. Copies share the cells.
 class Overlay {
  public:
-  // At least one; throws StatusError, INVALID_ARGUMENT, where one is not valid().
+  // An overlay without cells. Throws StatusError (INVALID_ARGUMENT) if there are no metrics or one is not valid().
   Overlay(std::vector<RouteWeights> metrics, std::shared_ptr<CellStore> store);
 
-  // Of the whole map. Throws StatusError where reads of the graph do, or the store, and what `proceed` says, which is
-  // asked before each cell with memory_bytes() so far. Then nothing has changed.
+  // Makes the cells of the whole map. `proceed` is called before each cell with the bytes of memory so far. Throws
+  // StatusError where reads of the graph or the store do, or with what `proceed` returns; then nothing has changed.
   using Proceed = std::function<Status(std::size_t bytes)>;
   void build(const storage::Graph& graph, const Proceed& proceed = {});
-  // After frames of these chunks changed, or came: makes the cells of the chunks that this concerns, and leaves those
-  // around them, where they are others now, to make_next(). Returns how many it made. Throws as build() does, and then
-  // it is of no use any more: to be tried with a copy.
+  // Makes the cells of chunks anew whose frames have changed or are new, and of chunks that this affects. The cells
+  // around them become outdated and are left to make_next(). Returns the number of chunks. Throws like build(); the
+  // overlay is then in an undefined state, so callers should refresh a copy.
   std::size_t refresh(const storage::Graph& graph, std::span<const storage::ChunkId> changed);
-  // One that is outdated, the smallest first. False: there is none. Throws StatusError where the store does; then it is
-  // outdated still.
+  // Makes an outdated cell anew, smallest level first. Returns false if there is none. Throws StatusError where the
+  // store does; the cell is then still outdated.
   bool make_next();
   std::size_t outdated() const { return waiting_.size(); }
 
   std::span<const RouteWeights> metrics() const { return metrics_; }
   const CellTree& tree() const { return *tree_; }
-  // Neither the root nor outdated; nor are its parts, then.
+  // Whether a search may pass the cell: it is not the root, and neither the cell nor any of its parts is outdated.
   bool is_current(std::uint32_t number) const { return number != tree_->root() && !waits_[number]; }
-  // Null: it is not current.
+  // The cell, or null if it is not current.
   const StoredCell* cell(std::uint32_t number) const { return waits_[number] ? nullptr : cells_[number].get(); }
-  // Of what stands beside the store.
+  // Memory outside the store.
   std::size_t memory_bytes() const;
   const std::shared_ptr<CellStore>& store() const { return store_; }
 
   void put(ByteWriter& w) const;
-  // What put() put, of a store that has the cells still; nullopt: the bytes are not that.
+  // Reads what put() wrote; the store must still have the cells. nullopt if the bytes are invalid.
   static std::optional<Overlay> get(ByteReader& r, std::shared_ptr<CellStore> store);
 
  private:
@@ -59,7 +59,7 @@ class Overlay {
   void outdate(std::uint32_t number);
   struct NewChunk {
     std::shared_ptr<const StoredCell> cell;
-    std::vector<storage::ChunkId> ties;  // where its edges lead, one each
+    std::vector<storage::ChunkId> ties;  // the chunks to which its edges lead, one entry for each edge
   };
   void add(const std::map<storage::ChunkId, NewChunk>& came);
   void divide(std::uint32_t number);
@@ -69,11 +69,11 @@ class Overlay {
   std::vector<RouteWeights> metrics_;
   std::shared_ptr<CellStore> store_;
   std::shared_ptr<CellTree> tree_ = std::make_shared<CellTree>();
-  // By their numbers in the tree.
+  // By the number in the tree:
   std::vector<std::shared_ptr<const StoredCell>> cells_;
-  std::vector<bool> waits_;                                    // it, or one in it, is outdated
-  std::set<std::pair<std::uint32_t, std::uint32_t>> waiting_;  // those, by level
-  std::set<std::uint32_t> outdated_;                           // those of which a part has changed
+  std::vector<bool> waits_;                                    // whether the cell or one within it is outdated
+  std::set<std::pair<std::uint32_t, std::uint32_t>> waiting_;  // level and number of the cells that wait
+  std::set<std::uint32_t> outdated_;                           // cells of which a direct part has changed
 };
 
 }  // namespace relmap::route

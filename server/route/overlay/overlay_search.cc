@@ -13,21 +13,22 @@
 namespace relmap::route {
 namespace {
 
-// How much further than the nearest nodes of a place those may be that are left together with it: a share of the way.
+// Nodes of a place are left together if their costs exceed that of the nearest one by at most this share.
 constexpr double kAhead = 0.2;
 
-constexpr std::size_t kPlacesBetweenLooks = 16;  // at the clock
+constexpr std::size_t kPlacesBetweenLooks = 16;  // between calls of proceed
 
-enum Way : std::uint8_t { kForward = 0, kBackward = 1 };  // from the start, and from the goal against the traffic
+// From the start along the edges, or from the goal against them.
+enum Direction : std::uint8_t { kForward = 0, kBackward = 1 };
 
-// Of all cells, for one search after another.
+// Scratch memory by cell, used by one search after another.
 struct Marks {
   explicit Marks(const CellTree& tree) : place(tree.size(), CellFrames::kNone), opened(tree.size()) {}
   std::vector<std::uint32_t> place;
   std::vector<bool> opened;
 };
 
-// From both ends at once (Pohl 1971), over the cells and frames within one cell, or within the whole map.
+// Bidirectional search (Pohl 1971) over the cells and frames within one cell, or within the whole map.
 class Search {
  public:
   Search(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query, std::uint32_t within,
@@ -49,30 +50,30 @@ class Search {
   Search(const Search&) = delete;
   Search& operator=(const Search&) = delete;
 
-  // Cells around the frame are not passed: their parts are looked at, down to the frames of its chunk.
+  // Opens a cell and all cells around it: they are not passed, but their parts are searched, down to the frames of the
+  // cell if that is a chunk.
   void open_around(std::uint32_t cell) {
     for (; cell != CellTree::kNone && cell != within_ && !marks_.opened[cell]; cell = tree_.parent(cell)) {
       marks_.opened[cell] = true;
       opened_.push_back(cell);
     }
   }
-  // Nothing that the overlay knows of these chunks is used, nor of edges to them.
+  // Uses the graph instead of the overlay for these chunks and for edges to them.
   void open_stale(std::span<const storage::ChunkId> stale);
-  // Where a search begins from either side; a frame that the filter refuses is left out.
-  Status begin(FrameId frame, Way way);
-  bool has_begun(Way way) const { return !queues_[way].empty(); }
-  // `enough`: what the route is known to cost, if that is known.
-  // nullopt: no way leads there.
+  // Adds a frame at which the search begins in this direction. A frame that the filter refuses is left out.
+  Status begin(FrameId frame, Direction direction);
+  bool has_begun(Direction direction) const { return !queues_[direction].empty(); }
+  // Returns the cheapest route; nullopt if there is none. `enough` is the cost of the route if that is known.
   Result<std::optional<OverlayRoute>> run(double enough = -1);
 
  private:
   // A part of the map as this search sees it.
   struct Place {
-    std::uint32_t number;      // in the tree; kNone: it does not know the chunk
-    const StoredCell* passed;  // null: it is a chunk that was opened
+    std::uint32_t number;      // in the tree; kNone for a chunk that the tree does not hold
+    const StoredCell* passed;  // null for a chunk that is opened
     std::shared_ptr<const CellFrames> frames;
-    std::shared_ptr<const SplitCostMatrix> within[2];  // null: not passed yet in this direction
-    Labels labels[2];  // they come from a place and a node, packed: from the same place by passing it
+    std::shared_ptr<const SplitCostMatrix> within[2];  // null until it is passed in this direction
+    Labels labels[2];                                  // Labels::came is a packed At: of this place if that was passed
   };
   struct At {
     std::uint32_t place, node;
@@ -84,7 +85,7 @@ class Search {
   static constexpr std::uint32_t kPending = ~0u;
   struct Offer {
     double cost;
-    At at;  // a node at which a cell is entered; or kPending: those to which a place was passed
+    At at;  // a node that is to be entered; or kPending: the nodes that pend in a place that was passed
     bool operator>(const Offer& other) const {
       return cost != other.cost ? cost > other.cost : at.packed() > other.at.packed();
     }
@@ -92,7 +93,7 @@ class Search {
   using Queue = std::priority_queue<Offer, std::vector<Offer>, std::greater<>>;
 
   bool is_passed(std::uint32_t cell) const { return !marks_.opened[cell] && overlay_.is_current(cell); }
-  // Where a frame is met; nullopt: nowhere within.
+  // The place and node of a frame; nullopt if it is not within within_.
   std::optional<At> locate(FrameId frame);
   std::optional<At> end_of(const Link& link);
   std::uint32_t place_of(std::uint32_t number);
@@ -105,22 +106,24 @@ class Search {
   bool is_refused(const Link& link) const {
     return filtered_ && (link.support < query_.filter.min_support || (!query_.filter.long_loops && link.long_loop()));
   }
-  // Cells in which a frame is refused are opened: not passed.
+  // A cell that holds a refused frame is opened, so a place that is passed needs no check.
   bool is_refused(const Place& place, FrameId frame) const {
     return filtered_ && !place.passed && !query_.filter.passes(frame);
   }
-  bool offer(Way way, At at, double cost, At from);
-  void walk_links(Way way, At at, double cost);
-  void settle(Way way);
-  void enter(Way way, At at, double cost);
-  void leave(Way way, std::uint32_t place, double cost);
-  double least(Way way) const { return queues_[way].empty() ? kUnreachable : queues_[way].top().cost; }
+  bool offer(Direction direction, At at, double cost, At from);
+  void walk_links(Direction direction, At at, double cost);
+  void settle(Direction direction);
+  void enter(Direction direction, At at, double cost);
+  void leave(Direction direction, std::uint32_t place, double cost);
+  double min_cost(Direction direction) const {
+    return queues_[direction].empty() ? kUnreachable : queues_[direction].top().cost;
+  }
   std::size_t memory_bytes() const {
     return marks_.place.size() * sizeof(marks_.place[0]) + place_bytes_ +
            (queues_[kForward].size() + queues_[kBackward].size()) * sizeof(Offer);
   }
   OverlayRoute trace() const;
-  void trace(Way way, std::vector<Hop>& hops, FrameId& end) const;
+  void trace(Direction direction, std::vector<Hop>& hops, FrameId& end) const;
 
   const Overlay& overlay_;
   const CellTree& tree_;
@@ -133,11 +136,11 @@ class Search {
   const WorkLimit& work_;
   std::vector<std::uint32_t> opened_;
   std::unordered_map<storage::ChunkId, CellFrames> stale_;          // their frames
-  std::unordered_map<storage::ChunkId, std::uint32_t> new_places_;  // of chunks that the tree does not know
+  std::unordered_map<storage::ChunkId, std::uint32_t> new_places_;  // of chunks that the tree does not hold
   std::deque<Place> places_;
   Queue queues_[2];
   std::vector<std::uint32_t> due_;
-  double best_ = kUnreachable;  // of a whole route
+  double best_ = kUnreachable;  // cost of the best complete route so far
   At meeting_{};
   std::uint64_t settled_ = 0;
   std::size_t place_bytes_ = 0;
@@ -154,7 +157,7 @@ void Search::open_stale(std::span<const storage::ChunkId> stale) {
 
 std::uint32_t Search::add_place(std::uint32_t number, const StoredCell* passed,
                                 std::shared_ptr<const CellFrames> frames) {
-  if (places_.size() % kPlacesBetweenLooks == 0 && work_.proceed)  // each may be read from disk
+  if (places_.size() % kPlacesBetweenLooks == 0 && work_.proceed)  // each place may be read from disk
     if (Status status = work_.proceed(memory_bytes()); !status.ok()) throw StatusError(status);
   const std::size_t nodes = frames->nodes.size();
   places_.push_back({number, passed, std::move(frames), {}, {Labels(nodes), Labels(nodes)}});
@@ -177,7 +180,7 @@ std::optional<Search::At> Search::locate(FrameId frame) {
   const std::uint32_t chunk = tree_.find(storage::chunk_id(frame));
   std::uint32_t place = CellFrames::kNone;
   if (chunk != CellTree::kNone) {
-    // The largest cell that is passed: those above one that is not are not, either.
+    // The largest cell that is passed. A cell around one that is not passed is not passed, either.
     std::uint32_t cell = chunk, around = tree_.parent(cell);
     for (; around != within_ && is_passed(around); around = tree_.parent(cell)) cell = around;
     for (; around != within_; around = tree_.parent(around))
@@ -195,7 +198,8 @@ std::optional<Search::At> Search::locate(FrameId frame) {
   return At{place, node};
 }
 
-// Mostly where it was met before. There is one place for each part of the map: if the cell is one, it is the right one.
+// Tries the hint first, which is right as a rule. Each part of the map has only one place, so if the cell of the hint
+// is a place that holds the frame, it is the right one.
 std::optional<Search::At> Search::end_of(const Link& link) {
   const At hint = At::unpack(link.met_at.get());
   if (hint.place < marks_.place.size())
@@ -209,14 +213,14 @@ std::optional<Search::At> Search::end_of(const Link& link) {
   return end;
 }
 
-// Whether it is the best so far.
-bool Search::offer(Way way, At at, double cost, At from) {
+// Updates the label of a node, and the best complete route. Returns whether the cost is the node's lowest so far.
+bool Search::offer(Direction direction, At at, double cost, At from) {
   Place& place = places_[at.place];
-  Labels& labels = place.labels[way];
+  Labels& labels = place.labels[direction];
   if (cost >= labels.cost[at.node]) return false;
   labels.cost[at.node] = cost;
   labels.came[at.node] = from.packed();
-  const double whole = cost + place.labels[1 - way].cost[at.node];
+  const double whole = cost + place.labels[1 - direction].cost[at.node];
   if (whole < best_) {
     best_ = whole;
     meeting_ = at;
@@ -224,81 +228,82 @@ bool Search::offer(Way way, At at, double cost, At from) {
   return true;
 }
 
-void Search::walk_links(Way way, At at, double cost) {
+void Search::walk_links(Direction direction, At at, double cost) {
   const CellFrames& cell = *places_[at.place].frames;
   for (const Link& link : cell.links_of(at.node)) {
-    if (!(way == kForward ? link.out : link.in) || is_refused(link)) continue;
+    if (!(direction == kForward ? link.out : link.in) || is_refused(link)) continue;
     const auto end = end_of(link);
     if (!end || is_refused(places_[end->place], link.to)) continue;
     const double to_end = cost + weights_(link.costs());
-    if (offer(way, *end, to_end, at)) queues_[way].push({to_end, *end});
+    if (offer(direction, *end, to_end, at)) queues_[direction].push({to_end, *end});
   }
 }
 
-Status Search::begin(FrameId frame, Way way) {
+Status Search::begin(FrameId frame, Direction direction) {
   if (work_.proceed)
     if (Status status = work_.proceed(memory_bytes()); !status.ok()) return status;
   const auto at = locate(frame);
   if (!at) return no_such_frame(frame);
   if (!query_.filter.passes(frame)) return {};
-  if (offer(way, *at, 0, *at)) queues_[way].push({0, *at});
+  if (offer(direction, *at, 0, *at)) queues_[direction].push({0, *at});
   return {};
 }
 
-void Search::settle(Way way) {
-  const Offer best = queues_[way].top();
-  queues_[way].pop();
+void Search::settle(Direction direction) {
+  const Offer best = queues_[direction].top();
+  queues_[direction].pop();
   if (best.at.node == kPending)
-    leave(way, best.at.place, best.cost);
+    leave(direction, best.at.place, best.cost);
   else
-    enter(way, best.at, best.cost);
+    enter(direction, best.at, best.cost);
 }
 
-// To all other nodes of the place. There the search is queued as one, and goes on when it comes to the nearest: by then
-// most of them have been reached in the best way.
-void Search::enter(Way way, At at, double cost) {
+// Enters a place at a node: passes it to all its other nodes, which then pend, and follows the node's links. The
+// pending nodes are queued as one entry at the cost of the nearest: until that is due, most of them get their final
+// costs.
+void Search::enter(Direction direction, At at, double cost) {
   Place& place = places_[at.place];
-  Labels& labels = place.labels[way];
+  Labels& labels = place.labels[direction];
   if (cost > labels.cost[at.node] || labels.settled[at.node]) return;
   labels.settled[at.node] = true;
   ++settled_;
   if (place.passed) {
-    auto& within = place.within[way];
-    if (!within && !place.passed->facts().oneway) within = place.within[1 - way];
-    if (!within) within = place.passed->within(query_.metric, way == kBackward);
+    auto& within = place.within[direction];
+    if (!within && !place.passed->facts().oneway) within = place.within[1 - direction];
+    if (!within) within = place.passed->within(query_.metric, direction == kBackward);
     const double before = labels.min_pending;
-    const double* other = place.labels[1 - way].cost.data();
+    const double* other = place.labels[1 - direction].cost.data();
     const double whole = relax_row(within->floors(at.node), within->rests(at.node), cost, at.packed(), other, labels);
     if (whole < best_) {
       best_ = whole;
       for (std::uint32_t node = 0; node < labels.cost.size(); ++node)
         if (labels.cost[node] + other[node] == whole) meeting_ = {at.place, node};
     }
-    if (labels.min_pending < before) queues_[way].push({labels.min_pending, {at.place, kPending}});
+    if (labels.min_pending < before) queues_[direction].push({labels.min_pending, {at.place, kPending}});
   }
-  walk_links(way, at, cost);
+  walk_links(direction, at, cost);
 }
 
-// Over the links of the nearest nodes that the place was passed to, and of those not much further.
-void Search::leave(Way way, std::uint32_t number, double cost) {
-  Labels& labels = places_[number].labels[way];
+// Leaves a place: follows the links of its nearest pending nodes and of those that are not much further (kAhead).
+void Search::leave(Direction direction, std::uint32_t number, double cost) {
+  Labels& labels = places_[number].labels[direction];
   if (cost > labels.min_pending) return;
   take_pending(cost * (1 + kAhead), labels, due_);
-  // They lie anywhere in memory: some are fetched ahead.
+  // Links are scattered in memory, so some are prefetched.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
   const CellFrames& cell = *places_[number].frames;
   for (std::size_t i = 0; i < due_.size(); ++i) {
     if (i + kAfterNext < due_.size()) __builtin_prefetch(&cell.begin[due_[i + kAfterNext]]);
     if (i + kNext < due_.size()) __builtin_prefetch(&cell.links[cell.begin[due_[i + kNext]]]);
-    walk_links(way, {number, due_[i]}, labels.cost[due_[i]]);
+    walk_links(direction, {number, due_[i]}, labels.cost[due_[i]]);
   }
-  if (labels.min_pending < kUnreachable) queues_[way].push({labels.min_pending, {number, kPending}});
+  if (labels.min_pending < kUnreachable) queues_[direction].push({labels.min_pending, {number, kPending}});
 }
 
 Result<std::optional<OverlayRoute>> Search::run(double enough) {
   for (std::size_t steps = 0;; ++steps) {
-    const double forward = least(kForward), backward = least(kBackward);
-    // One side has seen all that it can reach: it has seen the other's end, or no way leads there.
+    const double forward = min_cost(kForward), backward = min_cost(kBackward);
+    // Ends if the best route is proven, or if one side has searched all that it can reach.
     if (forward + backward >= best_ || forward == kUnreachable || backward == kUnreachable) break;
     if (best_ <= enough) break;
     if (forward + backward > query_.max_cost) return beyond(query_.max_cost, weights_);
@@ -314,30 +319,30 @@ Result<std::optional<OverlayRoute>> Search::run(double enough) {
   return std::optional(trace());
 }
 
-// From the meeting to the end where the search began, hops against it.
-void Search::trace(Way way, std::vector<Hop>& hops, FrameId& end) const {
+// Appends the hops from the meeting point back to where the search in this direction began.
+void Search::trace(Direction direction, std::vector<Hop>& hops, FrameId& end) const {
   for (At at = meeting_;;) {
     const Place& place = places_[at.place];
-    const Labels& labels = place.labels[way];
+    const Labels& labels = place.labels[direction];
     end = place.frames->nodes[at.node];
     const At before = At::unpack(labels.came[at.node]);
     if (before.packed() == at.packed()) return;
     const CellFrames& of_before = *places_[before.place].frames;
     Hop hop{of_before.nodes[before.node], end, place.number, {}, false, 0};
     if (before.place == at.place && place.passed) {
-      hop.cost = (*place.within[way])(before.node, at.node);
+      hop.cost = (*place.within[direction])(before.node, at.node);
     } else {
       hop.cell = CellTree::kNone;
       const Link* cheapest = nullptr;
       for (const Link& link : of_before.links_of(before.node))
-        if (link.to == end && (way == kForward ? link.out : link.in) && !is_refused(link) &&
+        if (link.to == end && (direction == kForward ? link.out : link.in) && !is_refused(link) &&
             (!cheapest || weights_(link.costs()) < weights_(cheapest->costs())))
           cheapest = &link;
       hop.edge = cheapest->edge(hop.from);
       hop.cost = weights_(cheapest->costs());
-      hop.forward = cheapest->forward == (way == kForward);
+      hop.forward = cheapest->forward == (direction == kForward);
     }
-    if (way == kBackward) std::swap(hop.from, hop.to);
+    if (direction == kBackward) std::swap(hop.from, hop.to);
     hops.push_back(hop);
     at = before;
   }
@@ -359,10 +364,10 @@ OverlayRoute Search::trace() const {
 std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, const RouteFilter& filter) {
   if (filter.supposed.candidates || filter.supposed.quarantined) return std::nullopt;
   const CellTree& tree = overlay.tree();
-  const std::size_t most = std::max<std::size_t>(10, tree.chunks() / 10);
+  const std::size_t max_cells = std::max<std::size_t>(10, tree.chunks() / 10);
   std::vector<std::uint32_t> cells;
   if (!filter.sessions.empty())
-    for (SessionNumber session = 0; session < tree.sessions() && cells.size() <= most; ++session)
+    for (SessionNumber session = 0; session < tree.sessions() && cells.size() <= max_cells; ++session)
       if (!filter.sessions.contains(session)) {
         const auto refused = tree.chunks_of(session);
         cells.insert(cells.end(), refused.begin(), refused.end());
@@ -372,25 +377,25 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
       cells.push_back(chunk);
   if ((filter.min_support > 0 || !filter.long_loops) && tree.chunks() > 0) {
     std::vector<std::uint32_t> open{tree.root()};
-    while (!open.empty() && cells.size() <= most) {
+    while (!open.empty() && cells.size() <= max_cells) {
       const std::uint32_t number = open.back();
       open.pop_back();
       const StoredCell* cell = overlay.cell(number);
       if (cell && cell->facts().min_support >= filter.min_support &&
           (filter.long_loops || cell->facts().longest_loop_m <= kLongLoopMetres))
         continue;
-      if (cell) cells.push_back(number);  // what is refused may lie in a part of it, or between two
+      if (cell) cells.push_back(number);  // the refused edge may be in a part of it or between two parts
       const auto& children = tree.node(number).children;
       open.insert(open.end(), children.begin(), children.end());
     }
   }
-  if (cells.size() > most) return std::nullopt;
+  if (cells.size() > max_cells) return std::nullopt;
   return cells;
 }
 
 namespace {
 
-// nullopt: no way leads there.
+// nullopt if there is no route.
 Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const storage::Graph& graph,
                                                  const OverlayQuery& query, std::span<const FrameId> from,
                                                  std::span<const FrameId> to, const WorkLimit& work) {
@@ -404,8 +409,8 @@ Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const s
     if (Status status = search.begin(frame, kForward); !status.ok()) return status;
   for (const FrameId frame : to)
     if (Status status = search.begin(frame, kBackward); !status.ok()) return status;
-  for (const Way way : {kForward, kBackward})
-    if (!search.has_begun(way)) return end_refused(way == kForward);
+  for (const Direction direction : {kForward, kBackward})
+    if (!search.has_begun(direction)) return end_refused(direction == kForward);
   return search.run();
 }
 
@@ -423,14 +428,14 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const storage::Graph& gr
     return not_connected(graph, joined.sessions(), to, joined.goal() && !filtered, filtered);
   } catch (const StatusError& error) {
     return Status(Reason::NOT_CONNECTED,
-                  "no way leads there; who is connected with whom cannot be told: " + error.status().message());
+                  "no route leads there; what is connected cannot be determined: " + error.status().message());
   }
 }
 
 Status unpack(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work) {
   Marks marks(overlay.tree());
-  OverlayQuery query;  // nothing has changed in a cell that was passed, nor is anything refused there
+  OverlayQuery query;  // without stale chunks and filter, neither of which concerns a cell that was passed
   query.metric = metric;
   std::vector<Hop> packed(route.hops.rbegin(), route.hops.rend()), unpacked;
   while (!packed.empty()) {
@@ -445,7 +450,7 @@ Status unpack(const Overlay& overlay, const storage::Graph& graph, std::size_t m
     if (Status status = search.begin(hop.to, kBackward); !status.ok()) return status;
     auto inside = search.run(hop.cost * (1 + SplitCostMatrix::kPrecision));
     if (!inside.ok()) return inside.status();
-    if (!*inside) return {Reason::INTERNAL, "a cell that was passed has no way through it"};
+    if (!*inside) return {Reason::INTERNAL, "a cell that was passed has no path through it"};
     packed.insert(packed.end(), (*inside)->hops.rbegin(), (*inside)->hops.rend());
   }
   route.hops = std::move(unpacked);

@@ -1,5 +1,5 @@
-// Searches over the cells of a map: frame by frame at the ends and where the map has changed, cells, the larger the
-// further, between. dijkstra.h is the reference.
+// Searches over the cells of a map: frame by frame near the ends and where the map has changed, and by cells between,
+// larger ones the further it is from the ends. dijkstra.h is the reference.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,10 @@
 
 namespace relmap::route {
 
-// The way through one cell of the map, or over one edge.
+// A step of a route: through one cell, or over one edge.
 struct Hop {
   FrameId from, to;
-  std::uint32_t cell = CellTree::kNone;  // none: over `link`
+  std::uint32_t cell = CellTree::kNone;  // kNone: the step is over `edge`
   EdgeId edge;
   bool forward = false;
   double cost = 0;
@@ -27,39 +27,41 @@ struct Hop {
 
 struct OverlayRoute {
   double cost = 0;
-  std::vector<Hop> hops;  // one after the other; none: it begins where it ends
+  std::vector<Hop> hops;  // in order; empty if the route begins where it ends
   FrameId from, to;
   std::uint64_t nodes_settled = 0;
   std::uint32_t chunks_opened = 0;
 };
 
-// What is asked for, and what the cells do not know.
+// A question to the overlay, and where the overlay does not hold.
 struct OverlayQuery {
-  std::size_t metric = 0;                   // which of overlay.metrics()
-  std::span<const storage::ChunkId> stale;  // frames of these changed, or came, since the overlay was made
-  RouteFilter filter = {};                  // the closures that it supposes are left out: cells do not know them
+  std::size_t metric = 0;                   // index in overlay.metrics()
+  std::span<const storage::ChunkId> stale;  // chunks with frames that changed or came since the overlay was made
+  RouteFilter filter = {};                  // closures that it supposes are ignored, since cells do not contain them
   std::vector<std::uint32_t> opened;        // cells_to_open() of the filter
   double max_cost = std::numeric_limits<double>::infinity();
 };
 
-// Cells that hold what the filter refuses: a search looks into them. Nullopt, as cells are of no use then: they are
-// more than a tenth as many as there are chunks, or the filter supposes closures that are not in force. A filter that
-// supposes only closures that bind has its cells: the caller searches short routes once more, with these closures.
+// Returns the cells that hold something that the filter refuses; a search must open them. nullopt if cells are of no
+// use with this filter: if these cells are more than a tenth of the number of chunks, or if the filter supposes
+// closures that are not in force. Cells can be used with a filter that supposes only closures that bind; the caller
+// then searches short routes again with these closures.
 std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, const RouteFilter& filter);
 
-// The cheapest route by a metric of the overlay from any of `from` to any of `to`. `graph`: the map that the overlay is
-// of. INVALID_ARGUMENT (an end without frames), NO_SUCH_FRAME, NOT_CONNECTED (the message names the sessions that are
-// joined to the start in either direction, whatever the filter), COST_LIMIT (or NOT_CONNECTED, where both are true),
-// OUT_OF_REACH, and what work.proceed says. Throws StatusError where reads of the graph or of cells do, and what
-// work.proceed says meanwhile.
+// Returns the cheapest route by a metric of the overlay from any of `from` to any of `to`. `graph` is the map of which
+// the overlay was made. INVALID_ARGUMENT (an end without frames), NO_SUCH_FRAME, NOT_CONNECTED (the message names the
+// sessions that are joined to the start in either direction, whatever the filter), COST_LIMIT (or NOT_CONNECTED, if
+// both are true), OUT_OF_REACH, and what work.proceed returns. Throws StatusError where reads of the graph or of cells
+// do, or if work.proceed ends such a read.
 Result<OverlayRoute> find_route(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
-// The same way with no cell in it that is larger than a chunk. Not ok: the route is as it was.
+// Replaces each hop through a larger cell by hops through chunks and over edges. If the status is not ok, the route is
+// unchanged.
 Status unpack(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work = {});
 
-// Frame by frame, of an unpacked route. `count_standing`: as RouteOptions have it.
+// Turns an unpacked route into one of frames. `count_standing` is that of RouteOptions.
 Result<Route> follow(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, const OverlayRoute& route,
                      bool count_standing, const WorkLimit& work = {});
 

@@ -17,7 +17,7 @@ constexpr std::size_t kHeaderBytes = 16;
 
 std::string path_in(const std::string& data_folder) { return data_folder + "/routes/table"; }
 
-// Empty: there is none.
+// The bytes of the file; empty if there is none or it cannot be read.
 Bytes read_all(const std::string& path) {
   const auto file = storage::posix_file_system()->open_read(path);
   if (!file.ok()) return {};
@@ -29,7 +29,7 @@ Bytes read_all(const std::string& path) {
 
 Status write_table(const std::string& data_folder, std::uint64_t commit, const Overlay& overlay,
                    std::span<const storage::ChunkId> stale) {
-  // What was written in the place of another cell must not turn out to be that one.
+  // Cells are synced before the table, so that it never names a cell whose place still holds an earlier one.
   if (Status status = overlay.store()->sync(); !status.ok()) return status;
   ByteWriter w;
   w.put_bytes(as_bytes(kMagic));
@@ -55,7 +55,7 @@ std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint
                                        std::span<const RouteWeights> metrics, std::shared_ptr<storage::Budget> budget,
                                        std::uint64_t room_for_others) {
   const Bytes bytes = read_all(path_in(data_folder));
-  // Before anything is written to the cells that it tells of.
+  // The table is removed before anything is written to the cells that it names.
   if (!storage::posix_file_system()->remove(path_in(data_folder)).ok() ||
       !storage::posix_file_system()->sync_directory(data_folder + "/routes").ok() || bytes.size() < kHeaderBytes)
     return std::nullopt;

@@ -1,5 +1,5 @@
-// What is known of the cells on disk from one run of the daemon to the next: DIR/routes/table, written when a run ends
-// in order, and taken away when the next begins. After a crash cells are made anew.
+// The table of the cells on disk, DIR/routes/table, which is written when a run of the daemon ends in order and removed
+// when the next one begins. After a crash there is no table, and cells are made anew.
 //
 //    0  u8[8]  "RELMAPRT"
 //    8  u32    version
@@ -22,16 +22,16 @@ namespace relmap::route {
 
 struct OverlayTable {
   Overlay overlay;
-  std::vector<storage::ChunkId> stale;  // changed since the cells were made
+  std::vector<storage::ChunkId> stale;  // chunks that have changed since the cells were made
 };
 
-// Nothing is written any more to the store of the overlay. `commit`: the map as it is now. IO_ERROR, DISK_FULL: there
-// is no table then.
+// Writes the table. The store of the overlay must not be written any more. `commit` is the number of the map's last
+// commit. IO_ERROR, DISK_FULL: there is no table then.
 Status write_table(const std::string& data_folder, std::uint64_t commit, const Overlay& overlay,
                    std::span<const storage::ChunkId> stale);
 
-// Takes it away; for the last two see CellStore::open(). Nullopt: there is none, or it is not of this commit and these
-// metrics, or not whole.
+// Reads the table and removes it. nullopt if there is none, if it is of another commit or of other metrics, or if it is
+// damaged. For `budget` and `room_for_others` see CellStore::open().
 std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint64_t commit,
                                        std::span<const RouteWeights> metrics, std::shared_ptr<storage::Budget> budget,
                                        std::uint64_t room_for_others);

@@ -22,7 +22,7 @@ namespace {
 
 const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, kByTimeStandingToo, {1, 0.5, 0.2, 30}};
 
-// Of the cheapest way within a chunk, frame by frame.
+// The cost of the cheapest path within a chunk, frame by frame.
 double cost_within(const storage::Graph& graph, const RouteWeights& weights, FrameId from, FrameId to) {
   const CellFrames frames = frames_of(graph, storage::chunk_id(from));
   std::vector<double> cost(frames.nodes.size(), kUnreachable);
@@ -40,7 +40,7 @@ double cost_within(const storage::Graph& graph, const RouteWeights& weights, Fra
   return cost[frames.find(to)];
 }
 
-// The overlay's cost is Dijkstra's, and its hops are a way of that cost through the graph.
+// Expects that the overlay finds Dijkstra's cost and that its hops are a path of that cost through the graph.
 void expect_as_dijkstra(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query, FrameId from,
                         FrameId to) {
   const std::vector<FrameId> starts{from}, goals{to};
@@ -137,8 +137,8 @@ TEST(Overlay, FindsWhatDijkstraFinds) {
   }
 }
 
-// Edges are estimated anew, closures are taken out and come back: routes are right whether the cells know of it, some
-// are outdated, or all are made.
+// Edges are estimated anew, and closures are removed and come back. Routes must be right while the cells are stale,
+// while some are outdated, and when all are current.
 TEST(Overlay, FollowsTheMap) {
   StreetGridOptions options = small_town(4);
   options.oneway_share = 0.3;
@@ -147,7 +147,7 @@ TEST(Overlay, FollowsTheMap) {
   overlay.build(town);
   std::mt19937_64 random(4);
   for (int round = 0; round < 12; ++round) {
-    std::set<storage::ChunkId> edited;  // those whose frames the edges stand with
+    std::set<storage::ChunkId> edited;  // the chunks that store the edges
     for (int change = 0; change < 5; ++change) {
       FrameId frame = town.random_frame(random);
       if (change == 2) frame.index = std::max(1u, frame.index / storage::kFramesPerChunk) * storage::kFramesPerChunk;
@@ -219,7 +219,7 @@ class SoFar final : public storage::PartialGraph {
   const StreetGrid& town_;
 };
 
-// From nothing, a piece at a time: routes are right at once, and cells stay as they should be.
+// The map grows from nothing, a piece at a time. Routes must be right at once, and the cells well shaped.
 TEST(Overlay, GrowsWithTheMap) {
   const StreetGrid town(small_town(5));
   SoFar map(town);
@@ -274,7 +274,7 @@ TEST(Overlay, GrowsWithTheMap) {
   for (std::uint32_t cell = 0; cell < built.tree().size(); ++cell)
     if (built.tree().node(cell).level == 1) borders_built += built.cell(cell)->nodes();
   EXPECT_LT(static_cast<double>(borders), 1.5 * static_cast<double>(borders_built));
-  // What a copy shows stays as it is.
+  // A copy does not change.
   const Overlay copy(overlay);
   const std::uint32_t last = copy.tree().find({1, 46});
   const StoredCell* const before = copy.cell(last);
@@ -286,7 +286,7 @@ TEST(Overlay, GrowsWithTheMap) {
   EXPECT_EQ(copy.outdated(), 0u);
 }
 
-TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
+TEST(Overlay, AChangeThatAffectsNoPassageChangesNoCellAround) {
   StreetGrid town(small_town(5));
   Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
@@ -299,7 +299,7 @@ TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
   EXPECT_EQ(overlay.cell(overlay.tree().around(overlay.tree().find({3, 7}), 1)), nullptr);
   make_all(overlay);
   EXPECT_NE(overlay.cell(overlay.tree().around(overlay.tree().find({3, 7}), 1)), nullptr);
-  // A step between two chunks is an edge of both; the last chunk of a drive is passed by nobody.
+  // A step between two chunks is an edge of both cells; the last chunk of a drive is not on any passage.
   town.set_length({3, 7 * storage::kFramesPerChunk}, false, 1.1);
   EXPECT_EQ(overlay.refresh(town, chunk), 2u);
   make_all(overlay);
@@ -307,13 +307,13 @@ TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
   town.set_length({3, 2999}, false, 1.1);
   EXPECT_EQ(overlay.refresh(town, tail), 1u);
   EXPECT_EQ(overlay.outdated(), 0u);
-  // Nor is what is not there.
+  // A chunk that does not exist changes nothing, either.
   const std::vector<storage::ChunkId> beyond{{3, 1000}};
   overlay.refresh(town, beyond);
   EXPECT_EQ(overlay.tree().find({3, 1000}), CellTree::kNone);
 }
 
-TEST(Overlay, FiltersOpenWhatTheyRefuse) {
+TEST(Overlay, FiltersOpenTheCellsThatTheyRefuse) {
   StreetGridOptions options = small_town(6);
   options.oneway_share = 0.2;
   options.robots = 12;
@@ -360,7 +360,7 @@ TEST(Overlay, FiltersOpenWhatTheyRefuse) {
   EXPECT_FALSE(cells_to_open(overlay, filter).has_value()) << "it refuses edges everywhere";
 }
 
-TEST(Overlay, AlternativesAtEitherEnd) {
+TEST(Overlay, FindsTheBestOfSeveralFramesAtEitherEnd) {
   const StreetGrid town(small_town(6));
   Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
@@ -385,7 +385,7 @@ TEST(Overlay, EndsWithItsWork) {
   const StreetGrid town(small_town(7));
   Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
-  // Whenever it is asked: in the search, in what unpacks the route, and in what follows it.
+  // `proceed` may end it at any call: in the search, while the route is unpacked, and while it is followed.
   const std::vector<FrameId> here{{1, 5}}, there{{6, 2900}};
   std::size_t asked = 0, enough = 0;
   const WorkLimit work{
@@ -416,8 +416,8 @@ TEST(Overlay, EndsWithItsWork) {
   EXPECT_EQ(find_route(overlay, town, OverlayQuery(), here, there, few).reason(), Reason::OUT_OF_REACH);
 }
 
-// Of all that a map may hold and a town does not: gaps, frames that are not there, edges of no or equal length, several
-// between two frames, edges within a chunk and to itself, sessions that nothing joins.
+// A map with everything that a town lacks: gaps, missing frames, edges of zero or equal length, several edges between
+// two frames, edges within a chunk and from a frame to itself, sessions without edges to others.
 class TangledGraph final : public storage::PartialGraph {
  public:
   explicit TangledGraph(std::mt19937& random, int loops = 120) {
@@ -437,14 +437,14 @@ class TangledGraph final : public storage::PartialGraph {
     for (int i = 0; i < loops; ++i) {
       const FrameId a = ids_[random() % ids_.size()];
       const FrameId b = random() % 3 ? ids_[random() % ids_.size()] : near(a, random);
-      if (a.session == 4 || b.session == 4) continue;  // alone
+      if (a.session == 4 || b.session == 4) continue;  // session 4 has no edges to others
       for (std::size_t n = 1 + random() % 2; n > 0; --n)
         join(std::min(a, b), std::max(a, b), storage::EdgeKind::kLoop, random);
     }
     for (auto& [id, frame] : frames_) std::sort(frame->incoming.begin(), frame->incoming.end());
   }
   const std::vector<FrameId>& ids() const { return ids_; }
-  // Every edge at some frames becomes another.
+  // Changes every edge at some frames.
   std::vector<storage::ChunkId> change(std::mt19937& random) {
     std::set<storage::ChunkId> changed;
     for (int i = 0; i < 10; ++i) {
@@ -501,7 +501,7 @@ class TangledGraph final : public storage::PartialGraph {
   std::vector<FrameId> ids_;
 };
 
-TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
+TEST(Overlay, FindsWhatDijkstraFindsInATangle) {
   std::mt19937 random(8);
   for (int trial = 0; trial < 8; ++trial) {
     TangledGraph graph(random);
@@ -531,7 +531,7 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
   }
 }
 
-// Frame by frame: what edges lead to, in either direction.
+// What edges join to a frame in either direction, found frame by frame.
 std::set<FrameId> joined_to(const storage::Graph& graph, FrameId from) {
   std::set<FrameId> reached{from};
   for (std::vector<FrameId> open{from}; !open.empty();) {
@@ -544,7 +544,7 @@ std::set<FrameId> joined_to(const storage::Graph& graph, FrameId from) {
   return reached;
 }
 
-TEST(Reachability, IsThatOfTheFrames) {
+TEST(Reachability, EqualsASearchFrameByFrame) {
   std::mt19937 random(10);
   int apart = 0, together = 0;
   for (int trial = 0; trial < 12; ++trial) {
@@ -596,7 +596,7 @@ TEST(Reachability, LooksIntoFewCells) {
   EXPECT_LE(looks, 5) << "two for the ends, and each 64 cells, twice";
 }
 
-TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
+TEST(Overlay, ACellThatCannotBeReadIsMadeAtTheNextTry) {
   std::mt19937 random(9);
   TangledGraph graph(random);
   Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
@@ -611,13 +611,13 @@ TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
                        graph.ids()[random() % graph.ids().size()]);
 }
 
-TEST(Overlay, NeedsWeightsThatAreSome) {
+TEST(Overlay, NeedsValidWeights) {
   EXPECT_THROW(Overlay({}, nullptr), StatusError);
   EXPECT_THROW(Overlay({kByDistance, {-1, 1, 0, 0}}, nullptr), StatusError);
 }
 
-// Sessions that nothing joins, and maps smaller than a cell.
-TEST(Overlay, OfPartsThatNothingJoinsThereIsNoWay) {
+// Sessions that no edges join, and maps smaller than a cell.
+TEST(Overlay, FindsNoRouteBetweenPartsThatNoEdgesJoin) {
   DrawnMap map(R"(
     A---B---C
 
@@ -638,7 +638,7 @@ TEST(Overlay, OfPartsThatNothingJoinsThereIsNoWay) {
   expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('F'));
 }
 
-TEST(CostMatrix, EliminationKeepsTheCostsOfAllWays) {
+TEST(CostMatrix, EliminationKeepsTheCostsOfAllPaths) {
   std::mt19937 random(1);
   for (int trial = 0; trial < 50; ++trial) {
     const std::size_t n = 1 + random() % 40, kept = random() % (n + 1);
@@ -671,7 +671,7 @@ TEST(CostMatrix, SplitKeepsAlmostAllOfEachCost) {
     }
   EXPECT_EQ(SplitCostMatrix(split.whole()), split);
 
-  // Where a double is as large or as small as a float is, and where it is not.
+  // Values at and beyond the range of a float.
   CostMatrix ends(3);
   ends.offer(0, 1, std::numeric_limits<double>::max());
   ends.offer(0, 2, std::numeric_limits<double>::min());
@@ -688,7 +688,7 @@ TEST(CostMatrix, SplitKeepsAlmostAllOfEachCost) {
   EXPECT_NEAR(at_ends(2, 1), 4.0, 1e-11);
 }
 
-TEST(Labels, ARowIsRelaxedAsOneByOne) {
+TEST(Labels, RelaxingARowEqualsRelaxingOneByOne) {
   std::mt19937 random(2);
   for (int trial = 0; trial < 200; ++trial) {
     const std::size_t n = 1 + random() % 50;

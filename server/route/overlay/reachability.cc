@@ -11,8 +11,8 @@
 namespace relmap::route {
 namespace {
 
-// The map in pieces: cells that hang together, each one element; of other chunks, and of those that are looked at
-// frame by frame, each frame.
+// The map as elements of disjoint sets. Each cell whose frames are connected is one element; other chunks, and those
+// that are opened, have one element for each frame.
 class Pieces {
  public:
   Pieces(const Overlay& overlay, const std::unordered_map<storage::ChunkId, CellFrames>& opened, const WorkLimit& work)
@@ -33,12 +33,12 @@ class Pieces {
     }
   }
 
-  // The set that a frame is of; kNone: it has no edges out of its chunk, which is not opened.
+  // The set of a frame; kNone if it has no edges out of its chunk and the chunk is not opened.
   std::uint32_t find(FrameId frame) {
     const std::uint32_t element = element_of(frame);
     return element == CellFrames::kNone ? element : sets_.find(element);
   }
-  // Sessions of the frames in any of these sets.
+  // The sessions of the frames in any of these sets.
   std::set<SessionNumber> sessions(const std::unordered_set<std::uint32_t>& reached) {
     std::set<SessionNumber> sessions;
     for (const Piece& piece : pieces_)
@@ -57,10 +57,10 @@ class Pieces {
 
  private:
   struct Piece {
-    const StoredCell* cell;  // null: a chunk that is opened
+    const StoredCell* cell;  // null for a chunk that is opened
     bool joined;
-    std::uint32_t first;         // element
-    std::vector<FrameId> nodes;  // each an element; none: it is joined
+    std::uint32_t first;         // its first element
+    std::vector<FrameId> nodes;  // the frames of its elements; empty if it is joined
   };
 
   void look() {
@@ -101,7 +101,7 @@ class Pieces {
     }
     for (std::uint32_t i = 0; i < frames.nodes.size(); ++i)
       for (const Link& link : frames.links_of(i))
-        // What the overlay says of an edge to a chunk that was opened may be out of date.
+        // An edge of the overlay to a chunk that is opened may be out of date.
         if (!piece.cell || !opened_.contains(storage::chunk_id(link.to)))
           if (const std::uint32_t end = element_of(link.to); end != CellFrames::kNone)
             sets_.join(piece.first + (piece.joined ? 0 : i), end);
@@ -110,7 +110,7 @@ class Pieces {
     while (cell != CellTree::kNone && piece_of_[cell] == CellFrames::kNone) cell = tree_.parent(cell);
     return cell == CellTree::kNone ? CellFrames::kNone : piece_of_[cell];
   }
-  // From the rest of the piece around it.
+  // Whether edges lead into the cell from the rest of the piece around it.
   bool is_led_into(std::uint32_t cell) const {
     for (; piece_of_[cell] == CellFrames::kNone; cell = tree_.parent(cell))
       if (overlay_.cell(cell)->nodes() == 0) return false;
@@ -129,14 +129,14 @@ class Pieces {
                : piece.first + static_cast<std::uint32_t>(node - piece.nodes.begin());
   }
 
-  static constexpr std::size_t kPiecesBetweenLooks = 64;  // at the clock: each may be read from disk
+  static constexpr std::size_t kPiecesBetweenLooks = 64;  // between calls of proceed; each piece may be read from disk
 
   const Overlay& overlay_;
   const CellTree& tree_;
   const std::unordered_map<storage::ChunkId, CellFrames>& opened_;
   const WorkLimit& work_;
   std::unordered_map<storage::ChunkId, std::uint32_t> opened_pieces_;
-  std::vector<std::uint32_t> piece_of_;  // by the tree's numbers
+  std::vector<std::uint32_t> piece_of_;  // by the number in the tree
   std::vector<Piece> pieces_;
   DisjointSets sets_;
   std::size_t bytes_ = 0, looks_ = 0;

@@ -1,6 +1,6 @@
-// What edges join a frame to, in either direction: asked when no route was found, to say why. Each cell knows whether
-// its frames hang together (CellFacts::joined), so that only those are opened that do not, or that changed: some
-// milliseconds a million frames.
+// Finds what edges join to a frame, in either direction, to explain why there is no route. Each cell knows whether its
+// edges connect its frames (CellFacts::joined), so only cells that are not connected or that have changed are opened.
+// This takes some milliseconds for a million frames.
 #pragma once
 
 #include <set>
@@ -13,14 +13,14 @@ namespace relmap::route {
 
 class Reachability {
  public:
-  // `stale`: chunks of which frames changed, or came, since the overlay was made. Throws StatusError where reads of the
-  // graph do, and what work.proceed says.
+  // `stale` are the chunks with frames that changed or came since the overlay was made. Throws StatusError where reads
+  // of the graph do, and with what work.proceed returns.
   Reachability(const Overlay& overlay, const storage::Graph& graph, std::span<const storage::ChunkId> stale,
                std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
-  // Of the frames that any of `from` is joined to.
+  // The sessions of the frames to which any of `from` is joined.
   const std::set<SessionNumber>& sessions() const { return sessions_; }
-  // Any of `to` is among these.
+  // Whether any of `to` is among these frames.
   bool goal() const { return goal_; }
 
  private:
@@ -28,7 +28,7 @@ class Reachability {
   bool goal_ = false;
 };
 
-// NOT_CONNECTED, with the sessions named, if no edges join any of `from` to any of `to`. Throws as Reachability does.
+// NOT_CONNECTED, with the sessions named, if no edges join any of `from` to any of `to`. Throws like Reachability.
 Status check_joined(const Overlay& overlay, const storage::Graph& graph, std::span<const storage::ChunkId> stale,
                     std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 

@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kSlice{10};  // of making cells before what is made is shown
+constexpr std::chrono::milliseconds kSlice{10};  // time for making outdated cells before the result is shown
 constexpr std::chrono::milliseconds kMaxRest{1000};
 constexpr std::chrono::hours kLastRetry{1};
 
@@ -50,27 +50,27 @@ struct RouteIndex::Impl {
   const RouteIndexOptions options;
   const CurrentView current_view;
   const std::shared_ptr<storage::Budget> budget;
-  // The thread's own.
+  // Used by the thread only:
   Overlay working;
   bool hindered = false;    // something could not be read
-  std::size_t charged = 0;  // for what stands beside the store
+  std::size_t charged = 0;  // bytes charged for what is outside the store
   Clock::time_point damaged_at{};
 
   mutable std::mutex mutex;
   mutable std::condition_variable wake;
-  std::shared_ptr<CellStore> store;                           // null: it could not be opened yet
-  std::unordered_map<storage::ChunkId, std::uint64_t> stale;  // since which version of the map
-  std::shared_ptr<const Overlay> shown;                       // null: none, or not yet
+  std::shared_ptr<CellStore> store;                           // null until it has been opened
+  std::unordered_map<storage::ChunkId, std::uint64_t> stale;  // the version of the last change of each stale chunk
+  std::shared_ptr<const Overlay> shown;                       // null while there are no cells
   std::string missing_because = "the cells of this map are still being made";
   std::string late_because;
-  bool given_up = false;  // for a while
+  bool given_up = false;  // until the next retry
   bool must_yield = false;
   bool stopping = false;
   std::thread thread;
 };
 
 void RouteIndex::Impl::run() {
-  ::setpriority(PRIO_PROCESS, 0, 10);  // of this thread: robots and callers go first
+  ::setpriority(PRIO_PROCESS, 0, 10);  // lowers the priority of this thread: robots and callers come first
   Clock::duration retry = options.retry;
   load();
   std::unique_lock lock(mutex);
@@ -95,14 +95,14 @@ void RouteIndex::Impl::run() {
       if (std::exchange(hindered, false)) pause = kMaxRest;
     } else if (store && store->is_damaged() && start - damaged_at > options.retry) {
       damaged_at = start;
-      drop(trouble.message(), false);  // and made anew at once, in another file
+      drop(trouble.message(), false);  // they are made anew at once, in another file
       pause = {};
     } else {
-      // Where only the disk is full, the cells that there are still serve, with what is stale looked at frame by frame.
+      // If only the disk is full, the cells that exist are still used, and stale chunks are searched frame by frame.
       if (shown && trouble.reason() == Reason::DISK_FULL)
         note_late(trouble.message());
       else
-        drop(trouble.message(), true);  // what was done in part is not trusted
+        drop(trouble.message(), true);  // the overlay may be half changed
       if (store) store->trim();
       pause = retry;
       retry = std::min<Clock::duration>(2 * retry, kLastRetry);
@@ -116,7 +116,7 @@ void RouteIndex::Impl::run() {
   }
 }
 
-// What the run before left.
+// Loads the cells that the run before saved.
 void RouteIndex::Impl::load() {
   if (options.folder.empty()) return;
   try {
@@ -143,7 +143,7 @@ void RouteIndex::Impl::open_store() {
   store = std::move(opened).or_throw();
 }
 
-// Some of what is to be done; whether there is more.
+// Does some of the work that there is to do. Returns whether there is more.
 bool RouteIndex::Impl::work() {
   if (shown && store->is_damaged())
     throw StatusError(Status(Reason::DATA_LOSS, "the file of cells is damaged; they are made again from the map"));
@@ -210,7 +210,8 @@ std::vector<storage::ChunkId> RouteIndex::Impl::refresh(const storage::MapView& 
   return made;
 }
 
-// Cells grown one by one lie as well as those made together only while they are the lesser part.
+// Whether so many chunks are new that the tree should be built anew: cells that grow chunk by chunk are as good as
+// those that are made together only while they are the smaller part.
 bool RouteIndex::Impl::is_mostly_new(const std::vector<storage::ChunkId>& chunks) const {
   const auto fresh = std::count_if(chunks.begin(), chunks.end(), [this](storage::ChunkId chunk) {
     return working.tree().find(chunk) == CellTree::kNone;
@@ -218,7 +219,8 @@ bool RouteIndex::Impl::is_mostly_new(const std::vector<storage::ChunkId>& chunks
   return fresh > 64 && static_cast<std::uint32_t>(fresh) > working.tree().chunks() / 4;
 }
 
-// What was made of the map of this version, which these chunks are known of.
+// Shows the working overlay to searches. The chunks in `known` are as of this version of the map, so they are no longer
+// stale unless they have changed since.
 void RouteIndex::Impl::show(std::uint64_t version, const std::vector<storage::ChunkId>& known) {
   const std::size_t bytes = working.memory_bytes();
   charge(bytes);
@@ -254,12 +256,12 @@ void RouteIndex::Impl::charge(std::size_t bytes) {
   charged = bytes;
 }
 
-// What was read of cells goes where others need the room.
+// Evicts cells from memory if other shares, or this one, exceed the budget.
 void RouteIndex::Impl::make_room() {
   const std::size_t beside = budget->used_beside_cache(), mine = budget->used(storage::Share::kRoutes),
-                    most = budget->allowance(storage::Share::kRoutes);
+                    allowance = budget->allowance(storage::Share::kRoutes);
   const std::size_t over =
-      std::max(beside > budget->limit() ? beside - budget->limit() : 0, mine > most ? mine - most : 0);
+      std::max(beside > budget->limit() ? beside - budget->limit() : 0, mine > allowance ? mine - allowance : 0);
   if (over == 0) return;
   std::shared_ptr<CellStore> cells;
   {
@@ -269,7 +271,8 @@ void RouteIndex::Impl::make_room() {
   if (cells) cells->evict(over);
 }
 
-// The budget is exceeded: what can be read again goes first, then all cells, which can be made again.
+// Called when the budget is exceeded. Frees what can be read again first; if that is not enough, all cells, which can
+// be made again.
 void RouteIndex::Impl::yield() {
   make_room();
   if (budget->used_beside_cache() <= budget->limit()) return;
@@ -279,14 +282,14 @@ void RouteIndex::Impl::yield() {
 }
 
 void RouteIndex::Impl::check(std::size_t bytes) const {
-  const std::size_t most = budget->allowance(storage::Share::kRoutes);
-  if (bytes > most / 2)  // the rest is for what searches pass
+  const std::size_t allowance = budget->allowance(storage::Share::kRoutes);
+  if (bytes > allowance / 2)  // the other half is for the cells that searches pass
     throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the cells of this map take more than the " +
-                                                          std::to_string(most >> 20) +
+                                                          std::to_string(allowance >> 20) +
                                                           " MB that memory_budget_mb leaves for them"));
   const std::lock_guard lock(mutex);
   if (must_yield)
-    throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the memory of cells was needed for something else"));
+    throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the memory of the cells was needed for something else"));
   if (stopping) throw StatusError(Status(Reason::SHUTTING_DOWN, "the daemon stops"));
 }
 
@@ -326,7 +329,8 @@ void RouteIndex::changed(std::uint64_t version, std::span<const storage::ChunkId
 
 RouteIndex::Snapshot RouteIndex::snapshot() const {
   const std::lock_guard lock(impl_->mutex);
-  // What a view shows is told before it is there: whatever this one has more than the cells know is stale.
+  // changed() is called before a view is published, so every chunk in which this view differs from the cells is in
+  // `stale`.
   Snapshot snapshot{impl_->current_view(), impl_->shown, impl_->missing_because, impl_->late_because, {}};
   if (!snapshot.overlay) return snapshot;
   snapshot.stale.reserve(impl_->stale.size());
@@ -334,7 +338,7 @@ RouteIndex::Snapshot RouteIndex::snapshot() const {
   return snapshot;
 }
 
-bool RouteIndex::wait_settled(Clock::time_point deadline) const {
+bool RouteIndex::wait_current(Clock::time_point deadline) const {
   std::unique_lock lock(impl_->mutex);
   return impl_->wake.wait_until(lock, deadline, [this] {
     return impl_->given_up || !impl_->late_because.empty() ||

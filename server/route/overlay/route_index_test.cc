@@ -55,7 +55,7 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
   index->start();
   std::mt19937 random(1);
   for (int round = 0; round < 30; ++round) {
-    ASSERT_TRUE(round % 3 || index->wait_settled(Clock::now() + 30s));
+    ASSERT_TRUE(round % 3 || index->wait_current(Clock::now() + 30s));
     const auto map = index->snapshot();
     if (round % 3 == 0) {
       EXPECT_TRUE(map.stale.empty());
@@ -67,7 +67,7 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
     town.drive(90);
     town.change(random);
   }
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   EXPECT_EQ(index->snapshot().overlay->tree().chunks(), 4 * ((200 + 30 * 90 + 63) / storage::kFramesPerChunk));
   EXPECT_GT(town.budget().used(storage::Share::kRoutes), 0u);
 }
@@ -77,11 +77,11 @@ TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
   town.drive(1000);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   std::mt19937 random(4);
   for (std::uint32_t round = 0; town.map().session(2)->frames > 0; ++round) {
     town.remove_chunk(2);
-    ASSERT_TRUE(round % 2 == 0 || index->wait_settled(Clock::now() + 30s));
+    ASSERT_TRUE(round % 2 == 0 || index->wait_current(Clock::now() + 30s));
     const auto map = index->snapshot();
     const auto some_frame = [&] {
       FrameId id = town.random_frame(random);
@@ -90,17 +90,17 @@ TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
     };
     for (int i = 0; i < 10; ++i) expect_as_dijkstra(map, random() % kMetrics.size(), some_frame(), some_frame());
   }
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   EXPECT_EQ(index->snapshot().overlay->outdated(), 0u);
 }
 
-// One thread edits, one makes cells, two ask.
+// One thread edits the map, one makes cells, and two search.
 TEST(RouteIndex, IsRightWhileTheMapChanges) {
   LiveTown town;
   town.drive(600);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   std::atomic<int> asked = 0;
   std::vector<std::thread> askers;
   for (int asker = 0; asker < 2; ++asker)
@@ -131,7 +131,7 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   std::mt19937 random(3);
   for (int i = 0; i < 60; ++i) {
     if (i % 10 == 0) town.change(random);
@@ -141,14 +141,14 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
   }
 }
 
-// Each holds what it passes, and lets go what the others want.
-TEST(RouteIndex, ManyAskInLittleMemory) {
+// Each search holds the cells that it passes, and the memory must suffice for all of them in turn.
+TEST(RouteIndex, ManySearchesShareLittleMemory) {
   LiveTown town(std::size_t{1} << 20);
   town.drive(2000);
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 60s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   std::atomic<int> found = 0, asking = 3;
   std::vector<std::thread> askers;
   for (unsigned seed = 1; seed <= 3; ++seed)
@@ -170,7 +170,7 @@ TEST(RouteIndex, ManyAskInLittleMemory) {
           if (!route.ok() || !expected.ok()) continue;
           EXPECT_NEAR(route->cost, expected->cost, 1e-9 * expected->cost);
           ++found;
-        } catch (const StatusError& error) {  // all of it is held by others
+        } catch (const StatusError& error) {  // other searches hold all of the memory
           EXPECT_EQ(error.status().reason(), Reason::BUDGET_EXCEEDED) << error.status().to_string();
         }
       }
@@ -179,7 +179,7 @@ TEST(RouteIndex, ManyAskInLittleMemory) {
   std::mt19937 random(4);
   while (asking > 0) {
     town.change(random);
-    EXPECT_TRUE(town.map().commit().ok());  // what is not committed would take the room of cells
+    EXPECT_TRUE(town.map().commit().ok());  // uncommitted data would take the room of the cells
     std::this_thread::sleep_for(5ms);
   }
   for (std::thread& asker : askers) asker.join();
@@ -187,28 +187,28 @@ TEST(RouteIndex, ManyAskInLittleMemory) {
   EXPECT_LE(town.budget().used(storage::Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
 }
 
-TEST(RouteIndex, WhereNotEvenItsTablesFitThereAreNoCells) {
+TEST(RouteIndex, HasNoCellsWhereNotEvenItsTablesFit) {
   LiveTown town(std::size_t{64} << 10);
   town.drive(3000);
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   const auto map = index->snapshot();
   EXPECT_FALSE(map.overlay);
   EXPECT_NE(map.missing_because.find("memory_budget_mb"), std::string::npos) << map.missing_because;
   EXPECT_EQ(town.budget().used(storage::Share::kRoutes), 0u);
   std::mt19937 random(3);
-  town.change(random);  // nobody minds
+  town.change(random);  // must do no harm
 }
 
-// What others hold goes before what can be made again.
-TEST(RouteIndex, GivesWayToOtherSharesAndComesBack) {
+// Cells are dropped where other shares need the memory, since they can be made again.
+TEST(RouteIndex, YieldsToOtherSharesAndComesBack) {
   LiveTown town;
   town.drive(1000);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   ASSERT_TRUE(index->snapshot().overlay);
   const auto until = [&](bool there) {
     for (const auto end = Clock::now() + 30s; Clock::now() < end; std::this_thread::sleep_for(1ms))
@@ -226,27 +226,27 @@ TEST(RouteIndex, GivesWayToOtherSharesAndComesBack) {
     expect_as_dijkstra(index->snapshot(), 0, town.random_frame(random), town.random_frame(random));
 }
 
-// An import: cells of the whole are made at once, where they were grown.
-TEST(RouteIndex, IsMadeAnewWhereMostOfTheMapIs) {
+// As after an import: all cells are made anew together rather than grown.
+TEST(RouteIndex, IsMadeAnewWhenMostOfTheMapIsNew) {
   LiveTown town;
   town.drive(100);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   town.drive(2500);
   std::mt19937 random(5);
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   for (int i = 0; i < 20; ++i)
     expect_as_dijkstra(index->snapshot(), 1, town.random_frame(random), town.random_frame(random));
 }
 
-TEST(RouteIndex, TriesAgainWhereTheMapCannotBeRead) {
+TEST(RouteIndex, TriesAgainWhenTheMapCannotBeRead) {
   LiveTown town;
   town.drive(300);
   const auto index = town.index();
   town.views_fail = true;
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   town.views_fail = false;
   for (const auto end = Clock::now() + 30s; !index->snapshot().overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
@@ -254,7 +254,7 @@ TEST(RouteIndex, TriesAgainWhereTheMapCannotBeRead) {
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 299});
 }
 
-TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
+TEST(RouteIndex, MakesDamagedCellsAnew) {
   const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
@@ -262,7 +262,7 @@ TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
   town.drive(2000);
   const auto index = town.index(folder);
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   const std::string path = folder + "/routes/cells";
   const std::string nothing(std::filesystem::file_size(path), '\0');
   std::fstream(path, std::ios::in | std::ios::out | std::ios::binary) << nothing;
@@ -270,14 +270,14 @@ TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
   EXPECT_THROW(expect_as_dijkstra(map, 0, {1, 0}, {4, 1999}), StatusError);
   for (const auto end = Clock::now() + 30s; index->snapshot().overlay == map.overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   for (const auto end = Clock::now() + 30s; !index->snapshot().overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 1999});
 }
 
-// What one run leaves, the next goes on with, if the map is the same and nothing is damaged.
-TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
+// A run continues with the cells of the run before if the map is the same and nothing is damaged.
+TEST(RouteIndex, IsKeptAfterARunThatEndsInOrder) {
   const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
@@ -295,7 +295,7 @@ TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
     return info.st_ino;
   };
   const auto await = [&](const RouteIndex& index) {
-    ASSERT_TRUE(index.wait_settled(Clock::now() + 30s));
+    ASSERT_TRUE(index.wait_current(Clock::now() + 30s));
     ASSERT_TRUE(index.snapshot().overlay);
   };
   {
@@ -303,14 +303,14 @@ TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
     index->start();
     await(*index);
     index->stop();
-    for (int i = 0; i < 5; ++i) town.change(random);  // which the cells do not know
+    for (int i = 0; i < 5; ++i) town.change(random);  // after which the cells are stale
     town.drive(100);
     ASSERT_TRUE(town.map().commit().ok());
     ASSERT_TRUE(index->save().ok());
     EXPECT_FALSE(index->snapshot().stale.empty());
   }
   const auto first = inode();
-  const auto held_open = std::ifstream(folder + "/routes/cells");  // its inode is given to no other
+  const auto held_open = std::ifstream(folder + "/routes/cells");  // keeps its inode from being reused
   {
     const auto index = town.index(folder);
     index->start();
@@ -327,7 +327,7 @@ TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
     ASSERT_TRUE(index->save().ok());
   }
   town.map().watch_edits({});
-  town.change(random);  // behind the back of all cells
+  town.change(random);  // without telling the index
   ASSERT_TRUE(town.map().commit().ok());
   {
     const auto index = town.index(folder);
@@ -363,7 +363,7 @@ TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
   }
 }
 
-TEST(RouteIndex, OnAFullDiskThereAreNone) {
+TEST(RouteIndex, HasNoCellsOnAFullDisk) {
   const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
@@ -372,7 +372,7 @@ TEST(RouteIndex, OnAFullDiskThereAreNone) {
   town.room_for_others = std::uint64_t{1} << 62;
   const auto index = town.index(folder);
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   const auto map = index->snapshot();
   EXPECT_FALSE(map.overlay);
   EXPECT_NE(map.missing_because.find("disk"), std::string::npos) << map.missing_because;
@@ -381,20 +381,20 @@ TEST(RouteIndex, OnAFullDiskThereAreNone) {
   town.change(random);
 }
 
-TEST(RouteIndex, OfAnEmptyMapGrowsFromNothing) {
+TEST(RouteIndex, GrowsFromAnEmptyMap) {
   LiveTown town;
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   for (int i = 0; i < 10; ++i) {
     town.drive(40);
     expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {1, static_cast<std::uint32_t>(40 * i)});
   }
-  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 399});
 }
 
-TEST(RouteIndex, EndsInTheMidstOfItsWork) {
+TEST(RouteIndex, CanBeStoppedWhileItWorks) {
   LiveTown town;
   town.drive(3000);
   for (int i = 0; i < 5; ++i) {

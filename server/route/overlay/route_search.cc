@@ -14,7 +14,7 @@ bool too_stale(const RouteIndex::Snapshot& map) {
   return map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10);
 }
 
-// What is wanted, as cells have it; or why they have not.
+// The question to the cells, or UNSUPPORTED with the reason why cells cannot answer it.
 Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
   const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
   if (!map.overlay) return without(map.missing_because);
@@ -48,12 +48,13 @@ class RouteSearch {
     const auto query = as_cells_have_it(map_, options_);
     if (!query.ok()) {
       answer_.frame_by_frame = query.status().message();
-      // Where edges do not join the ends Dijkstra would have to see all that is joined to the start.
+      // Checked first since, if no edges join the ends, Dijkstra would have to search all that is joined to the start.
       if (Status status = check_joined(); !status.ok()) return with_near(std::move(status), near_steps);
       return frame_by_frame();
     }
     Result<Route> route = by_cells(*query);
-    // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their own.
+    // Frame by frame it may still succeed: cells read all frames of a chunk, of which a damaged one may not be on the
+    // route, and they need memory of their own.
     if (const Reason reason = route.reason();
         reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED) {
       answer_.frame_by_frame = route.status().message();
@@ -76,8 +77,9 @@ class RouteSearch {
 
   Result<RouteAnswer> frame_by_frame() { return as_answer(find_route(*map_.view, from_, to_, options_, work_)); }
 
-  // NOT_CONNECTED, if cells that are not those of the question say so nevertheless: filters only take edges away. The
-  // closures that only bind, which every question supposes besides, are followed around the start (with_near()).
+  // NOT_CONNECTED if the cells show that no edges join the ends, even though they cannot answer the question itself: a
+  // filter only removes edges. Closures that only bind, which every question supposes in addition, are followed around
+  // the start (with_near()).
   Status check_joined() const {
     if (!map_.overlay || too_stale(map_) || options_.filter.supposed.candidates || options_.filter.supposed.quarantined)
       return {};
@@ -89,8 +91,8 @@ class RouteSearch {
     }
   }
 
-  // Cells do not know of closures that only bind. Where what they found is short, or nothing, these are followed frame
-  // by frame around the start: a goal that is found so is found in the best of all ways.
+  // Cells do not contain closures that only bind. If the route that they found is short, or if they found none,
+  // searches frame by frame around the start with these closures: if that finds the goal, its route is the best one.
   Result<RouteAnswer> with_near(Result<Route> by_cells, std::uint64_t near_steps) {
     const Reason reason = by_cells.reason();
     const bool refused = reason == Reason::NOT_CONNECTED || reason == Reason::COST_LIMIT;
@@ -100,7 +102,7 @@ class RouteSearch {
     around.max_frames = std::min<std::size_t>(around.max_frames, kNearFramesAStep * near_steps);
     try {
       near = find_route(*map_.view, from_, to_, options_, around);
-    } catch (const StatusError&) {  // what cannot be read there may be none of the route's
+    } catch (const StatusError&) {  // what cannot be read there may not be on the route
     }
     if (near.ok()) {
       answer_.near = true;
@@ -108,7 +110,7 @@ class RouteSearch {
       return as_answer(std::move(near));
     }
     if (by_cells.ok()) return as_answer(std::move(by_cells));
-    // A search that came to a limit of its own leaves what edges say as the answer.
+    // If the search around the start came to its own limit, the answer by edges stands.
     if (near.reason() != Reason::OUT_OF_REACH && near.reason() != Reason::BUDGET_EXCEEDED) return near.status();
     return Status(reason, by_cells.status().message() +
                               "; closures that only bind landmarks were followed near the start, and not beyond");

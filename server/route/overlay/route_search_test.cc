@@ -19,7 +19,7 @@ class RouteSearchTest : public ::testing::Test {
   RouteSearchTest() {
     town_.drive(600);
     index_->start();
-    EXPECT_TRUE(index_->wait_settled(std::chrono::steady_clock::now() + std::chrono::minutes(1)));
+    EXPECT_TRUE(index_->wait_current(std::chrono::steady_clock::now() + std::chrono::minutes(1)));
     map_ = index_->snapshot();
   }
 
@@ -54,7 +54,7 @@ TEST_F(RouteSearchTest, CellsAnswerAsDijkstraDoes) {
   }
 }
 
-// Where closures that only bind could give a better way, the search around the start is Dijkstra's.
+// Where closures that only bind could give a better route, the search around the start is Dijkstra's.
 TEST_F(RouteSearchTest, AShortRouteIsSearchedAgainAroundItsStart) {
   const FrameId from{1, 100}, to{1, 103};
   const auto answer = search(from, to, {}, 50);
@@ -67,7 +67,7 @@ TEST_F(RouteSearchTest, AShortRouteIsSearchedAgainAroundItsStart) {
   EXPECT_FALSE(long_way->near);
 }
 
-TEST_F(RouteSearchTest, WhatCellsDoNotKnowIsSearchedFrameByFrame) {
+TEST_F(RouteSearchTest, QuestionsThatCellsCannotAnswerAreSearchedFrameByFrame) {
   const FrameId from{1, 100}, to{1, 300};
   RouteOptions options;
   options.weights = {2, 0, 0, 0};
@@ -94,7 +94,7 @@ TEST_F(RouteSearchTest, WhatCellsDoNotKnowIsSearchedFrameByFrame) {
   EXPECT_EQ("the disk is full", without->frame_by_frame);
 }
 
-TEST_F(RouteSearchTest, EndsWithWhatItsWorkSays) {
+TEST_F(RouteSearchTest, EndsWithTheStatusOfItsWorkLimit) {
   const WorkLimit stopped{.max_frames = 1'000'000,
                           .proceed = [](std::size_t) { return Status(Reason::DEADLINE, "too late"); }};
   EXPECT_EQ(Reason::DEADLINE, search({1, 0}, {1, 599}, {}, 0, stopped).reason());

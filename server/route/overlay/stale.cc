@@ -21,7 +21,8 @@ std::unordered_map<storage::ChunkId, CellFrames> frames_of_stale(const Overlay& 
     const std::uint32_t number = overlay.tree().find(chunk);
     const auto then = number == CellTree::kNone ? kNothing : overlay.cell(number)->frames();
     for (const FrameId end : ends_of_changed_links(*then, frames))
-      if (storage::chunk_id(end) != chunk) open.push_back(storage::chunk_id(end));  // the cell has no links within
+      // Links within the chunk always differ, since the cell has none.
+      if (storage::chunk_id(end) != chunk) open.push_back(storage::chunk_id(end));
   }
   return stale;
 }

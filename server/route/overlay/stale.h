@@ -1,4 +1,4 @@
-// Where the map is no longer what an overlay was made of.
+// Finds where the map is no longer as it was when an overlay was made.
 #pragma once
 
 #include <span>
@@ -9,9 +9,9 @@
 
 namespace relmap::route {
 
-// The frames of chunks that changed, or came, since the overlay was made; and of those to which their edges lead, where
-// these changed, since what is stored with one end concerns both. What the overlay says of all other chunks is true.
-// Throws StatusError where reads of the graph do, and what work.proceed says.
+// Returns the frames of the chunks that changed or came since the overlay was made, and of chunks to which their
+// changed edges lead, since an edge is stored with one end but concerns both. The overlay is right about all other
+// chunks. Throws StatusError where reads of the graph do, and with what work.proceed returns.
 std::unordered_map<storage::ChunkId, CellFrames> frames_of_stale(const Overlay& overlay, const storage::Graph& graph,
                                                                  std::span<const storage::ChunkId> changed,
                                                                  const WorkLimit& work = {});

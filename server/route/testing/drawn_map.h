@@ -1,5 +1,5 @@
 // Maps for tests, drawn in ASCII. A letter or digit is a frame; its column and row are its position in metres (x right,
-// z up the page); all frames look the same way. Lines between frames are for the reader's eye; edges are said in words:
+// z up the page); all frames look the same way. Lines between frames are only for the reader; edges are added by calls:
 //
 //   DrawnMap map(R"(
 //     A---B---C
@@ -35,7 +35,7 @@ class DrawnMap final : public storage::PartialGraph {
     }
   }
 
-  // A frame without a drawing.
+  // Adds a frame that is not drawn.
   void place(char name, const Vector3& position) { positions_[name] = position; }
 
   struct Drive {
@@ -43,7 +43,7 @@ class DrawnMap final : public storage::PartialGraph {
     double standing_s = 0;  // before each frame but the first
     bool oneway = false;
   };
-  // The next session; returns its number.
+  // Adds the next session; returns its number.
   SessionNumber drive(std::string_view names) { return drive(names, Drive()); }
   SessionNumber drive(std::string_view names, Drive how) {
     storage::Session session;
@@ -69,7 +69,8 @@ class DrawnMap final : public storage::PartialGraph {
     return session.number;
   }
 
-  // The last two frames of a drive are as far apart as this id says; what came before must not close loops with `to`.
+  // Renumbers `to`, the last frame of a drive, to `late`, which leaves a gap after `from`. `to` must have no loop
+  // edges.
   void leave_a_gap(char from, char to, FrameId late) {
     auto hot = frames_.extract(id(to));
     hot.key() = late;
@@ -84,7 +85,7 @@ class DrawnMap final : public storage::PartialGraph {
     sessions_.at(late.session).last = late.index;
   }
 
-  // An accepted loop edge between the two frames named; returns its id.
+  // Adds an accepted loop edge between the two named frames; returns its id.
   EdgeId close(std::string_view ends, double seconds = 1) {
     const bool swap = id(ends[0]) > id(ends[1]);
     const char a = swap ? ends[1] : ends[0], b = swap ? ends[0] : ends[1];

@@ -1,4 +1,4 @@
-// A town of streets in a map that grows and changes, and the cells of its routes. For tests.
+// For tests: a town of streets in a map that grows and changes, and the cells of its routes.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace relmap::route {
 
 inline const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0.2, 30}};
 
-// A town in a map, whose worker is the test.
+// A town in a map. The test does the worker's part.
 class LiveTown {
  public:
   explicit LiveTown(std::size_t budget_bytes = std::size_t{256} << 20)
@@ -50,13 +50,13 @@ class LiveTown {
     return index;
   }
 
-  // Every robot drives on.
+  // Lets every robot drive on.
   void drive(std::uint32_t frames) {
     for (std::uint32_t i = 0; i < frames && frames_ < options().frames_a_robot; ++i, ++frames_)
       for (SessionNumber robot = 1; robot <= options().robots; ++robot) add({robot, frames_});
     map_->publish();
   }
-  // An edge is estimated anew, and a loop taken out, or back.
+  // Estimates an edge anew, and removes a loop edge or puts it back.
   template <typename Random>
   void change(Random& random) {
     storage::FrameHot& frame = map_->edit_hot(random_frame(random));
@@ -69,7 +69,7 @@ class LiveTown {
     map_->publish();
   }
 
-  // The end of a robot's drive leaves the map.
+  // Removes the end of a robot's drive from the map.
   void remove_chunk(SessionNumber robot) {
     map_->edit_session(robot).state = storage::SessionState::kDeleting;
     const std::uint32_t last = map_->session(robot)->last;

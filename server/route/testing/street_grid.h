@@ -1,6 +1,6 @@
-// A fleet that drives about in a town of square blocks: robots turn at crossings as they like, and recognise each
-// crossing that any of them has passed. Made from a seed; stands in memory, a few bytes a frame, and shows itself as
-// the graph that a map would be. For tests and benchmarks of routes.
+// For tests and benchmarks of routes: a fleet that drives around in a town of square blocks. Robots turn at random at
+// crossings and recognise each crossing that any of them has passed. The town is made from a seed, takes a few bytes of
+// memory a frame, and implements the graph that a map would have.
 #pragma once
 
 #include <algorithm>
@@ -38,9 +38,9 @@ class StreetGrid final : public storage::PartialGraph {
     return {1 + static_cast<std::uint32_t>(random() % options_.robots),
             static_cast<std::uint32_t>(random() % options_.frames_a_robot)};
   }
-  // The step to this frame, or the loop edge stored there, is estimated anew: so many times as long as at first.
+  // Scales the length of the step to this frame, or of the loop edge stored there, relative to its first value.
   void set_length(FrameId frame, bool loop, double factor) { changed_[{frame, loop}].factor = factor; }
-  // The loop edge stored with this frame.
+  // Sets the state of the loop edge stored with this frame.
   void set_state(FrameId frame, storage::EdgeState state) { changed_[{frame, true}].state = state; }
   std::optional<FrameId> recognised_at(FrameId frame) const {
     const auto loop = loop_to_.find(frame);
@@ -104,8 +104,8 @@ class StreetGrid final : public storage::PartialGraph {
         recognised_[last].push_back(frame);
         ++loops_;
       }
-      if (!last.valid() || random() % 2) last = frame;  // which of the earlier passes is recognised
-      do {                                              // on, left or right, and back only where the town ends
+      if (!last.valid() || random() % 2) last = frame;  // the earlier pass that is recognised
+      do {                                              // straight on, left or right; back only at the edge of the town
         if (random() % 2) {
           const int before = dx;
           const bool left = random() % 2;
@@ -123,7 +123,7 @@ class StreetGrid final : public storage::PartialGraph {
     }
   }
 
-  // Between 0 and 1, of a frame and a purpose.
+  // A pseudo-random number between 0 and 1 that depends on a frame and a purpose.
   double chance(FrameId frame, std::uint64_t purpose) const {
     return static_cast<double>(detail::mix(frame.packed() * 8 + purpose + options_.seed * 0x9e3779b97f4a7c15u) >> 11) *
            0x1p-53;

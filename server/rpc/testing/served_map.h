@@ -1,5 +1,5 @@
-// A small map at work behind the handlers, over the memory engine: session 1 drove a circuit 1.4 times, session 2 is
-// another place that nothing connects to it. For tests.
+// For tests: a small map behind the handlers, in the memory engine. Session 1 drove a circuit about 1.25 times; session
+// 2 is another place without edges to the first.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ class ServedMap {
     EXPECT_TRUE(taken.ok()) << taken.status().to_string();
   }
 
-  // Frames 0 .. count - 1 of the circuit, as one camera saw them.
+  // Adds frames 0 .. count - 1 of the circuit as a mono session.
   SessionNumber take_in_with_one_eye(std::uint32_t count) {
     const SessionNumber session = mapper->begin_session(map::with_one_eye(circuit.keyframe(0)).session).or_throw();
     for (std::uint32_t i = 0; i < count; ++i) submit(session, map::with_one_eye(circuit.keyframe(i)));
@@ -57,7 +57,7 @@ class ServedMap {
     sim::PointsWorldOptions options;
     options.frames = kFrames;
     options.frames_per_lap = kLap;
-    options.speed = 0.4;  // a lap takes longer than what place recognition leaves out
+    options.speed = 0.4;  // so slow that a lap takes longer than the recent past, which place recognition masks
     options.births = 20;
     options.appearance = 140;
     return options;
