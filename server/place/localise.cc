@@ -112,7 +112,7 @@ class Search {
     return Localisation{*trials_.all()[*best].verified, trials_.candidate(*best).probability, 1, false,
                         static_cast<std::uint32_t>(trials_.tried())};
   }
-  // Of the first that was refused; before it, that something was confirmed where there are no metres.
+  // The refusal of the first candidate; NOT_STEREO, if any candidate has that, takes precedence.
   Status refusal() const {
     Status first;
     for (const PlaceTrial& trial : trials_.all())

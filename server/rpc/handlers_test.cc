@@ -486,7 +486,7 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
       route::RouteIndexOptions{}, [this] { return map_.mapper->view(); },
       std::make_shared<storage::Budget>(std::size_t{64} << 20));
   map_.core->routes.index->start();
-  ASSERT_TRUE(map_.core->routes.index->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+  ASSERT_TRUE(map_.core->routes.index->wait_current(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
   const auto found = steps_of(request, &by_cells);
   EXPECT_EQ(by_cells.frame_by_frame(), "");
   EXPECT_NEAR(by_cells.cost(), by_edges.cost, 1e-9 * by_edges.cost);
