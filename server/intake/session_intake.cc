@@ -40,7 +40,7 @@ SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit
     durable_ = turn_ = seen_ = session.next_sequence;
     if (session.frames > 0) durable_time_us_ = turn_time_us_ = session.last_time_us;
     const std::uint32_t newest = session.next_sequence - std::min(session.next_sequence, kNewest);
-    view->visit_settled(session.number, newest, [&](const storage::Settled& settled) {
+    view->visit_skipped(session.number, newest, [&](const storage::Skipped& settled) {
       if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
       return true;
     });
@@ -56,7 +56,7 @@ std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequenc
   if (const auto hot = view->hot({*number_, sequence}); hot && hot->present) {
     found = Judged{hot->payload_crc, Reason::OK, false};
   } else {
-    view->visit_settled(*number_, sequence, [&](const storage::Settled& settled) {
+    view->visit_skipped(*number_, sequence, [&](const storage::Skipped& settled) {
       if (settled.from <= sequence) found = Judged{settled.crc, settled.reason, !settled.refused};
       return false;
     });

@@ -171,7 +171,7 @@ void Deletion::add_all_observers(const std::set<LandmarkId>& landmarks) {
   std::optional<FrameId> all_near;  // the base of which all frames in reach have been added
   for (const LandmarkId landmark : landmarks) {
     if (!landmark.valid() || goes(landmark.base)) continue;
-    const bool fixed = storage::is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
+    const bool fixed = storage::is_fixed(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
     if (fixed && all_near == landmark.base) continue;
     add_observers(map_, landmark, &affected_);
     if (fixed) all_near = landmark.base;

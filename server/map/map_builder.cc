@@ -167,7 +167,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
 Applied MapBuilder::apply_record(std::uint64_t, const storage::GapRecord& record) {
   const auto session = map_.session(record.session);
   if (!session || record.to < record.from || record.from < session->next_sequence) return {};
-  map_.settle(record.session, {record.from, record.to, 0, false, record.reason});
+  map_.skip(record.session, {record.from, record.to, 0, false, record.reason});
   map_.state().gaps += record.to - record.from + 1;
   return {};
 }
@@ -176,7 +176,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::RefusalRecord& re
   ++map_.state().refused[static_cast<std::size_t>(record.reason)];
   const auto session = map_.session(record.session);
   if (!session || record.sequence < session->next_sequence) return {};
-  map_.settle(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
+  map_.skip(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
   return {};
 }
 

@@ -103,7 +103,7 @@ TEST(MapBuilder, DerivedFactsStayInStepInAPlaceThatIsPassedManyTimes) {
   std::size_t fixed = 0, max_observers = 0;
   for (std::uint32_t i = 0; i < 40; ++i)
     for (const storage::Landmark& landmark : drive.map().hot({kDriveSession, i})->landmarks) {
-      fixed += storage::is_settled(landmark.observers);
+      fixed += storage::is_fixed(landmark.observers);
       max_observers = std::max(max_observers, landmark.observers.size());
     }
   EXPECT_GT(fixed, 500u);

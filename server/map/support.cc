@@ -94,14 +94,14 @@ std::vector<FrameId> updated(const storage::Graph& graph, storage::FirstObserver
   if (storage::resolve(graph, landmark) != landmark) return {};  // it stands for another one now
   std::vector<FrameId> list = graph.hot(landmark.base)->landmarks[landmark.slot].observers;
   const FrameId last = list.empty() ? FrameId() : list.back();
-  const bool was_fixed = storage::is_settled(list);
+  const bool was_fixed = storage::is_fixed(list);
   const std::size_t removed =
       std::erase_if(list, [&](FrameId f) { return std::binary_search(change.gone.begin(), change.gone.end(), f); });
   list.insert(list.end(), change.come.begin(), change.come.end());
   storage::keep_first_observers(graph, &list);
   // A fixed landmark's list does not contain later observers, which may have to move up. (Besides, a new observer
   // between two passes may make them one.)
-  if (!was_fixed || (removed == 0 && storage::is_settled(list) &&
+  if (!was_fixed || (removed == 0 && storage::is_fixed(list) &&
                      storage::taken_in(*graph.hot(list.back())) <= storage::taken_in(*graph.hot(last))))
     return list;
   return first_observers.of(landmark);
@@ -130,7 +130,7 @@ void add_support(storage::EditableGraph& map, PathsTo& paths) {
     }
     for (const EdgeId edge : *path) delta.add(edge, +1);
     // The list is in the order of arrival, and this frame is the newest.
-    if (!storage::is_settled(map.hot(landmark.base)->landmarks[landmark.slot].observers))
+    if (!storage::is_fixed(map.hot(landmark.base)->landmarks[landmark.slot].observers))
       map.edit_hot(landmark.base).landmarks[landmark.slot].observers.push_back(id);
   }
   for (const LandmarkId landmark : not_needed)
@@ -168,7 +168,7 @@ void add_observers(const storage::Graph& graph, LandmarkId landmark, std::set<Fr
   for (const storage::Unreached& item : hot->unreached)
     if (item.slot == landmark.slot) frames->insert(item.observer);
   const std::vector<FrameId>& list = hot->landmarks[landmark.slot].observers;
-  if (!storage::is_settled(list)) {
+  if (!storage::is_fixed(list)) {
     frames->insert(list.begin(), list.end());
     return;
   }
@@ -183,7 +183,7 @@ void add_frames_beyond(const storage::Graph& graph, const std::vector<FrameId>& 
     for (const storage::Unreached& item : hot->unreached) frames->insert(item.observer);
     bool all_near = false;  // all frames in reach have been added
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
-      const bool fixed = storage::is_settled(hot->landmarks[slot].observers);
+      const bool fixed = storage::is_fixed(hot->landmarks[slot].observers);
       if (fixed && all_near) continue;
       add_observers(graph, {frame, slot}, frames);
       all_near = all_near || fixed;

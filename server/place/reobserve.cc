@@ -285,7 +285,7 @@ Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, Fra
     binding.aligned = true;
   }
   const auto fixed = std::count_if(found.begin(), found.end(), [&](const Aligned& aligned) {
-    return storage::is_settled(graph.hot(aligned.landmark.base)->landmarks[aligned.landmark.slot].observers);
+    return storage::is_fixed(graph.hot(aligned.landmark.base)->landmarks[aligned.landmark.slot].observers);
   });
   const double radius = kBeside * camera.width;
   for (std::size_t t = 0; t < warm->observations.size(); ++t) {

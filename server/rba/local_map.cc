@@ -108,7 +108,7 @@ std::int32_t LocalMap::landmark(LandmarkId stored) {
   if (index < 0) {
     index = landmark_at(base, id.slot) = static_cast<std::int32_t>(landmarks.size());
     const storage::Landmark& record = frames[base].hot->landmarks[id.slot];
-    landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, storage::is_settled(record.observers),
+    landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, storage::is_fixed(record.observers),
                          is_frozen(base), &record});
   }
   landmark_at(owner, stored.slot) = index;

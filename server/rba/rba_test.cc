@@ -231,7 +231,7 @@ TEST(Relax, FixedLandmarksAreHeldUnlessTheyMayMove) {
   const FrameId base = drive.frame(20);
   const auto& landmarks = drive.map().hot(base)->landmarks;
   const auto fixed = std::find_if(landmarks.begin(), landmarks.end(), [](const storage::Landmark& landmark) {
-    return storage::is_settled(landmark.observers);
+    return storage::is_fixed(landmark.observers);
   });
   ASSERT_NE(fixed, landmarks.end());
   const auto slot = static_cast<std::size_t>(fixed - landmarks.begin());

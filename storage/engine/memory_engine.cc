@@ -84,7 +84,7 @@ class MemoryEngine final : public Engine {
   Status checkpoint(const std::string&, const EngineProgress&) override {
     return Status(Reason::UNSUPPORTED, "the memory engine keeps nothing that could be copied to a folder");
   }
-  Status compact(const EngineProgress&) override { return {}; }  // a table holds nothing but what is in it
+  Status compact(const EngineProgress&) override { return {}; }  // a table holds no replaced values
 
   Result<EngineStats> stats() const override {
     const std::lock_guard lock(mutex_);
@@ -95,7 +95,7 @@ class MemoryEngine final : public Engine {
     return stats;
   }
 
-  // It stands for a disk: what it holds is not counted against the daemon's memory.
+  // It stands in for a disk, so its content does not count as the daemon's memory.
   std::size_t memory_bytes() const override { return 0; }
 
  private:

@@ -1,4 +1,4 @@
-// The engine that forgets everything when its last holder does: unit tests, and TSan.
+// An engine in memory whose content ends with the last reference to it: for unit tests and ThreadSanitizer.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// An immutable table of keys and values: the snapshots of the engines that keep them in memory.
+// An immutable table of keys and values: the snapshot of the engines that keep the map in memory.
 #pragma once
 
 #include <map>
@@ -29,7 +29,7 @@ class TableSnapshot final : public EngineSnapshot {
     return {};
   }
 
-  // The table after puts and deletes; values are shared, not copied.
+  // The table after the puts and deletes. Unchanged values are shared, not copied.
   static std::shared_ptr<const Table> changed(const Table& table, std::span<const Put> puts,
                                               std::span<const std::string> deletes) {
     auto next = std::make_shared<Table>(table);
@@ -38,7 +38,7 @@ class TableSnapshot final : public EngineSnapshot {
     return next;
   }
 
-  // Of keys and values.
+  // Size of all keys and values.
   static std::uint64_t bytes(const Table& table) {
     std::uint64_t sum = 0;
     for (const auto& [key, value] : table) sum += key.size() + value->size();

@@ -31,7 +31,7 @@ Bytes PartWriter::finish() const {
   w.put(id_.session);
   w.put(id_.chunk);
   w.put(commit_);
-  w.put(std::uint64_t{0});  // room to grow
+  w.put(std::uint64_t{0});  // reserved
   for (const Entry& entry : entries_) {
     w.put(std::uint32_t{entry.slot});
     w.put(entry.length);

@@ -1,6 +1,6 @@
 // The container of chunk parts (docs/storage-format.md): a checked header with the index of the frames that follow, and
-// a checked record for each, so that one frame can be had without decoding the others. An open chunk's frames stand in
-// containers of one.
+// a checked record for each frame, so that one frame can be read without decoding the others. Each frame of an open
+// chunk has a container of its own.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@ inline constexpr std::uint16_t kPartVersion = 2;
 
 class PartWriter {
  public:
-  // `commit`: number of the commit that writes it. `body`: as frame_codec.h encodes it; slots ascending.
+  // `commit` is the number of the commit that writes the part. frame_codec.h encodes the bodies; slots must ascend.
   PartWriter(Part part, ChunkId id, std::uint64_t commit) : part_(part), id_(id), commit_(commit) {}
   void add(std::uint32_t slot, ByteSpan body);
-  // A record taken over from another container as it is: if it was damaged, it stays so and can be seen to be.
+  // Copies a record of another container unchanged: a damaged record stays damaged, and readers can tell.
   void copy(std::uint32_t slot, ByteSpan body, std::uint32_t crc);
   Bytes finish() const;
 
@@ -37,10 +37,10 @@ class PartWriter {
   ByteWriter bodies_;
 };
 
-// A frame by itself.
+// A container with one frame.
 Bytes frame_container(Part part, FrameId id, std::uint64_t commit, ByteSpan body);
 
-// A view of the bytes, which must outlive it.
+// Reads a container. The bytes must outlive the reader.
 class PartReader {
  public:
   // TRUNCATED, CORRUPT or UNKNOWN_FORMAT_VERSION; CORRUPT also if it is another part or chunk than asked for.
@@ -49,9 +49,9 @@ class PartReader {
   std::uint64_t commit() const { return commit_; }
   std::size_t size() const { return entries_.size(); }
   std::uint32_t slot(std::size_t i) const { return entries_[i].slot; }
-  // The i-th body, its checksum verified: CORRUPT.
+  // The i-th body; CORRUPT if it does not match its checksum.
   Result<ByteSpan> body(std::size_t i) const;
-  // As it is stored, and the checksum it should have.
+  // The i-th body as it is stored, and the checksum that it should have.
   ByteSpan stored(std::size_t i) const { return entries_[i].body; }
   std::uint32_t crc(std::size_t i) const { return entries_[i].crc; }
 

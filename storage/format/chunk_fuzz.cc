@@ -10,10 +10,10 @@ using relmap::ByteWriter;
 using relmap::FrameId;
 using namespace relmap::storage;
 
-constexpr FrameId kId{3, 577};  // whose the bodies are
+constexpr FrameId kId{3, 577};  // the frame of the bodies
 
-// Bodies are tried as every part, past the checksums that random bytes do not pass. What decodes must encode to
-// something that decodes to the same again.
+// Random bytes do not pass the checksums, so they are tried as bodies of every part. What decodes must encode to bytes
+// that decode to the same again.
 template <typename Decode, typename Encode>
 void round_trip(ByteSpan body, Decode decode, Encode encode) {
   const auto frame = decode(body);

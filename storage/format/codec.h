@@ -69,7 +69,7 @@ inline std::string get_long_string(ByteReader& r) {
   return {bytes.begin(), bytes.end()};
 }
 
-// Bytes with their number (u32) in front.
+// u32 length, then the bytes.
 inline void put_blob(ByteWriter& w, ByteSpan bytes) {
   w.put(static_cast<std::uint32_t>(bytes.size()));
   w.put_bytes(bytes);
@@ -79,8 +79,8 @@ inline Bytes get_blob(ByteReader& r) {
   return {bytes.begin(), bytes.end()};
 }
 
-// A table is u32 count, u16 bytes an item, and the items. A later version may append fields to an item: a reader that
-// does not know them steps over them.
+// A table is u32 count, u16 bytes per item, and the items. A later version may append fields to an item; a reader that
+// does not know them skips them.
 template <typename Items, typename PutItem>
 void put_table(ByteWriter& w, const Items& items, PutItem put_item) {
   w.put(static_cast<std::uint32_t>(items.size()));
@@ -104,7 +104,7 @@ bool get_table(ByteReader& r, Items& items, GetItem get_item) {
     ByteReader item(r.get_bytes(stride));
     items.push_back(get_item(item));
     if (!item.ok()) return false;
-    if (i == 0) items.reserve(count);  // not before an item is known to fit the stride
+    if (i == 0) items.reserve(count);  // only once an item is known to fit the stride
   }
   return true;
 }

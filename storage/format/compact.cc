@@ -8,16 +8,16 @@ namespace relmap::storage::compact {
 
 namespace {
 
-constexpr std::uint8_t kFullPose = 0;  // else 1 + PoseGrid::left_out
+constexpr std::uint8_t kFullPose = 0;  // otherwise 1 + PoseGrid::left_out
 
 enum class MatrixForm : std::uint8_t { kFull = 0, kZero = 1, kKnown = 2, kSingle = 3 };  // single: 21 floats
 
 template <typename T>
-bool same_bits(const T& a, const T& b) {  // -0 is not 0, NaN is itself
+bool same_bits(const T& a, const T& b) {  // -0 differs from 0, NaN equals itself
   return std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<std::size_t>(a.size())) == 0;
 }
 
-// The symmetric matrix of these floats is it, bit for bit.
+// Whether the matrix is symmetric and made of floats, bit for bit.
 bool made_of_floats(const Matrix6& m) {
   Matrix6 kept;
   for (int column = 0; column < 6; ++column)
@@ -25,7 +25,7 @@ bool made_of_floats(const Matrix6& m) {
   return kept.allFinite() && same_bits(m, kept);
 }
 
-// Small whatever the sign: 0, -1, 1, -2 ...
+// 0, -1, 1, -2 ... become 0, 1, 2, 3 ...: small numbers stay small whatever their sign.
 std::uint64_t zigzag(std::int64_t value) {
   return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
 }
@@ -62,7 +62,7 @@ std::size_t get_count(ByteReader& r) {
   return 0;
 }
 
-// The distance within a session, or, odd, a session and an index.
+// Within a session an even number, from the distance; otherwise an odd number, from the session, and the index.
 void put(ByteWriter& w, FrameId id, FrameId near) {
   if (id.session == near.session) {
     put_unsigned(w, zigzag(std::int64_t{id.index} - std::int64_t{near.index}) << 1);

@@ -1,6 +1,6 @@
-// What extensions of records mean, by their tags (docs/storage-format.md, Extensions, has also those that are
-// reserved). A tag means the same in every record that has it, so that what a proposal or a keyframe says goes on in
-// the edge or frame that it becomes; once given it is never given to anything else.
+// The tags of extensions of records, which say what they mean (docs/storage-format.md, Extensions, has also those that
+// are reserved). A tag means the same in every record, so that what a proposal or a keyframe says goes on in the edge
+// or frame that it becomes. A tag that has been used is never given another meaning.
 #pragma once
 
 #include <cstdint>
@@ -12,24 +12,24 @@
 namespace relmap::storage::tags {
 
 inline constexpr std::uint32_t kUniqueness = 1;  // of an edge, or a proposal
-inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: there, so true; no bytes
-inline constexpr std::uint32_t kCarried = 3;     // of a closure: along which frames it says that the robot was carried
-inline constexpr std::uint32_t kAlone = 25;      // of an edit of an edge: it concerns this edge only; no bytes
+inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: true if present; no bytes
+inline constexpr std::uint32_t kCarried = 3;  // of a closure: the frames along which it says that the robot was carried
+inline constexpr std::uint32_t kAlone = 25;   // of an edit of an edge: it concerns this edge only; no bytes
 inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state that it had before it was frozen
-inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a mark of what it may take out
+inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a mark of what it may remove
 
-// Map hashes do not count what has one of these tags: it tells how the map came about. The last three are reserved.
+// These tags say how the map came about, so map hashes leave them out. The last three are reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
 inline constexpr std::uint32_t kOwner = 18, kWallTime = 19, kAuthor = 20;
 inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kAuthor; }
 
-// Where it is not known nothing is written, for that is the default.
+// They write nothing where the value is unknown or the default.
 void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
 void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
-// False: malformed.
+// They return false if the extension is malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
 bool take_map_identity(Extensions& extensions, MapIdentity& identity);

@@ -38,12 +38,12 @@ void put_pair(ByteWriter& w, Enum low, auto high) {
   w.put(static_cast<std::uint8_t>(static_cast<std::uint8_t>(low) | (static_cast<std::uint8_t>(high) << 4)));
 }
 
-// Nothing more can be read.
+// All further reads fail.
 void spend(ByteReader& r) { (void)r.get_bytes(r.remaining() + 1); }
 
 std::uint32_t get_u32(ByteReader& r) { return static_cast<std::uint32_t>(get_unsigned(r)); }
 
-// Ids that ascend lie near each other: each is written relative to the one before.
+// Ascending ids lie near each other, so each is written relative to the one before.
 FrameId frame_of(FrameId id) { return id; }
 FrameId frame_of(EdgeId id) { return id.frame; }
 
@@ -282,7 +282,7 @@ void get_landmarks(ByteReader& r, std::vector<Landmark>& landmarks, FrameId id) 
   }
 }
 
-constexpr std::uint8_t kLevelInFlags = 31;  // a level that stands in a byte of its own
+constexpr std::uint8_t kLevelInFlags = 31;  // the level follows in a byte of its own
 constexpr std::uint8_t kAligned = 0x80;
 constexpr std::uint32_t kMono = 0x7fc00000;  // a quiet NaN
 
@@ -394,7 +394,7 @@ std::optional<FrameWarm> decode_warm(ByteSpan body, FrameId id) {
   return f;
 }
 
-// Descriptors are nine tenths of it, and shrink by a quarter.
+// Descriptors are nine tenths of a cold part, and shrink by a quarter.
 void encode_cold(ByteWriter& w, const FrameCold& f) {
   ByteWriter plain;
   put_unsigned(plain, f.appearance.size());
@@ -414,13 +414,13 @@ void encode_cold(ByteWriter& w, const FrameCold& f) {
   Bytes packed(ZSTD_compressBound(plain.size()));
   const std::size_t size =
       ZSTD_compressCCtx(context.get(), packed.data(), packed.size(), plain.bytes().data(), plain.size(), /*level=*/1);
-  if (ZSTD_isError(size)) throw std::bad_alloc();  // all that can go wrong
+  if (ZSTD_isError(size)) throw std::bad_alloc();  // the only possible error
   w.put_bytes(ByteSpan(packed).first(size));
 }
 
 std::optional<FrameCold> decode_cold(ByteSpan body) {
   const auto size = ZSTD_getFrameContentSize(body.data(), body.size());
-  if (size > kMaxColdBytes) return std::nullopt;  // an error is a number beyond
+  if (size > kMaxColdBytes) return std::nullopt;  // error codes are larger
   Bytes plain(size);
   static thread_local const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
                                                                                             ZSTD_freeDCtx);

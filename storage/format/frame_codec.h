@@ -1,6 +1,6 @@
-// One frame's part as bytes: the body of a chunk part's record (storage/format/chunk_codec.h). Exact: decode(encode(x))
-// == x, doubles bit for bit, and compact where estimates have the precision they are kept with
-// (storage/graph/precision.h). Checksums are the container's affair.
+// One frame's part as bytes: the body of a record in a chunk part (storage/format/chunk_codec.h). The encoding is
+// exact: decode(encode(x)) == x, doubles bit for bit. It is compact where estimates have the precision at which they
+// are kept (storage/graph/precision.h). The container has the checksums.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@
 
 namespace relmap::storage {
 
-// `id`: the frame's own, which is not written: other identities are written relative to it.
+// `id` is the frame's own, which is not written; other identities are written relative to it.
 void encode_hot(ByteWriter& w, FrameId id, const FrameHot& frame);
 void encode_warm(ByteWriter& w, FrameId id, const FrameWarm& frame);
 void encode_cold(ByteWriter& w, const FrameCold& frame);  // without the words
 void encode_words(ByteWriter& w, const std::vector<std::uint32_t>& words);
 
-// nullopt: no such body.
+// nullopt if the bytes are not such a body.
 std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id);
 std::optional<FrameWarm> decode_warm(ByteSpan body, FrameId id);
 std::optional<FrameCold> decode_cold(ByteSpan body);

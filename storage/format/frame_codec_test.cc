@@ -36,8 +36,8 @@ auto decoded(ByteSpan body, const FrameWarm&) { return decode_warm(body, kId); }
 auto decoded(ByteSpan body, const FrameCold&) { return decode_cold(body); }
 auto decoded(ByteSpan body, const std::vector<std::uint32_t>&) { return decode_words(body); }
 
-// Every field as it stands, so that NaN and -0 count for what they are. Written for the tests: the codec has forms to
-// choose from.
+// Writes every field as it is, so that NaN and -0 are compared too. Written for the tests, since the codec chooses
+// between several forms.
 void dump(ByteWriter& w, FrameId id) { w.put(id.session), w.put(id.index); }
 void dump(ByteWriter& w, EdgeId id) { dump(w, id.frame), w.put(id.ordinal); }
 void dump(ByteWriter& w, LandmarkId id) { dump(w, id.base), w.put(id.slot); }
@@ -139,7 +139,7 @@ TEST(FrameCodec, GivesBackEveryBitOfRandomFrames) {
     FrameHot hot = random.hot(kId);
     hot.appearance_count = random.below(300);
     expect_exact(hot);
-    round_estimates(hot);  // the forms that they are stored in as a rule
+    round_estimates(hot);  // the forms in which they are usually stored
     expect_exact(hot);
     expect_exact(random.warm());
     expect_exact(random.cold());

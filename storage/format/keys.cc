@@ -60,17 +60,17 @@ std::string session(SessionNumber number) {
 }
 std::string_view all_sessions() { return "s"; }
 
-std::string settled_in(SessionNumber session) {
-  std::string key(all_settled());
+std::string skipped_in(SessionNumber session) {
+  std::string key(all_skipped());
   put_u32(key, session);
   return key;
 }
-std::string settled(SessionNumber session, std::uint32_t to) {
-  std::string key = settled_in(session);
+std::string skipped(SessionNumber session, std::uint32_t to) {
+  std::string key = skipped_in(session);
   put_u32(key, to);
   return key;
 }
-std::string_view all_settled() { return "g"; }
+std::string_view all_skipped() { return "g"; }
 
 std::string pending(ChunkId id) { return chunk_key(all_pending(), id); }
 std::string_view all_pending() { return "q"; }

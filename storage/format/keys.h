@@ -10,8 +10,8 @@
 
 namespace relmap::storage::keys {
 
-// Whether this version knows what begins so. Keys of a later version begin with another byte; they are kept as they
-// are, and ignored by all that reads.
+// Whether this version knows keys that begin with `first`. Keys of a later version begin with another byte; they are
+// kept as they are, and readers ignore them.
 bool is_known(char first);
 
 std::string map_state();
@@ -19,20 +19,20 @@ std::string map_state();
 std::string session(SessionNumber number);
 std::string_view all_sessions();
 
-// Sequences of a session that ended without a frame, by the last of them.
-std::string settled(SessionNumber session, std::uint32_t to);
-std::string settled_in(SessionNumber session);  // prefix
-std::string_view all_settled();
+// Skipped sequences of a session, by the last one of the range.
+std::string skipped(SessionNumber session, std::uint32_t to);
+std::string skipped_in(SessionNumber session);  // prefix
+std::string_view all_skipped();
 // Frames of a chunk that wait for relaxation.
 std::string pending(ChunkId id);
 std::string_view all_pending();
 std::optional<ChunkId> pending_of(std::string_view key);
 
-// A closed chunk's part; the prefix of its frames' records while it is open.
+// A closed chunk's part; while the chunk is open, the prefix of its frames' records.
 std::string part(Part part, ChunkId id);
-// A frame's record: of an open chunk (hot, warm), or for good (cold, words).
+// A frame's record: while its chunk is open (hot, warm), or for good (cold, words).
 std::string frame(Part part, FrameId id);
-std::optional<FrameId> frame_of(std::string_view key);  // of a frame's record
+std::optional<FrameId> frame_of(std::string_view key);  // nullopt: not a frame's record
 // What a key of a part stands for.
 struct PartKey {
   Part part;

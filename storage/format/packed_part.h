@@ -21,13 +21,13 @@ namespace relmap::storage {
 template <typename Frame>  // FrameHot or FrameWarm
 class PackedPart {
  public:
-  // What is stored of a frame. Not there: no owner, and no damage.
+  // What is stored of a frame. A frame that is not there has neither owner nor damage.
   struct Record {
     std::shared_ptr<const Bytes> owner;  // of the bytes that `body` is part of
     ByteSpan body;
     std::uint32_t crc = 0;
     std::shared_ptr<const Frame> frame;    // if it is decoded already
-    std::shared_ptr<const Status> damage;  // its container cannot be read
+    std::shared_ptr<const Status> damage;  // set if its container cannot be read
 
     bool there() const { return owner || damage; }
   };
@@ -39,14 +39,14 @@ class PackedPart {
   PackedPart& operator=(const PackedPart&) = delete;
 
   ChunkId id() const { return id_; }
-  // Null: there is no such frame. Throws StatusError, DATA_LOSS naming the frame.
+  // Null if there is no such frame. Throws StatusError: DATA_LOSS naming the frame.
   std::shared_ptr<const Frame> frame(std::uint32_t slot) const;
-  // Those whose bit, by slot, is set.
+  // The frames whose bits are set in `slots`.
   Slots<Frame> frames(std::uint64_t slots) const;
-  // As it is stored, with the frame if that is decoded.
+  // The record as it is stored, with the frame if that has been decoded.
   Record record(std::uint32_t slot) const;
   bool empty() const;
-  // Every record bears its checksum.
+  // Whether every record matches its checksum.
   bool sound() const;
 
  private:
@@ -62,7 +62,8 @@ class PackedPart {
 extern template class PackedPart<FrameHot>;
 extern template class PackedPart<FrameWarm>;
 
-// Enters the frames of a container, which `bytes` is. What is wrong with it as a whole, if anything.
+// Enters the frames of the container `bytes` in `records`, and the commit that wrote it in `commit`. Returns what is
+// wrong with the container as a whole, if anything.
 template <typename Frame>
 Status unpack(std::shared_ptr<const Bytes> bytes, ChunkId id, typename PackedPart<Frame>::Records& records,
               std::uint64_t* commit);
@@ -72,7 +73,7 @@ extern template Status unpack<FrameHot>(std::shared_ptr<const Bytes>, ChunkId, P
 extern template Status unpack<FrameWarm>(std::shared_ptr<const Bytes>, ChunkId, PackedPart<FrameWarm>::Records&,
                                          std::uint64_t*);
 
-// DATA_LOSS, "hot part of frame 3:120: ...".
+// Throws StatusError: DATA_LOSS, "hot part of frame 3:120: ...".
 [[noreturn]] void throw_lost(Part part, const std::string& where, const std::string& what);
 
 }  // namespace relmap::storage

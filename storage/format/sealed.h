@@ -1,5 +1,5 @@
-// A sealed record: kind, version, length and CRC32C round a body. Sessions, the map's state and journal records stand
-// in one each.
+// A sealed record: version, kind and length before a body, and a CRC32C behind it. Sessions, the map's state and
+// journal records are sealed records.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct Sealed {
   std::uint8_t kind = 0;
   ByteSpan body;
 };
-// TRUNCATED, CORRUPT, or UNKNOWN_FORMAT_VERSION if the version is none of these.
+// TRUNCATED, CORRUPT, or UNKNOWN_FORMAT_VERSION if the version is not one of `oldest` to `newest`.
 Result<Sealed> unseal(ByteSpan bytes, std::uint16_t oldest, std::uint16_t newest);
 
 }  // namespace relmap::storage

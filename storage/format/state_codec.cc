@@ -10,10 +10,11 @@ namespace relmap::storage {
 namespace {
 
 constexpr std::uint16_t kVersion = 4;  // of a session, and of the map's state
-// As map format 2 wrote them, where a session is open, or idle work did not come last; else of version 3, with the
-// session's state, or the number of those records, behind all else. What is settled or waits has this version still.
+// The version of map format 2 where a session is open, or where idle work did not come last. Otherwise that format
+// wrote version 3, with the session's state, or the number of records of idle work, behind all else. Skipped sequences
+// and pending frames still have this version.
 constexpr std::uint16_t kFormat2 = 2;
-constexpr std::uint8_t kSession = 1, kState = 2, kSettled = 3, kPending = 4;
+constexpr std::uint8_t kSession = 1, kState = 2, kSkipped = 3, kPending = 4;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
 
@@ -115,28 +116,28 @@ Result<Session> decode_session(ByteSpan bytes) {
   return s;
 }
 
-Bytes encode_settled(const Settled& settled) {
+Bytes encode_skipped(const Skipped& skipped) {
   ByteWriter w;
-  w.put(settled.from);
-  w.put(settled.to);
-  w.put(settled.crc);
-  codec::put_bool(w, settled.refused);
-  w.put(settled.reason);
-  return seal(kSettled, kFormat2, w.bytes());
+  w.put(skipped.from);
+  w.put(skipped.to);
+  w.put(skipped.crc);
+  codec::put_bool(w, skipped.refused);
+  w.put(skipped.reason);
+  return seal(kSkipped, kFormat2, w.bytes());
 }
 
-Result<Settled> decode_settled(ByteSpan bytes) {
+Result<Skipped> decode_skipped(ByteSpan bytes) {
   const auto sealed = unseal(bytes, kFormat2, kFormat2);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
-  Settled settled;
-  settled.from = r.get<std::uint32_t>();
-  settled.to = r.get<std::uint32_t>();
-  settled.crc = r.get<std::uint32_t>();
-  settled.refused = codec::get_bool(r);
-  settled.reason = r.get<Reason>();
-  if (sealed->kind != kSettled || !r.at_end()) return malformed("record of what is settled");
-  return settled;
+  Skipped skipped;
+  skipped.from = r.get<std::uint32_t>();
+  skipped.to = r.get<std::uint32_t>();
+  skipped.crc = r.get<std::uint32_t>();
+  skipped.refused = codec::get_bool(r);
+  skipped.reason = r.get<Reason>();
+  if (sealed->kind != kSkipped || !r.at_end()) return malformed("record of skipped sequences");
+  return skipped;
 }
 
 Bytes encode_pending(std::uint64_t frames) {

@@ -40,13 +40,13 @@ TEST(StateCodec, GivesBackSessions) {
   expect_refused_when_damaged(encode_session(random.session(1)), decode_session);
 }
 
-TEST(StateCodec, GivesBackWhatIsSettledAndWhatWaits) {
+TEST(StateCodec, GivesBackSkippedSequencesAndPendingFrames) {
   RandomFrames random(2);
   for (int i = 0; i < 100; ++i) {
-    const Settled settled = random.settled();
-    EXPECT_EQ(decode_settled(encode_settled(settled)).or_throw(), settled);
+    const Skipped skipped = random.skipped();
+    EXPECT_EQ(decode_skipped(encode_skipped(skipped)).or_throw(), skipped);
   }
-  expect_refused_when_damaged(encode_settled(random.settled()), decode_settled);
+  expect_refused_when_damaged(encode_skipped(random.skipped()), decode_skipped);
   EXPECT_EQ(decode_pending(encode_pending(0x8000000000000001)).or_throw(), 0x8000000000000001);
   expect_refused_when_damaged(encode_pending(5), decode_pending);
 }
@@ -88,7 +88,7 @@ TEST(StateCodec, GivesBackTheMapState) {
   expect_refused_when_damaged(encode_state(state), decode_state);
 }
 
-// What map format 2 wrote: no extensions, and what follows the facts only where it says something.
+// Records of map format 2 have no extensions, and what follows the facts only where it says something.
 TEST(StateCodec, ReadsWhatFormat2Wrote) {
   const auto without_end = [](const Bytes& sealed, std::size_t end) {
     constexpr std::size_t kHead = 8, kCrc = 4;

@@ -1,23 +1,25 @@
-// Which landmark an observation means: facts are stored (claims, origins), the answer is derived, so that taking a
-// closure out is exact.
+// Which landmark an observation means. Only facts are stored (claims, and origins of observations); the landmark in
+// force is derived from them, so that removing a closure undoes exactly what it said.
 #pragma once
 
 #include "storage/graph/graph.h"
 
 namespace relmap::storage {
 
-// True for what needs none (tracking, kFromDeletedSession) and for accepted closures.
+// Whether what `closure` justifies holds: the closure is accepted, or none is needed (an invalid id: tracking, or
+// kFromDeletedSession).
 bool closure_holds(const Graph& graph, ClosureId closure);
 
-// What claims say of a landmark: follows, from it on, the first whose closure is accepted, to a landmark of which no
-// claim holds, or one that says that there is no need of it. A claim to what is lost holds no more.
+// What the claims of a landmark say. Beginning with `landmark`, the first claim whose closure is accepted is followed
+// to its target, until a landmark has no claim that holds, or has one that says it is not needed. A claim does not hold
+// if its target is lost.
 struct Meaning {
-  LandmarkId landmark;  // invalid: it is lost
+  LandmarkId landmark;  // at the end of the claims; invalid if it is lost
   bool needed = true;
 };
 Meaning meaning_of(const Graph& graph, LandmarkId landmark);
 
-// The landmark in force: that one. Invalid where there is no need of it.
+// The landmark in force that `landmark` stands for. Invalid if it is lost or not needed.
 LandmarkId resolve(const Graph& graph, LandmarkId landmark);
 
 }  // namespace relmap::storage

@@ -30,7 +30,7 @@ TEST_F(BindingTest, FollowsClaimsToTheirEnd) {
   EXPECT_EQ(resolve(graph, old), old);
 }
 
-TEST_F(BindingTest, TakingAClosureOutUndoesExactlyWhatItSaid) {
+TEST_F(BindingTest, RemovingAClosureUndoesExactlyWhatItSaid) {
   graph.frame({1, 5}).edge(first)->state = EdgeState::kRemoved;
   EXPECT_EQ(resolve(graph, middle), middle);
   EXPECT_EQ(resolve(graph, fresh), middle);
@@ -43,10 +43,10 @@ TEST_F(BindingTest, TakingAClosureOutUndoesExactlyWhatItSaid) {
   EXPECT_EQ(resolve(graph, fresh), old);
 }
 
-TEST_F(BindingTest, OneThatIsNotNeededStandsForNothingWhileItsClosureHolds) {
+TEST_F(BindingTest, ALandmarkThatIsNotNeededMeansNothingWhileTheClosureHolds) {
   graph.frame(middle.base).landmarks[1].claims = {{{}, first}};
   EXPECT_FALSE(resolve(graph, middle).valid());
-  EXPECT_FALSE(resolve(graph, fresh).valid());  // it is said to be that one
+  EXPECT_FALSE(resolve(graph, fresh).valid());  // a claim says that it is `middle`
   graph.frame({1, 5}).edge(first)->state = EdgeState::kQuarantined;
   EXPECT_EQ(resolve(graph, middle), middle);
   EXPECT_EQ(resolve(graph, fresh), middle);

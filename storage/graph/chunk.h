@@ -1,4 +1,4 @@
-// Chunks: the unit of paging. kFramesPerChunk consecutive frames of one session, in parts that are paged, cached and
+// Chunks, the unit of paging: kFramesPerChunk consecutive frames of one session, in parts that are paged, cached and
 // rewritten independently of each other.
 #pragma once
 
@@ -24,7 +24,7 @@ inline ChunkId chunk_id(FrameId id) { return {id.session, chunk_of(id)}; }
 inline std::uint32_t slot_of(FrameId id) { return id.index % kFramesPerChunk; }
 inline FrameId frame_in(ChunkId id, std::uint32_t slot) { return {id.session, id.chunk * kFramesPerChunk + slot}; }
 
-// Numbers on disk: never changed.
+// Numbers on disk; they never change.
 enum class Part : std::uint8_t { kHot = 1, kWarm = 2, kCold = 3, kWords = 4 };
 
 inline std::string_view part_name(Part part) {

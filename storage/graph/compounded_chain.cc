@@ -14,7 +14,8 @@ bool is_positive(const Matrix6& covariance) {
 
 }  // namespace
 
-// Of the error of `step` (rows) with that of the one before in the chain: zero unless they are neighbours.
+// Cross-covariance of the error of `step` (rows) with that of the step before it in the chain; zero unless both are
+// neighbouring odometry edges.
 Matrix6 CompoundedChain::common(const Step& step, const Step& before) {
   Matrix6 common = Matrix6::Zero();
   if (step.is_odometry && before.is_odometry) {
@@ -49,7 +50,8 @@ void CompoundedChain::append(const Edge& edge, bool forward) {
   last_ = step;
 }
 
-// What only neighbours have in common may be more than the whole allows.
+// With the correlations of neighbours alone the sum may not be positive definite; then all edges are taken as
+// independent.
 Matrix6 CompoundedChain::covariance() const {
   const Matrix6& covariance = edges_ == 0 || is_positive(correlated_) ? correlated_ : independent_;
   return 0.5 * (covariance + covariance.transpose());

@@ -1,7 +1,7 @@
-// A chain of edges as one transform with its covariance (docs/method.md, 3). Neighbouring odometry edges share
-// landmarks, so their errors have something in common: as much is stored with the later one
-// (Edge::correlation_with_previous), and counted here in whichever direction they are walked. Edges further apart are
-// taken as independent.
+// A chain of edges, compounded to one transform with its covariance (docs/method.md, 3). Neighbouring odometry edges
+// share landmarks, so their errors are correlated. The later one stores the correlation
+// (Edge::correlation_with_previous); it is included here in whichever direction the edges are walked. Edges further
+// apart are taken as independent.
 #pragma once
 
 #include <array>
@@ -13,19 +13,19 @@ namespace relmap::storage {
 
 class CompoundedChain {
  public:
-  // Walks on along `edge`, from its a to its b (forward) or back.
+  // Appends a step along `edge`: from its a to its b if `forward`, otherwise from b to a.
   void append(const Edge& edge, bool forward);
 
-  // Of the frame where the chain begins and that where it has come to.
+  // T_first_last, of the frames where the chain begins and ends.
   const SE3& T() const { return T_; }
-  // Of T Exp(xi); zero for no edges.
+  // Covariance of xi in T Exp(xi); zero without edges.
   Matrix6 covariance() const;
   std::uint32_t edges() const { return edges_; }
-  // Of all neighbours in the chain it is known what they have in common, and that enters covariance().
+  // Whether the correlations of all neighbouring edges in the chain are known and included in covariance().
   bool is_correlated() const;
 
  private:
-  // The last edge: T_step Exp(J xi) of its own xi.
+  // The edge appended last: the step's error is J xi, where xi is the edge's own.
   struct Step {
     FrameId a, b;
     bool is_odometry = false;
@@ -36,8 +36,8 @@ class CompoundedChain {
 
   SE3 T_;
   Matrix6 correlated_ = Matrix6::Zero();
-  Matrix6 independent_ = Matrix6::Zero();  // as if no two edges had anything in common
-  bool known_ = true;                      // of all neighbours so far
+  Matrix6 independent_ = Matrix6::Zero();  // covariance with all edges taken as independent
+  bool known_ = true;                      // the correlations of all neighbours so far
   std::uint32_t edges_ = 0;
   Step last_;
 };

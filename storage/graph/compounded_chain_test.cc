@@ -10,7 +10,7 @@
 namespace relmap::storage {
 namespace {
 
-// Odometry edges of a winding drive, each with something in common with the one before.
+// Odometry edges of a winding drive, each correlated with the one before.
 std::vector<Edge> drive(std::uint32_t count, double correlation) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -35,9 +35,9 @@ std::vector<Edge> drive(std::uint32_t count, double correlation) {
   return edges;
 }
 
-// The joint covariance of all edges' errors, carried to the chain's end at once.
+// The joint covariance of all edges' errors, propagated to the end of the chain in one step.
 Matrix6 at_once(const std::vector<Edge>& edges, bool forward, bool with_common) {
-  std::vector<Matrix6> carry;  // of the edge's own xi
+  std::vector<Matrix6> carry;  // Jacobian by the edge's own xi
   const std::size_t n = edges.size();
   for (std::size_t i = 0; i < n; ++i) {
     SE3 rest;  // from behind edge i to the end
@@ -69,7 +69,7 @@ CompoundedChain walk(const std::vector<Edge>& edges, bool forward) {
   return chain;
 }
 
-TEST(CompoundedChain, CountsWhatNeighboursHaveInCommonInBothDirections) {
+TEST(CompoundedChain, IncludesTheCorrelationOfNeighboursInBothDirections) {
   const std::vector<Edge> edges = drive(7, -0.3);
   SE3 T;
   for (const Edge& edge : edges) T = T * edge.T_ab;
@@ -84,7 +84,7 @@ TEST(CompoundedChain, CountsWhatNeighboursHaveInCommonInBothDirections) {
   }
 }
 
-TEST(CompoundedChain, TakesEdgesAsIndependentWhereWhatTheyHaveInCommonIsImpossible) {
+TEST(CompoundedChain, TakesEdgesAsIndependentWhereTheirCorrelationsAreImpossible) {
   const std::vector<Edge> edges = drive(7, -1);
   const CompoundedChain chain = walk(edges, true);
   const Matrix6 expected = at_once(edges, true, false);
@@ -92,7 +92,7 @@ TEST(CompoundedChain, TakesEdgesAsIndependentWhereWhatTheyHaveInCommonIsImpossib
   EXPECT_FALSE(chain.is_correlated());
 }
 
-TEST(CompoundedChain, OfNoEdgeIsCertain) {
+TEST(CompoundedChain, IsCertainWithoutEdges) {
   const CompoundedChain chain;
   EXPECT_EQ(chain.covariance(), Matrix6::Zero());
   EXPECT_TRUE(chain.is_correlated());

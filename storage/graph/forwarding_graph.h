@@ -1,11 +1,12 @@
-// Passes every question on to another graph: the base of those that stand before one and answer a part themselves.
+// Forwards every call to another graph: the base of graphs that stand in front of another one and answer some calls
+// themselves.
 #pragma once
 
 #include "storage/graph/graph.h"
 
 namespace relmap::storage {
 
-// `Interface`: Graph, or EditableGraph, whose edits are for the derived class to answer.
+// `Interface` is Graph, or EditableGraph, whose edits the derived class implements.
 template <typename Interface>
 class ForwardingGraph : public Interface {
  public:
@@ -14,8 +15,8 @@ class ForwardingGraph : public Interface {
   std::shared_ptr<const FrameCold> cold(FrameId id) const override { return to_.cold(id); }
   std::vector<Session> sessions() const override { return to_.sessions(); }
   std::optional<Session> session(SessionNumber number) const override { return to_.session(number); }
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const Graph::SettledVisit& visit) const override {
-    to_.visit_settled(session, sequence, visit);
+  void visit_skipped(SessionNumber session, std::uint32_t sequence, const Graph::SkippedVisit& visit) const override {
+    to_.visit_skipped(session, sequence, visit);
   }
   std::vector<FrameId> labelled(const std::string& label) const override { return to_.labelled(label); }
   std::vector<std::string> labels(const std::string& prefix) const override { return to_.labels(prefix); }

@@ -27,7 +27,7 @@ namespace relmap::storage {
 inline constexpr std::uint32_t kFramesPerChunk = 64;
 inline std::uint32_t chunk_of(FrameId id) { return id.index / kFramesPerChunk; }
 
-enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };  // prior: bridges a gap, or blind motion
+enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };  // prior: over a gap or unseen motion
 enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
 
 // How a loop closure was confirmed.
@@ -37,39 +37,40 @@ enum class Verification : std::uint8_t {
   kPnP = 2,
   kEpipolar = 3,
   kImported = 4,
-  kCompounded = 5,  // it stands for the way through a session that has been deleted (server/map/deletion.h)
+  kCompounded = 5,  // replaces a path through a session that has been deleted (server/map/deletion.h)
 };
-// In metres, so that it may become an edge. What was imported was verified elsewhere, if at all.
+// Whether the closure is metric, so that it may become an edge. An imported one was verified elsewhere, if at all.
 inline bool is_metric(Verification v) { return v != Verification::kNone && v != Verification::kEpipolar; }
 
-// A loop closure came into a state.
+// A change of the state of a loop closure.
 struct EdgeEvent {
-  std::uint64_t journal_sequence = 0;  // of the record that brought it about
+  std::uint64_t journal_sequence = 0;  // of the record that caused it
   EdgeState state = EdgeState::kCandidate;
   Reason reason = Reason::LONE;
-  EdgeId cause;      // the closure that was proposed, or edited, then: itself, or one that agrees or conflicts with it
+  EdgeId cause;      // the closure whose proposal or edit caused it: itself, or one that agrees or conflicts with it
   std::string note;  // the operator's
 
   bool operator==(const EdgeEvent&) const = default;
 };
 
-// How far a recognised place stands out from all others, as the lookup found it. Not known of what was imported.
+// How far a recognised place stands out from all others, as the lookup found it. Unknown for an imported closure.
 struct Uniqueness {
-  bool known = false;  // else nothing below is set, and it speaks neither for nor against
-  FrameId runner_up;   // of the places elsewhere that geometry confirms the one that fits best; invalid: none
-  std::uint16_t runner_up_inliers = 0;  // there
-  float runner_up_probability = 0;      // by appearance
-  std::uint16_t alike = 0;              // places elsewhere that geometry confirms
-  // Share of what both views should show in which they show different things, 0..1; negative: not measured.
+  bool known = false;  // false: nothing below is set, and it counts neither for nor against the closure
+  FrameId runner_up;   // the best of the places elsewhere that geometry confirms; invalid: none
+  std::uint16_t runner_up_inliers = 0;  // at the runner-up
+  float runner_up_probability = 0;      // of the runner-up, by appearance
+  std::uint16_t alike = 0;              // number of places elsewhere that geometry confirms
+  // The share (0..1) of what both views should show in which they show different things; negative: not measured.
   float differs = -1;
-  // By its landmarks (server/place/changes.h): cells of the picture in which they should be found again by what they
-  // looked like, and of those the ones in which none is. 0 and 0: not measured.
+  // Measured by landmarks (server/place/changes.h): the number of cells of the picture in which landmarks should be
+  // found again by their appearance, and in how many of these none is found. 0 and 0: not measured.
   std::uint16_t compared = 0, changed = 0;
 
   bool operator==(const Uniqueness&) const = default;
 };
 
-// An edge of the graph, or a loop closure that only binds (`carries == false`): stored with the newer of its frames.
+// An edge of the graph, or a loop closure that only binds landmarks (`carries == false`). It is stored with the newer
+// of its two frames.
 struct Edge {
   EdgeId id;
   FrameId a;  // the older frame, by the order in which the map took them in
@@ -83,15 +84,15 @@ struct Edge {
   std::uint32_t support = 0;  // derived: observations whose path uses it
 
   SE3 T_ab;                              // the estimate
-  Matrix6 covariance = Matrix6::Zero();  // its marginal, of T_ab Exp(xi)
-  // Of its xi (rows) with that of the odometry edge that ends in `a`, in 127ths, by columns
-  // (storage/graph/precision.h); zero where they are independent or it is unknown.
+  Matrix6 covariance = Matrix6::Zero();  // marginal covariance of xi in T_ab Exp(xi)
+  // Correlation of its xi (rows) with that of the odometry edge that ends in `a` (columns), in 127ths, stored by
+  // columns (storage/graph/precision.h); zero where they are independent or the correlation is unknown.
   std::array<std::int8_t, 36> correlation_with_previous{};
   SE3 prior_T_ab;  // last well-supported estimate (at first: the robot's own step)
   Matrix6 prior_covariance = Matrix6::Identity();
 
-  float driven_s = 0;  // odometry: time since the frame before, driven and standing apart; loop: docs/method.md, 8
-  float standing_s = 0;
+  float driven_s = 0;    // odometry edge: seconds driven since the frame before; loop edge: docs/method.md, 8
+  float standing_s = 0;  // seconds standing, likewise
 
   // Evidence of a loop closure.
   Verification verification = Verification::kNone;
@@ -99,25 +100,25 @@ struct Edge {
   std::uint16_t bound = 0;              // derived: observations and aliases that it justifies
   float probability = 0;                // of the place, by appearance
   float spread = 0;                     // share of the picture that the inliers span, 0..1
-  std::vector<FrameId> bound_frames;    // ascending: frames in which it binds (claims or observations), b among them
+  std::vector<FrameId> bound_frames;    // frames in which it binds (claims or observations), b among them; ascending
   std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
-  std::vector<EdgeEvent> history;       // oldest first: the first, and the last of those after it
+  std::vector<EdgeEvent> history;       // oldest first: the first event and the latest ones, kMaxEvents at most
   Uniqueness uniqueness;
 
-  // Of a closure of the session's own past that agrees with others and not with the odometry: the robot was carried
-  // from frame `first` to `last`, as far as can be told. Session 0: it says nothing of the kind.
+  // Of a closure with the session's own past that agrees with others and not with the odometry: it says that the robot
+  // was carried somewhere between the frames `first` and `last`. Session 0: it says nothing of the kind.
   FrameRange carried;
-  // Derived, ascending, of an edge of the robot's own motion: accepted closures whose `carried` it lies in. While there
-  // are any, the way from `first` to `last` is what they measured and not what the odometry says.
+  // Derived, ascending, of an odometry edge: the accepted closures in whose `carried` it lies. While there are any, the
+  // transform from `first` to `last` is what they measured and not what the odometry says.
   std::vector<EdgeId> carried_by;
 
-  Extensions unknown;  // of a later version: kept as they came
+  Extensions unknown;  // from a later version, kept unchanged
 
   bool in_graph() const { return state == EdgeState::kAccepted && carries; }
   FrameId other(FrameId end) const { return end == a ? b : a; }
 };
 
-// Visits the edges of the robot's own motion along which `closure`, while it is accepted, says that it was carried.
+// Visits the odometry edges along which `closure` says that the robot was carried; none unless it is accepted.
 template <typename Visit>
 void for_each_carried_step(const Edge& closure, Visit visit) {
   if (closure.carried.session == 0 || closure.state != EdgeState::kAccepted) return;
@@ -125,25 +126,25 @@ void for_each_carried_step(const Edge& closure, Visit visit) {
     visit(EdgeId{{closure.carried.session, index + 1}, 0});
 }
 
-inline constexpr std::size_t kMaxEvents = 16;     // of an edge that are kept
+inline constexpr std::size_t kMaxEvents = 16;     // kept in the history of an edge
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
 
-// Whether the robot guessed the motion along the edge: no camera saw it (dead reckoning, a gap, a robot that started
-// anew).
+// Whether the motion along the edge is a guess of the robot that no camera saw: dead reckoning, a gap, a robot that
+// started anew.
 inline bool is_guessed(const Edge& edge) {
   return edge.kind == EdgeKind::kPrior || edge.source == MotionSource::kUnsensed;
 }
-// Whether, besides, no landmark has been seen from both sides since, which would support the edge.
+// Whether the motion is a guess and too few landmarks have been seen from both sides since to support the edge.
 inline bool is_unmeasured(const Edge& edge) { return is_guessed(edge) && edge.support < kMinSupport; }
 
-// What was known by way of a session that has been deleted is justified by this in place of a closure
-// (server/map/deletion.h): it holds whatever closures do.
+// Stands in place of a closure for what was known by way of a session that has been deleted (server/map/deletion.h). It
+// always holds.
 inline constexpr ClosureId kFromDeletedSession{{}, 1};
 
-// "Landmark `self` is the same point as `target`", said by a closure; or, with an invalid target, "there is no need of
-// `self`: older landmarks around it have been found in the same picture". Of a landmark's claims the first whose
-// closure is accepted holds (storage/graph/binding.h). target's base was taken in before self's, so claims never form a
-// cycle.
+// A closure's claim that landmark `self`, with which the claim is stored, is the same point as `target`. With an
+// invalid target it claims that `self` is not needed, since older landmarks around it have been found in the same
+// picture. Of a landmark's claims the first one whose closure is accepted holds (storage/graph/binding.h). The target's
+// base was taken in before the base of `self`, so claims never form a cycle.
 struct AliasClaim {
   LandmarkId target;
   ClosureId closure;
@@ -152,17 +153,18 @@ struct AliasClaim {
 // A point, stored in its base frame by inverse depth: p_base = (a, b, 1) / rho.
 struct Landmark {
   Vector3 abr = {0, 0, 0.1};  // (a, b, rho); rho >= 1e-5 per metre
-  TrackId track;              // of the base's session
-  bool depth_prior = false;   // derived: mono only and < 1 degree of parallax (docs/method.md, 3)
+  TrackId track;              // of the base frame's session
+  bool depth_prior = false;   // derived: seen in mono only, with < 1 degree of parallax (docs/method.md, 3)
   std::vector<AliasClaim> claims;
-  // Derived: the first frames with an observation that resolves to this landmark and a path from its base, in the order
-  // in which the map took them in (storage/graph/observers.h).
+  // Derived: the first frames that have an observation which resolves to this landmark, and a path from its base; in
+  // the order in which the map took them in (storage/graph/observers.h).
   std::vector<FrameId> observers;
 
   Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
 };
 
-// A frame that sees the landmark in `slot` to no effect: it has no path from its base, or there is no need of it.
+// A frame that sees the landmark in `slot`, but whose observation has no effect: the frame has no path from the
+// landmark's base, or the landmark is not needed.
 struct Unreached {
   std::uint32_t slot = 0;
   FrameId observer;
@@ -171,21 +173,21 @@ struct Unreached {
 };
 
 struct FrameHot {
-  bool present = false;  // false: a sequence that never came (gap, refusal); nothing else is set
+  bool present = false;  // false: the sequence has no frame (gap, refusal); nothing else is set
   std::int64_t time_us = 0;
-  std::uint64_t journal_sequence = 0;  // of its record: the order in which the map took its frames in
+  std::uint64_t journal_sequence = 0;  // of its record; gives the order in which the map took its frames in
   std::uint32_t payload_crc = 0;       // CRC32C of the keyframe as received: tells a repeat from a conflict
   SE3 T_odom_frame;                    // the robot's own odometry, as received
-  float mean_error = -1;  // mean reprojection error, px, at the end of the last accepted solve with it active; -1: none
-  std::uint32_t error_terms = 0;       // observations that entered it
-  std::uint32_t appearance_count = 0;  // of its cold part
+  float mean_error = -1;  // mean reprojection error in px after the last accepted solve with it active; -1: none
+  std::uint32_t error_terms = 0;       // number of observations in mean_error
+  std::uint32_t appearance_count = 0;  // features in its cold part
   std::uint16_t next_loop_ordinal = 1;
   std::vector<Edge> edges;           // stored here: the odometry edge first, then closures, ascending by ordinal
   std::vector<EdgeId> incoming;      // derived, ascending: edges stored with newer frames that end here
   std::vector<Landmark> landmarks;   // by slot
-  std::vector<Unreached> unreached;  // derived, ascending: of these landmarks
+  std::vector<Unreached> unreached;  // derived, ascending: frames that see these landmarks without effect
   std::vector<std::string> labels;
-  Extensions unknown;  // of a later version, in its keyframe or since: kept as they came
+  Extensions unknown;  // from a later version, in its keyframe or added since; kept unchanged
 
   Edge* edge(EdgeId id) {
     for (Edge& e : edges)
@@ -195,9 +197,9 @@ struct FrameHot {
   const Edge* edge(EdgeId id) const { return const_cast<FrameHot*>(this)->edge(id); }
 };
 
-// The order in which the map took its frames in, and nothing but this decides what is older. One owner numbers all of
-// them; where a map comes to have several, each numbers its own journal, and the owner of the frame refines the order
-// where numbers are equal (docs/storage-format.md, Owners).
+// The order in which the map took its frames in. It alone decides which of two frames is older. One owner numbers all
+// frames. Where a map comes to have several owners, each numbers its own journal, and the owner of the frame decides
+// between equal numbers (docs/storage-format.md, Owners).
 struct TakenIn {
   std::uint64_t sequence = 0;
 
@@ -205,14 +207,14 @@ struct TakenIn {
 };
 inline TakenIn taken_in(const FrameHot& frame) { return {frame.journal_sequence}; }
 
-// What frame i measured of a landmark.
+// What a frame measured of a landmark.
 struct Observation {
-  LandmarkId landmark;  // as stored: that of its track (or, bound without a track, the old landmark); resolve() gives
+  LandmarkId landmark;  // as stored: that of its track, or the old landmark if bound without a track; resolve() gives
                         // the landmark in force
-  ClosureId origin;     // ClosureId(): tracking; else the closure that justifies it
-  float u_left = 0, v = 0, u_right = 0;  // pixels; u_right NaN: mono
+  ClosureId origin;     // ClosureId(): tracking; otherwise the closure that justifies it
+  float u_left = 0, v = 0, u_right = 0;  // pixels; u_right is NaN in mono
   std::uint8_t level = 0;
-  bool aligned = false;  // found in the picture by what the landmark looked like before: as exact as tracking
+  bool aligned = false;  // found by aligning the picture with an earlier view of the landmark: as exact as tracking
 
   bool is_tracked() const { return origin == ClosureId(); }
   StereoPixel pixel() const { return {u_left, v, u_right}; }
@@ -236,24 +238,25 @@ std::size_t memory_bytes(const FrameHot& frame);
 std::size_t memory_bytes(const FrameWarm& frame);
 std::size_t memory_bytes(const FrameCold& frame);
 
-// Sequences that ended without a frame.
-struct Settled {
+// Sequences of a session that are skipped: they have no frame.
+struct Skipped {
   std::uint32_t from = 0, to = 0;  // inclusive
   std::uint32_t crc = 0;           // of a refused keyframe; 0 for a gap
-  bool refused = false;            // else: a gap that the robot declared
+  bool refused = false;            // false: a gap
   Reason reason = Reason::OK;
 
-  bool operator==(const Settled&) const = default;
+  bool operator==(const Skipped&) const = default;
+};
+
+// Numbers on disk; they never change.
+enum class SessionState : std::uint8_t {
+  kOpen,
+  kEnded,     // its robot said that it is complete; another keyframe opens it again
+  kFrozen,    // takes no keyframes, and nothing in it moves
+  kDeleting,  // takes no keyframes; its frames are being removed
 };
 
 // What storage knows of a session beside its frames.
-enum class SessionState : std::uint8_t {
-  kOpen,
-  kEnded,     // its robot said that this was all; a keyframe opens it again
-  kFrozen,    // takes nothing in, and nothing in it moves
-  kDeleting,  // takes nothing in; its frames are going
-};
-
 struct Session {
   SessionNumber number = 0;
   SessionHeader header;
@@ -262,30 +265,31 @@ struct Session {
   std::uint32_t last = 0;    // highest index present
   std::uint32_t frames = 0;
   std::uint32_t next_sequence = 0;  // every sequence below it is applied, refused or a gap
-  std::uint64_t refused = 0;        // sequences settled without a frame: refused,
-  std::uint64_t given_up = 0;       // and given up (Graph::visit_settled has them singly)
+  std::uint64_t refused = 0;        // skipped sequences whose keyframes were refused
+  std::uint64_t given_up = 0;       // skipped sequences in gaps; Graph::visit_skipped() lists both
   std::int64_t first_time_us = 0;
   std::int64_t last_time_us = 0;
   SessionState state = SessionState::kOpen;
-  SessionState before_frozen = SessionState::kOpen;  // of a frozen one: open or ended, as it is again when it is thawed
-  Extensions unknown;                                // of a later version: kept as they came
+  SessionState before_frozen = SessionState::kOpen;  // of a frozen session: what it was, and is again when it is thawed
+  Extensions unknown;                                // from a later version, kept unchanged
 };
 
-// It takes nothing in; its frames are going, or have gone.
+// Whether it is being deleted, or has been: it takes no keyframes.
 inline bool is_going(const Session& session) { return session.state == SessionState::kDeleting; }
 
-// It takes nothing in, and nothing moves its frames.
+// Whether it is frozen: it takes no keyframes, and its frames do not move.
 inline bool is_frozen(const Session& session) { return session.state == SessionState::kFrozen; }
 
-// Nothing is left of it but its uuid, which is not taken again.
+// Whether nothing is left of it but its uuid, which is never used again.
 inline bool is_deleted(const Session& session) { return is_going(session) && session.frames == 0; }
 
-// Whether a frame that its session once had has gone with it: the newest go first.
+// Whether a frame that the session once had has been removed with it; the newest frames are removed first.
 inline bool is_removed(const Session& session, FrameId id) {
   return is_going(session) && (session.frames == 0 || id.index > session.last);
 }
 
-// The sequences below are frames, or settled without one. Of a session that is being deleted those behind have gone.
+// All sequences below this are frames or skipped. Of a session that is being deleted, what was at or above it has been
+// removed.
 inline std::uint64_t end_of(const Session& session) {
   if (!is_going(session)) return session.next_sequence;
   return session.frames > 0 ? std::uint64_t{session.last} + 1 : 0;

@@ -1,4 +1,4 @@
-// Frame ids to small numbers: an open hash table that is emptied at no cost and keeps its memory.
+// Maps frame ids to small numbers: an open-addressing hash table that is cleared at no cost and keeps its memory.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class FrameIndex {
     size_ = 0;
   }
 
-  // Null: it is not in the table. Good until the next insert().
+  // Null if the id is not in the table. Valid until the next insert().
   const std::int32_t* find(FrameId id) const {
     for (std::size_t k = home(id);; k = next(k)) {
       if (slots_[k].round != round_) return nullptr;
@@ -25,7 +25,7 @@ class FrameIndex {
     }
   }
 
-  // Of an id that is not in the table.
+  // `id` must not be in the table.
   void insert(FrameId id, std::int32_t value) {
     if (2 * ++size_ > slots_.size()) grow();
     place({id, value, round_});
@@ -35,7 +35,7 @@ class FrameIndex {
   struct Slot {
     FrameId id;
     std::int32_t value = 0;
-    std::uint64_t round = 0;  // of a slot in use: the table's
+    std::uint64_t round = 0;  // the slot is in use if it is that of the table
   };
 
   std::size_t home(FrameId id) const { return std::hash<FrameId>()(id) & (slots_.size() - 1); }
@@ -52,7 +52,7 @@ class FrameIndex {
       if (slot.round == round_) place(slot);
   }
 
-  std::vector<Slot> slots_;  // as many as a power of two, at most half of them in use
+  std::vector<Slot> slots_;  // a power of two in number, at most half of them in use
   std::uint64_t round_ = 1;
   std::size_t size_ = 0;
 };

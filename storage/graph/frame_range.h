@@ -11,7 +11,7 @@ namespace relmap::storage {
 
 struct FrameRange {
   SessionNumber session = 0;
-  std::uint32_t first = 0, last = 0;  // both within
+  std::uint32_t first = 0, last = 0;  // inclusive
 
   bool operator==(const FrameRange&) const = default;
   bool contains(FrameId frame) const { return frame.session == session && frame.index >= first && frame.index <= last; }

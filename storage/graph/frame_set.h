@@ -1,4 +1,4 @@
-// A set of frames: a bit each, by chunk. Remembers which chunks changed, for whoever writes them down.
+// A set of frames, as one bit each in a mask for their chunk. Remembers which chunks changed, for the next commit.
 #pragma once
 
 #include <bit>
@@ -26,12 +26,12 @@ class FrameSet {
     set_chunk(chunk_id(id), was & ~bit(id));
   }
   bool contains(FrameId id) const { return (chunk(chunk_id(id)) & bit(id)) != 0; }
-  // Of a set that is not empty.
+  // The set must not be empty.
   FrameId first() const {
     return frame_in(chunks_.begin()->first, static_cast<std::uint32_t>(std::countr_zero(chunks_.begin()->second)));
   }
 
-  // The frames of a chunk, a bit by slot.
+  // The frames of a chunk, one bit for each slot.
   std::uint64_t chunk(ChunkId id) const {
     const auto found = chunks_.find(id);
     return found == chunks_.end() ? 0 : found->second;
@@ -55,11 +55,11 @@ class FrameSet {
   bool operator==(const FrameSet& other) const { return chunks_ == other.chunks_; }
 
  private:
-  static constexpr std::size_t kNodeBytes = 64;  // of a tree
+  static constexpr std::size_t kNodeBytes = 64;  // a node of a tree, about
 
   static std::uint64_t bit(FrameId id) { return std::uint64_t{1} << slot_of(id); }
 
-  std::map<ChunkId, std::uint64_t> chunks_;  // none is 0
+  std::map<ChunkId, std::uint64_t> chunks_;  // no mask is 0
   std::set<ChunkId> changed_;
   std::size_t size_ = 0;
 };

@@ -36,7 +36,8 @@ std::vector<Neighbour> neighbours(const Graph& graph, FrameId, const FrameHot& h
 }
 
 std::optional<FrameId> next_in_session(FrameId id, const FrameHot& hot) {
-  // Its own later frames come after it, and the one that its motion leads to before all others.
+  // Incoming edges are sorted by the newer frame. Of the session's later frames the next one comes first, by its
+  // odometry edge.
   const auto next = std::lower_bound(hot.incoming.begin(), hot.incoming.end(), EdgeId{id, 0});
   if (next == hot.incoming.end() || next->ordinal != 0 || next->frame.session != id.session) return std::nullopt;
   return next->frame;

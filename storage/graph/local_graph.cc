@@ -146,14 +146,14 @@ LocalGraph::Turn LocalGraph::find_turn(std::int32_t base, std::int32_t observer)
   while (node_of_[observer] < 0 && mark_more()) {
   }
   Turn best;
-  auto fewest = static_cast<std::int32_t>(kPathDepth) + 1;
-  for (std::int32_t depth = 0; depth <= static_cast<std::int32_t>(kWalkDepth) && depth < fewest; ++depth) {
+  auto min_edges = static_cast<std::int32_t>(kPathDepth) + 1;
+  for (std::int32_t depth = 0; depth <= static_cast<std::int32_t>(kWalkDepth) && depth < min_edges; ++depth) {
     const Walk& down = walk(observer, depth);
     const Walk& up = walks_[walk_of_[base]];
     for (std::int32_t n = down.level[depth]; n < down.level[depth + 1]; ++n) {
       const std::int32_t met = node_of_[down.nodes[n].frame];
-      if (met < 0 || up.nodes[met].depth + depth >= fewest) continue;
-      fewest = up.nodes[met].depth + depth;
+      if (met < 0 || up.nodes[met].depth + depth >= min_edges) continue;
+      min_edges = up.nodes[met].depth + depth;
       best = {met, n};
     }
   }

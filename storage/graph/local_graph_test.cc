@@ -93,21 +93,21 @@ TEST(LocalGraph, APathGoesUpAndDownByTheFewestEdges) {
     std::size_t reached = 0, beyond = 0;
     for (const FrameId base : world.ids)
       for (const FrameId observer : world.ids) {
-        std::uint32_t fewest = ~0U, turn = 0;  // and how far from the observer the path turns
+        std::uint32_t min_edges = ~0U, turn = 0;  // `turn`: how far from the observer the path turns
         for (const auto& [frame, from_observer] : up[observer])
           if (const auto from_base = up[base].find(frame); from_base != up[base].end()) {
             const std::uint32_t edges = from_base->second + from_observer;
-            if (edges < fewest || (edges == fewest && from_observer < turn)) turn = from_observer;
-            fewest = std::min(fewest, edges);
+            if (edges < min_edges || (edges == min_edges && from_observer < turn)) turn = from_observer;
+            min_edges = std::min(min_edges, edges);
           }
         const bool found = local.path(local.frame(base), local.frame(observer), &steps);
-        ASSERT_EQ(found, fewest != ~0U) << base.to_string() << " " << observer.to_string();
+        ASSERT_EQ(found, min_edges != ~0U) << base.to_string() << " " << observer.to_string();
         if (!found) {
           ++beyond;
           continue;
         }
         ++reached;
-        ASSERT_EQ(steps.size(), fewest);
+        ASSERT_EQ(steps.size(), min_edges);
         const std::vector<FrameId> frames = frames_of(local, base, steps);
         EXPECT_EQ(frames.back(), observer);
         EXPECT_TRUE(up[observer].contains(frames[frames.size() - 1 - turn]));
@@ -118,7 +118,7 @@ TEST(LocalGraph, APathGoesUpAndDownByTheFewestEdges) {
   }
 }
 
-TEST(LocalGraph, WhatComesLaterLeavesPathsAsTheyAre) {
+TEST(LocalGraph, LaterFramesDoNotChangePaths) {
   RandomSessions world(7);
   world.grow(60, 0.2);
   const std::vector<FrameId> old = world.ids;
@@ -136,7 +136,7 @@ TEST(LocalGraph, WhatComesLaterLeavesPathsAsTheyAre) {
     return found;
   };
   const auto before = paths();
-  // Sessions of which nothing has been there: so that no motion goes on from an old frame.
+  // Frames of a new session, so that no old frame gets a further odometry edge.
   for (std::uint32_t i = 0; i < 200; ++i) {
     const FrameId id{9, i};
     world.graph.frame(id);
@@ -209,8 +209,9 @@ TEST(LocalGraph, APlacePassedOftenIsOneLoopEdgeAwayFromEachPass) {
   EXPECT_EQ(steps.size(), 7U);
 }
 
-TEST(LocalGraph, OneEdgeMayLieOnTwoWaysFromTheBase) {
-  // The far frames of session 4 are in reach over session 1 only, the near ones over the shorter way through session 3.
+TEST(LocalGraph, OneEdgeMayLieOnTwoPathsFromTheBase) {
+  // The far frames of session 4 are in reach over session 1 only, the near ones over the shorter path through session
+  // 3.
   SmallGraph graph;
   for (SessionNumber session = 1; session <= 4; ++session) {
     graph.frame({session, 0});

@@ -12,27 +12,27 @@
 
 namespace relmap::storage {
 
-// Of the map as a whole; every view has its own.
+// Facts of the map as a whole; every view has its own copy.
 struct MapFacts {
   std::uint64_t applied_sequence = 0;
   std::array<std::uint64_t, 128> refused{};  // keyframes refused, by Reason
   std::uint64_t keyframes = 0;               // in the map
-  std::uint64_t gaps = 0;                    // sequences given up
+  std::uint64_t gaps = 0;                    // sequences in gaps
   std::uint64_t closures_accepted = 0;
   std::uint64_t closures_candidate = 0;
   std::uint64_t closures_quarantined = 0;
   std::uint64_t closures_removed = 0;
-  std::uint64_t numerical_failures = 0;  // solves that left the map as it was
-  std::uint32_t vocabulary_crc = 0;      // the vocabulary that the words were made with; 0: none yet
-  MapIdentity identity;                  // not known: no daemon has served the map since maps have one
+  std::uint64_t numerical_failures = 0;  // solves that failed and left the map as it was
+  std::uint32_t vocabulary_crc = 0;      // of the vocabulary that made the words; 0: none yet
+  MapIdentity identity;                  // unknown until a daemon that gives maps an identity serves the map
 };
 
-// What must survive beside frames and sessions: written with every commit.
+// All that must survive beside frames and sessions; it is written with every commit.
 struct MapState : MapFacts {
   FrameSet pending;                // frames queued for relaxation (docs/method.md, 4), durable
-  std::set<FrameId> lookups;       // frames applied but not yet looked up beside the worker; taken up again at start
-  std::uint32_t idle_records = 0;  // of idle work, applied since the last record that brought something
-  Extensions unknown;              // of a later version: kept as they came
+  std::set<FrameId> lookups;       // frames that are applied but not looked up yet; the next start goes on with them
+  std::uint32_t idle_records = 0;  // records of idle work since the last record that could cause some
+  Extensions unknown;              // from a later version, kept unchanged
 };
 
 }  // namespace relmap::storage

@@ -30,7 +30,7 @@ bool in_one_pass(FrameId a, FrameId b) {
   return a.session == b.session && (a.index > b.index ? a.index - b.index : b.index - a.index) <= kPassFrames;
 }
 
-bool is_settled(const std::vector<FrameId>& observers) {
+bool is_fixed(const std::vector<FrameId>& observers) {
   if (observers.size() >= kMaxObservers) return true;
   std::size_t passes = 0;
   for (auto at = observers.begin(); at != observers.end() && passes <= kMaxPasses; ++at) {
@@ -71,7 +71,7 @@ void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames) {
   std::sort(ordered.begin(), ordered.end());
   ordered.erase(std::unique(ordered.begin(), ordered.end()), ordered.end());
   frames->clear();
-  for (std::size_t k = 0; k < ordered.size() && !is_settled(*frames); ++k) frames->push_back(ordered[k].second);
+  for (std::size_t k = 0; k < ordered.size() && !is_fixed(*frames); ++k) frames->push_back(ordered[k].second);
 }
 
 std::vector<FrameId> frames_above(const Graph& graph, const std::vector<FrameId>& frames, std::uint32_t depth) {

@@ -18,14 +18,14 @@ std::vector<FrameId> operator+(std::vector<FrameId> l, const std::vector<FrameId
   return l;
 }
 
-TEST(Observers, ALandmarkIsSettledByThirtyTwoFramesOrAFifthPass) {
-  EXPECT_FALSE(is_settled({}));
-  EXPECT_FALSE(is_settled(pass(0, 31)));
-  EXPECT_TRUE(is_settled(pass(0, 32)));
+TEST(Observers, ALandmarkIsFixedByThirtyTwoFramesOrAFifthPass) {
+  EXPECT_FALSE(is_fixed({}));
+  EXPECT_FALSE(is_fixed(pass(0, 31)));
+  EXPECT_TRUE(is_fixed(pass(0, 32)));
   const auto four = pass(0, 3) + pass(100, 3) + pass(200, 3) + pass(7, 3, 2);
-  EXPECT_FALSE(is_settled(four));
-  EXPECT_TRUE(is_settled(four + pass(300, 1)));
-  EXPECT_FALSE(is_settled(four + pass(203, 1))) << "the third pass goes on";
+  EXPECT_FALSE(is_fixed(four));
+  EXPECT_TRUE(is_fixed(four + pass(300, 1)));
+  EXPECT_FALSE(is_fixed(four + pass(203, 1))) << "the third pass goes on";
 }
 
 TEST(Observers, RobotsThatPassTogetherAreTwoPasses) {
@@ -34,23 +34,23 @@ TEST(Observers, RobotsThatPassTogetherAreTwoPasses) {
     frames.push_back({1, i});
     frames.push_back({2, 500 + i});
   }
-  EXPECT_FALSE(is_settled(frames));
+  EXPECT_FALSE(is_fixed(frames));
 }
 
-TEST(Observers, AreKeptInTheOrderOfTheirComingUpToWhereTheListIsFull) {
+TEST(Observers, AreKeptInTheOrderOfArrivalUntilTheListIsFull) {
   SmallGraph graph;
-  std::vector<FrameId> coming;
+  std::vector<FrameId> arrivals;
   for (std::uint32_t i = 0; i < 8; ++i)
-    for (const std::uint32_t base : {0U, 100U, 200U, 300U, 400U, 500U}) coming.push_back({1, base + i});
-  for (std::size_t k = 0; k < coming.size(); ++k) graph.frame(coming[k]).journal_sequence = 1000 - k;
-  std::vector<FrameId> kept = coming + coming;
+    for (const std::uint32_t base : {0U, 100U, 200U, 300U, 400U, 500U}) arrivals.push_back({1, base + i});
+  for (std::size_t k = 0; k < arrivals.size(); ++k) graph.frame(arrivals[k]).journal_sequence = 1000 - k;
+  std::vector<FrameId> kept = arrivals + arrivals;
   kept.push_back({3, 3});  // lost
   keep_first_observers(graph, &kept);
   EXPECT_THAT(
       kept, testing::ElementsAre(FrameId{1, 507}, FrameId{1, 407}, FrameId{1, 307}, FrameId{1, 207}, FrameId{1, 107}));
 }
 
-// Twenty passes, each tied to the first, each with a frame that sees the landmark of frame 5; pass 9 from out of reach.
+// Twenty passes, each tied to the first, each with a frame that sees the landmark of frame 5; pass 3 is out of reach.
 TEST(Observers, AreFoundAnewAmongAllFramesInReach) {
   SmallGraph graph;
   std::uint64_t sequence = 0;

@@ -16,7 +16,7 @@ PathTree build_path_tree(const Graph& graph, FrameId root, PathLimits limits) {
     for (const Neighbour& step : neighbours(graph, id, *hot)) {
       if (tree.index.contains(step.frame)) continue;
       if (depth == limits.depth || tree.nodes.size() == limits.frames) {
-        tree.cut = true;  // and so is all that follows: later nodes are as deep, or the tree is full
+        tree.cut = true;  // nothing can follow: later nodes are as deep, or the tree is full
         return tree;
       }
       tree.index.emplace(step.frame, static_cast<std::uint32_t>(tree.nodes.size()));
@@ -34,7 +34,8 @@ std::vector<SE3> poses_along(const Graph& graph, const PathTree& tree) {
     const auto hot = graph.hot(node.edge.frame);
     const Edge* edge = hot ? hot->edge(node.edge) : nullptr;
     if (!edge)
-      throw StatusError(Status(Reason::NO_SUCH_EDGE, node.edge.to_string() + " left the graph under its tree"));
+      throw StatusError(
+          Status(Reason::NO_SUCH_EDGE, node.edge.to_string() + " was removed from the graph while a tree held it"));
     poses[i] = poses[static_cast<std::size_t>(node.parent)] * (node.forward ? edge->T_ab : edge->T_ab.inverse());
   }
   return poses;

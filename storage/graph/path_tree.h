@@ -1,5 +1,6 @@
-// Breadth-first from a frame over accepted edges, neighbours in increasing edge id, the first discovery wins: what lies
-// round a place, by the newest ways too. (The paths of observations are LocalGraph's.)
+// Breadth-first search from a frame over accepted edges: neighbours in increasing order of edge id, and the first
+// discovery wins. It finds what lies around a place, also by the newest paths. (The paths of observations are
+// LocalGraph's.)
 #pragma once
 
 #include <cstdint>
@@ -11,18 +12,18 @@
 
 namespace relmap::storage {
 
-inline constexpr std::uint32_t kTreeFrames = 1000;  // first frames found
+inline constexpr std::uint32_t kTreeFrames = 1000;  // frames of a tree at most
 
 struct PathLimits {
   std::uint32_t depth = 30;  // edges
   std::uint32_t frames = kTreeFrames;
-  FrameId until = {};  // if valid: stop as soon as this frame is found; the tree to it is the same
+  FrameId until = {};  // if valid: the search stops when it finds this frame; the tree up to it is the same
 };
 
 struct PathNode {
   FrameId frame;
   std::int32_t parent = -1;  // index of the node nearer to the root; -1: the root
-  EdgeId edge;               // between parent and this
+  EdgeId edge;               // between the parent and this frame
   bool forward = false;      // from the parent, the edge is walked a -> b
   std::uint32_t depth = 0;
 };
@@ -31,7 +32,7 @@ struct PathNode {
 struct PathTree {
   std::vector<PathNode> nodes;
   std::unordered_map<FrameId, std::uint32_t> index;  // frame -> node
-  bool cut = false;                                  // there was more beyond the limits
+  bool cut = false;                                  // the limits left frames out
 
   const PathNode* find(FrameId frame) const {
     const auto it = index.find(frame);
@@ -41,7 +42,7 @@ struct PathTree {
 
 PathTree build_path_tree(const Graph& graph, FrameId root, PathLimits limits = {});
 
-// T_root_node for every node, composed along the tree with the edges' estimates.
+// T_root_node of every node, compounded along the tree from the edges' estimates.
 std::vector<SE3> poses_along(const Graph& graph, const PathTree& tree);
 
 }  // namespace relmap::storage

@@ -76,9 +76,9 @@ TEST(PathTree, StopsAtTheFrameLookedForWithTheSamePathToIt) {
   for (std::size_t i = 0; i < part.nodes.size(); ++i) EXPECT_EQ(part.nodes[i].frame, whole.nodes[i].frame);
 }
 
-TEST(PathTree, OfAFrameThatIsNotThereIsEmpty) { EXPECT_TRUE(build_path_tree(chain(3), {2, 0}).nodes.empty()); }
+TEST(PathTree, IsEmptyForAFrameThatDoesNotExist) { EXPECT_TRUE(build_path_tree(chain(3), {2, 0}).nodes.empty()); }
 
-TEST(PathTree, PosesComposeTheEdgesInBothDirections) {
+TEST(PathTree, PosesCompoundTheEdgesInBothDirections) {
   RandomFrames random(4);
   SmallGraph graph;
   const SE3 T_01 = random.transform(), T_12 = random.transform();

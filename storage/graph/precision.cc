@@ -13,13 +13,13 @@ constexpr double kMaxMetres = 0x1p30;         // metres
 constexpr double kCorrelationSteps = 127;
 constexpr double kMinPart = 0.499;  // one part of a unit quaternion is 0.5 or more
 
-// GCC 12 leaves both conversions out, from -O2 on, where it vectorises them: hence volatile.
+// Volatile, because GCC 12 drops both conversions from -O2 on where it vectorises them.
 double single(double value) {
   const volatile float kept = static_cast<float>(value);
   return kept;
 }
 
-// Up, if at all, in the direction that keeps an inverse depth at its floor.
+// The result is never below `rho`, so that an inverse depth at its minimum stays there.
 float inverse_depth(double rho) {
   const auto value = static_cast<float>(rho);
   return value < rho ? std::nextafter(value, 1.0F) : value;
@@ -30,7 +30,7 @@ float inverse_depth(double rho) {
 std::optional<PoseGrid> to_grid(const SE3& T) {
   if (!T.R.allFinite() || !(T.t.cwiseAbs().maxCoeff() < kMaxMetres)) return std::nullopt;
   const Eigen::Quaterniond q(T.R);
-  if (!(std::abs(q.norm() - 1) < 0.1)) return std::nullopt;  // no rotation at all
+  if (!(std::abs(q.norm() - 1) < 0.1)) return std::nullopt;  // not a rotation
   const std::array<double, 4> parts = {q.w(), q.x(), q.y(), q.z()};
   PoseGrid grid;
   while (grid.left_out < 3 && std::abs(parts[static_cast<std::size_t>(grid.left_out)]) < kMinPart) ++grid.left_out;

@@ -52,7 +52,7 @@ TEST(Precision, KeepsCovariancesSymmetricAndPositive) {
   }
 }
 
-// Whatever the compiler makes of conversions there and back.
+// Even where the compiler would drop a conversion to float and back.
 TEST(Precision, LandmarksAreFloats) {
   FrameHot frame;
   frame.landmarks.resize(9);
@@ -66,7 +66,7 @@ TEST(Precision, LandmarksAreFloats) {
     }
 }
 
-TEST(Precision, LeavesAloneWhatIsNoNumberAndNeverLowersAnInverseDepth) {
+TEST(Precision, LeavesNonFiniteValuesAloneAndNeverLowersAnInverseDepth) {
   FrameHot frame;
   frame.landmarks.resize(3);
   frame.landmarks[0].abr = {0.1, 0.2, 1e-5};
@@ -80,7 +80,7 @@ TEST(Precision, LeavesAloneWhatIsNoNumberAndNeverLowersAnInverseDepth) {
   EXPECT_EQ(frame.T_odom_frame.t.y(), 0.1);
 }
 
-TEST(Precision, CorrelationsComeBackToAHundredthOfWhatIsPossible) {
+TEST(Precision, CorrelationsAreKeptToAHundredth) {
   const Matrix6 own = Vector6(1e-4, 4e-4, 1e-4, 1e-6, 2e-6, 1e-6).asDiagonal();
   const Matrix6 previous = 3 * own;
   Matrix6 common = Matrix6::Zero();

@@ -1,4 +1,4 @@
-// Copies of whole files, durable on return.
+// Copies files; the copy is durable on return.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,9 @@
 
 namespace relmap::storage {
 
-// The first `size` bytes of `from` into a new file at `to`; its name is durable only after sync_directory(). `copied`
-// is told of each piece; what it answers, if not ok, ends the copy with just that. IO_ERROR.
+// Copies the first `size` bytes of `from` to the new file `to` and syncs it; the file's name is durable only after
+// sync_directory(). `copied` is called with the size of each piece; if it returns a status other than OK, the copy ends
+// with that status. IO_ERROR.
 Status copy_file(const ReadFile& from, std::uint64_t size, FileSystem& files, const std::string& to,
                  const std::function<Status(std::uint64_t bytes)>& copied);
 

@@ -21,7 +21,7 @@ DiskSpace::DiskSpace(std::shared_ptr<FileSystem> files, std::string folder, Disk
   look(Clock::now());
 }
 
-// Asks the file system. One that does not answer is not taken for full: writes will tell.
+// Asks the file system how much is free. If it does not answer, the disk is not taken to be full: writes will show.
 void DiskSpace::look(Clock::time_point now) {
   look_at_ = now + options_.ask_every;
   const auto room = files_->room(folder_);

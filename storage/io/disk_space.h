@@ -1,6 +1,6 @@
-// Room on the disk of a data folder: when it runs short nothing new is taken in, while commits, which free the journal,
-// still go through; and for a commit that would fail all the same there is a reserve, a file that is given up then and
-// made again when there is room.
+// Watches the free space on the disk of a data folder. When it runs short, nothing new is taken in, while commits,
+// which free the journal, still go through. For a commit that would fail all the same there is a reserve: a file that
+// is removed then and made again when there is room.
 #pragma once
 
 #include <chrono>
@@ -14,26 +14,29 @@
 namespace relmap::storage {
 
 struct DiskSpaceOptions {
-  std::uint64_t low_water = std::uint64_t{256} << 20;  // free bytes; at most a sixteenth of the disk
-  std::uint64_t reserve = std::uint64_t{64} << 20;     // at most a quarter of the low-water mark
-  std::chrono::milliseconds ask_every{100};            // the file system
-  std::chrono::milliseconds believe_failure{1000};     // over what the file system says is free (there are quotas)
+  std::uint64_t low_water = std::uint64_t{256} << 20;  // free bytes; limited to a sixteenth of the disk
+  std::uint64_t reserve = std::uint64_t{64} << 20;     // bytes; limited to a quarter of the low-water mark
+  std::chrono::milliseconds ask_every{100};            // the file system is asked at most this often
+  std::chrono::milliseconds believe_failure{
+      1000};  // a failed write overrides the reported free space this long (quotas)
 };
 
 // Thread-safe.
 class DiskSpace {
  public:
-  // Makes the reserve if there is room; the folder exists.
+  // Makes the reserve if there is room. The folder must exist.
   DiskSpace(std::shared_ptr<FileSystem> files, std::string folder, DiskSpaceOptions options);
 
-  // DISK_FULL, with the numbers, from when fewer bytes are free than the low-water mark until a quarter more are and
-  // the reserve is made again.
+  // DISK_FULL, with the numbers, once fewer bytes are free than the low-water mark. It lasts until a quarter more than
+  // the mark is free and the reserve has been made again.
   Status check();
-  // DISK_FULL if fewer bytes are free now, whatever the mark says: for those who must not fail halfway.
+  // DISK_FULL if fewer than `bytes` are free now, whatever the low-water mark says. For callers that must not fail
+  // halfway.
   Status spare(std::uint64_t bytes);
-  // A write has failed for want of room: check() says DISK_FULL until there is some.
+  // Reports that a write failed for want of room; check() answers DISK_FULL until there is room again.
   void note_failure();
-  // For a commit that failed so. True: there was a reserve, and another try is worth it.
+  // Removes the reserve, for a commit that failed for want of room. Returns true if there was one: then another try is
+  // worthwhile.
   bool give_up_reserve();
 
  private:
@@ -45,7 +48,7 @@ class DiskSpace {
   DiskSpaceOptions options_;
 
   std::mutex mutex_;
-  std::chrono::steady_clock::time_point look_at_{};  // not before
+  std::chrono::steady_clock::time_point look_at_{};  // the next look() is not before this
   DiskRoom room_;
   bool full_ = false;
   bool reserved_ = false;

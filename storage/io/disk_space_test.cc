@@ -23,7 +23,7 @@ struct DiskSpaceTest : ::testing::Test {
   bool reserved() const { return disk->open_read("d/RESERVE").ok(); }
 };
 
-TEST_F(DiskSpaceTest, SaysSoBelowTheMarkAndGoesOnOnceThereIsAQuarterMore) {
+TEST_F(DiskSpaceTest, ReportsDiskFullBelowTheMarkUntilAQuarterMoreIsFree) {
   DiskSpace space = open();
   EXPECT_TRUE(space.check().ok());
   faults->free = 99 * kMiB;
@@ -43,7 +43,7 @@ TEST_F(DiskSpaceTest, GivesTheReserveUpOnceAndMakesItAgainBeforeGoingOn) {
   EXPECT_TRUE(space.give_up_reserve());
   EXPECT_FALSE(reserved());
   EXPECT_FALSE(space.give_up_reserve());
-  faults->free = 130 * kMiB;  // above the mark, but not with the reserve
+  faults->free = 130 * kMiB;  // enough above the mark, but not for the reserve too
   EXPECT_EQ(space.check().reason(), Reason::DISK_FULL);
   EXPECT_FALSE(reserved());
   faults->free = 145 * kMiB;
@@ -51,7 +51,7 @@ TEST_F(DiskSpaceTest, GivesTheReserveUpOnceAndMakesItAgainBeforeGoingOn) {
   EXPECT_TRUE(reserved());
 }
 
-TEST_F(DiskSpaceTest, AFailureIsBelievedThoughTheFileSystemSaysThereIsRoom) {
+TEST_F(DiskSpaceTest, AFailedWriteOverridesTheReportedFreeSpace) {
   options.believe_failure = std::chrono::hours(1);
   DiskSpace space = open();
   space.note_failure();
@@ -74,7 +74,7 @@ TEST_F(DiskSpaceTest, ASmallDiskHasASmallMark) {
   EXPECT_EQ(space.check().reason(), Reason::DISK_FULL);
 }
 
-TEST_F(DiskSpaceTest, AReserveThatIsThereIsTakenUpAndOneThatDoesNotFitIsNotMade) {
+TEST_F(DiskSpaceTest, AnExistingReserveIsKeptAndOneThatDoesNotFitIsNotMade) {
   { DiskSpace space = open(); }
   faults->free = 1 * kMiB;
   DiskSpace again = open();

@@ -1,4 +1,5 @@
-// The few things a log asks of a file system, so that tests can put one under it that forgets what was not synced.
+// The few operations that a log needs of a file system, as an interface: tests can put one under the log that forgets
+// what was not synced.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +12,14 @@
 
 namespace relmap::storage {
 
-// Errors: IO_ERROR, NO_SUCH_FILE, DISK_FULL (also over a quota), READ_ONLY (the file system is). One thread at a time.
+// Errors: IO_ERROR, NO_SUCH_FILE, DISK_FULL (also over a quota), READ_ONLY (a read-only file system). For one thread at
+// a time.
 class AppendFile {
  public:
   virtual ~AppendFile() = default;
   virtual Status append(ByteSpan bytes) = 0;
-  // Bytes appended and the length are durable on return. After a failure nobody knows which are, and another sync may
-  // succeed without writing them: the file is not to be appended to any more.
+  // Makes the appended bytes and the file's length durable. After a failure nobody knows which bytes are durable, and
+  // another sync may succeed without writing them, so the file must not be appended to any more.
   virtual Status sync() = 0;
 };
 
@@ -25,8 +27,8 @@ class AppendFile {
 class ReadFile {
  public:
   virtual ~ReadFile() = default;
-  virtual std::uint64_t size() const = 0;  // when it was opened
-  // Exactly `size` bytes from `offset`; IO_ERROR if there are fewer.
+  virtual std::uint64_t size() const = 0;  // of the file when it was opened
+  // Reads exactly `size` bytes from `offset`; IO_ERROR if there are fewer.
   virtual Result<Bytes> read(std::uint64_t offset, std::size_t size) const = 0;
 };
 
@@ -35,31 +37,33 @@ struct DiskRoom {
   std::uint64_t size = 0;  // of the file system
 };
 
-// Thread-safe. Paths are the caller's, "/" between names. Errors as above.
+// Thread-safe. Names in a path are separated by "/". Errors are those of AppendFile.
 class FileSystem {
  public:
   virtual ~FileSystem() = default;
-  // Fine if it exists. Its name is durable only after sync_directory() of the folder that holds it.
+  // Succeeds if the directory exists already. Its name is durable only after sync_directory() of its parent.
   virtual Status create_directory(const std::string& path) = 0;
   virtual Result<std::vector<std::string>> list(const std::string& directory) const = 0;  // names, ascending
-  // At its end; made if it is not there. Its name is durable only after sync_directory().
+  // Opens the file to append to its end; creates it if it is missing. A new name is durable only after
+  // sync_directory().
   virtual Result<std::unique_ptr<AppendFile>> open_append(const std::string& path) = 0;
   virtual Result<std::unique_ptr<ReadFile>> open_read(const std::string& path) const = 0;
-  virtual Status truncate(const std::string& path, std::uint64_t size) = 0;  // and sync
+  virtual Status truncate(const std::string& path, std::uint64_t size) = 0;  // durable on return
   virtual Status remove(const std::string& path) = 0;
   virtual Status sync_directory(const std::string& path) = 0;
   virtual Result<DiskRoom> room(const std::string& directory) const = 0;
-  // A file that occupies `bytes` of the disk, for nothing but to be removed. No file is left if that fails.
+  // Creates a file that occupies `bytes` of the disk, as a reserve to be removed later. If that fails, no file is left.
   virtual Status occupy(const std::string& path, std::uint64_t bytes) = 0;
 };
 
-// The machine's own. `sync == false`: every sync returns at once and does nothing; only for a test that must fail.
+// The machine's file system. With `sync == false` every sync returns at once and does nothing: only for a test that
+// must then fail.
 std::shared_ptr<FileSystem> posix_file_system(bool sync = true);
 
-// Of a file or folder: where its name stands. "." for a name alone.
+// The folder that contains the file or folder `path`; "." for a name without a folder.
 std::string folder_of(const std::string& path);
-// Creates the folder if it is missing, and makes its name durable: also one that a process made which was killed before
-// it could. The folder that holds it must exist.
+// Creates the folder if it is missing and makes its name durable, even where a process that was killed had created it
+// and not synced it. The parent folder must exist.
 Status create_durable_directory(FileSystem& files, const std::string& path);
 
 }  // namespace relmap::storage

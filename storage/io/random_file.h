@@ -1,4 +1,5 @@
-// A file of which any part is read or written at any time: for what can be made again, so that little is synced.
+// A file of which any part can be read and written at any time. It is for data that can be made again, so little is
+// synced.
 #pragma once
 
 #include <cstdint>
@@ -10,19 +11,19 @@
 
 namespace relmap::storage {
 
-// Thread-safe, but for parts that are written. Errors: IO_ERROR, DISK_FULL.
+// Thread-safe, except that nobody may read a part while it is written. Errors: IO_ERROR, DISK_FULL.
 class RandomFile {
  public:
-  // Made if it is not there.
+  // Creates the file if it is missing.
   static Result<std::unique_ptr<RandomFile>> open(const std::string& path);
-  // Without a name, gone with the process.
+  // A file without a name, which is gone when it is closed.
   static Result<std::unique_ptr<RandomFile>> open_temporary();
   ~RandomFile();
   RandomFile(const RandomFile&) = delete;
   RandomFile& operator=(const RandomFile&) = delete;
 
   Result<std::uint64_t> size() const;
-  // TRUNCATED: it ends before that.
+  // TRUNCATED if the file ends before that.
   Status read(std::uint64_t offset, void* bytes, std::size_t count) const;
   Status write(std::uint64_t offset, ByteSpan bytes);
   Status truncate(std::uint64_t size);

@@ -23,9 +23,9 @@ Result<std::unique_ptr<JournalLog>> JournalLog::open(std::shared_ptr<FileSystem>
   return log;
 }
 
-// Reads every record that may be needed. Those from applied + 1 on must follow each other without a gap; where they
-// stop to, the rest is lost if anything says that it was durable or cannot be read, and otherwise the tail that a crash
-// cut off.
+// Reads every record that may be needed. Those from applied + 1 on must follow each other without a gap. Behind the
+// first gap, the rest is lost if anything says that it was durable, or if it cannot be read; otherwise it is the tail
+// that a crash cut off.
 Status JournalLog::recover(std::uint64_t applied) {
   const auto names = files_->list(directory_);
   if (!names.ok()) return names.status();
@@ -37,12 +37,12 @@ Status JournalLog::recover(std::uint64_t applied) {
   std::uint64_t durable = applied;
   std::uint64_t previous = 0;  // sequence of the record before
   Tail tail;
-  bool more = false;  // there are bytes behind the tail
+  bool more = false;  // there are bytes behind `tail`
   Status unreadable;
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     const std::uint64_t limit = i + 1 < segments_.size() ? segments_[i + 1].first : ~std::uint64_t{0};
     if (limit <= applied + 1) continue;
-    durable = std::max(durable, segments_[i].first - 1);  // begun only when all before it was
+    durable = std::max(durable, segments_[i].first - 1);  // a segment is begun when all before it is durable
     const auto reader = SegmentReader::open(*files_, segments_[i].path);
     if (reader.reason() == Reason::UNKNOWN_FORMAT_VERSION) return reader.status();
     more = true;
@@ -71,11 +71,12 @@ Status JournalLog::recover(std::uint64_t applied) {
   }
   loss_ = loss(durable, unreadable);
   if (loss_.ok() && more)
-    dropped_ = "journal records from " + std::to_string(last_ + 1) + " on were cut off before anybody was told of them";
+    dropped_ = "journal records from " + std::to_string(last_ + 1) + " on were cut off; they had not been acknowledged";
   return options_.read_only || !loss_.ok() ? Status() : continue_behind(tail);
 }
 
-// What is missing behind the last record, of which those up to `durable` are known to have been.
+// DATA_LOSS if records behind last_ are missing that were durable (`durable`: the highest such sequence known), or if
+// files there cannot be read (`unreadable`: why).
 Status JournalLog::loss(std::uint64_t durable, const Status& unreadable) const {
   if (!unreadable.ok() && durable <= last_)
     return Status(Reason::DATA_LOSS,
@@ -89,14 +90,14 @@ Status JournalLog::loss(std::uint64_t durable, const Status& unreadable) const {
                 "journal records " + range(last_ + 1, durable) + " were durable and cannot be read: " + why);
 }
 
-// Takes away what stands behind the tail, and opens it for appending.
+// Removes what stands behind the tail, and opens the tail's segment for appending.
 Status JournalLog::continue_behind(const Tail& tail) {
   const bool usable = tail.end != 0 && tail.sequence == last_;
   while (!segments_.empty() && (!usable || segments_.size() > tail.segment + 1)) {
     if (Status removed = files_->remove(segments_.back().path); !removed.ok()) return removed;
     segments_.pop_back();
   }
-  // A segment that came back would overtake the records that are written next.
+  // If a removed segment came back, its records would count instead of those that are written next.
   if (Status synced = files_->sync_directory(directory_); !synced.ok()) return synced;
   if (segments_.empty()) return begin_segment();
   const std::string& path = segments_.back().path;
@@ -107,14 +108,15 @@ Status JournalLog::continue_behind(const Tail& tail) {
   }
   auto file = files_->open_append(path);
   if (!file.ok()) return file.status();
-  // After a kill, what was read may have been in memory only.
+  // After a kill, what was read may have been in the page cache only.
   if (Status synced = (*file)->sync(); !synced.ok()) return synced;
-  if (segments_.back().salt) file_ = std::move(*file);  // else the next append begins another
+  if (segments_.back().salt) file_ = std::move(*file);  // otherwise the next append begins a new segment
   file_bytes_ = tail.end;
   return {};
 }
 
-// What a failed segment of this sequence left goes first, whatever its salt: its syncs cannot be believed.
+// Files that a failed segment with this first sequence left are removed first, whatever their salt: their syncs cannot
+// be trusted.
 Status JournalLog::begin_segment() {
   const Segment begun = segment({last_ + 1, next_salt_});
   const Bytes header = segment_header(begun.first, next_salt_);
@@ -162,8 +164,8 @@ Result<std::uint64_t> JournalLog::append(std::span<const Bytes> records) {
   return last_ += records.size();
 }
 
-// What failed is cut off, so that no later reader finds it. If that fails too, the next segment's first sequence says
-// that it does not exist.
+// Cuts off what the failed write left, so that no later reader finds it. If that fails too, the first sequence of the
+// next segment says that it does not exist.
 void JournalLog::leave_segment() {
   file_.reset();
   (void)files_->truncate(segments_.back().path, file_bytes_);

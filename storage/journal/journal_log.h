@@ -1,6 +1,6 @@
-// The journal as files: journal-SEQUENCE-SALT.log, append-only segments (docs/storage-format.md). A record is durable
-// when append() has returned; each carries the highest sequence that was durable before it, so that after a crash a
-// damaged tail (nobody was told of it) can be told from lost records (somebody was).
+// The journal as files: append-only segments, journal-SEQUENCE-SALT.log (docs/storage-format.md). A record is durable
+// when append() has returned. Each record carries the highest sequence that was durable before it, so that after a
+// crash a damaged tail, which nobody was told of, can be told from lost records, which somebody was told of.
 #pragma once
 
 #include <cstdint>
@@ -19,56 +19,57 @@
 namespace relmap::storage {
 
 struct JournalLogOptions {
-  std::uint64_t segment_bytes = std::uint64_t{16} << 20;  // a new segment is begun beyond
-  bool read_only = false;                                 // nothing is repaired, nothing appended
-  std::function<std::uint64_t()> salts = random_salt;     // one for each segment that is begun; tests have their own
+  std::uint64_t segment_bytes = std::uint64_t{16} << 20;  // a segment of this size or more is followed by a new one
+  bool read_only = false;                                 // neither repairs nor appends
+  std::function<std::uint64_t()> salts = random_salt;     // draws the salt of each new segment; tests have their own
 };
 
 // Thread-safe.
 class JournalLog {
  public:
-  // `applied`: records up to it are not needed any more, damaged or not, and cannot be read. Drops a damaged tail,
-  // which dropped() tells. IO_ERROR, UNKNOWN_FORMAT_VERSION. Lost records do not fail it: loss() names them, reads up
-  // to them succeed and appends are refused.
+  // Opens the journal in `directory`. Records up to `applied` are not needed any more, damaged or not, and cannot be
+  // read. A damaged tail is dropped; dropped() says so. Lost records do not make open() fail: loss() names them, the
+  // records before them can be read, and appends are refused. IO_ERROR, UNKNOWN_FORMAT_VERSION.
   static Result<std::unique_ptr<JournalLog>> open(std::shared_ptr<FileSystem> files, const std::string& directory,
                                                   std::uint64_t applied, JournalLogOptions options = {});
 
-  // The sequence of the last one, once all are durable. On failure none of them counts, unless the machine stops before
-  // the disk takes them back or the next append succeeds: then the next start may find them. The next append begins a
-  // new segment, so a failure lasts as long as its cause. No records: whether some would be taken now.
+  // Appends `records` and returns the sequence of the last one, once all of them are durable. If the call fails, none
+  // of them counts, with one exception: if the machine stops before the disk has taken them back and before the next
+  // append has succeeded, the next start may find them. After a failure the next append begins a new segment, so the
+  // failure lasts as long as its cause. Without records, the call reports whether an append would succeed now.
   Result<std::uint64_t> append(std::span<const Bytes> records);
   Status read(std::uint64_t from, const std::function<bool(std::uint64_t sequence, ByteSpan record)>& visit) const;
-  // Deletes the segments that hold nothing above `through`; what else is not above it can no longer be read.
+  // Deletes the segments that hold nothing above `through`. Other records up to `through` can no longer be read either.
   Status trim(std::uint64_t through);
 
-  // The files that the records from first() on are in, open: what is trimmed later can still be read from them. Their
-  // first `bytes` bytes are durable records.
+  // The files that hold the records from first() on, open: they can be read even if they are trimmed later. Of each
+  // file, the first `bytes` bytes are durable.
   struct KeptFile {
     std::string name;
     std::unique_ptr<ReadFile> file;
     std::uint64_t bytes = 0;
   };
   Result<std::vector<KeptFile>> keep() const;
-  Result<std::uint64_t> bytes() const;  // of those files
+  Result<std::uint64_t> bytes() const;  // of the files that keep() returns
 
-  std::uint64_t first() const;  // lowest that can be read; last() + 1 if none can
-  std::uint64_t last() const;   // 0: none was ever written
+  std::uint64_t first() const;  // lowest sequence that can be read; last() + 1 if none can
+  std::uint64_t last() const;   // 0 if no record was ever written
   // OK, or DATA_LOSS naming the range of records that were durable once and cannot be read.
   const Status& loss() const { return loss_; }
-  // What was dropped at open(), in words; empty: nothing.
+  // What open() dropped, in words; empty if nothing.
   const std::string& dropped() const { return dropped_; }
 
  private:
   struct Segment {
     std::uint64_t first = 0;            // sequence of its first record
-    std::optional<std::uint64_t> salt;  // none: of version 1
+    std::optional<std::uint64_t> salt;  // nullopt: a segment of version 1
     std::string path;
   };
 
   // Where the records end.
   struct Tail {
     std::size_t segment = 0;
-    std::uint64_t end = 0;  // offset; 0: there is none
+    std::uint64_t end = 0;  // offset in the segment; 0: there is no usable segment
     std::uint64_t sequence = 0;
   };
 
@@ -93,9 +94,9 @@ class JournalLog {
 
   mutable std::mutex mutex_;
   std::vector<Segment> segments_;     // ascending; the last is appended to
-  std::unique_ptr<AppendFile> file_;  // null: a write to the last segment has failed, or it is of version 1
-  std::uint64_t next_salt_ = 0;       // of the segment that is begun next
-  std::uint64_t file_bytes_ = 0;      // durable ones
+  std::unique_ptr<AppendFile> file_;  // of the last segment; null if a write to it failed or it is of version 1
+  std::uint64_t next_salt_ = 0;       // of the next segment
+  std::uint64_t file_bytes_ = 0;      // durable bytes of the last segment
   std::uint64_t first_ = 1;
   std::uint64_t last_ = 0;
 };

@@ -100,7 +100,7 @@ TEST_F(JournalLogTest, RollsOverToNewSegmentsAndTrimsWholeOnes) {
   EXPECT_EQ(log->last(), 51u);
 }
 
-TEST_F(JournalLogTest, SegmentsLeftByACrashBeforeTheTrimAreNoHarm) {
+TEST_F(JournalLogTest, SegmentsLeftByACrashBeforeTheTrimDoNoHarm) {
   auto log = open();
   append(*log, 50);
   log = open(40);  // committed, never trimmed
@@ -110,7 +110,7 @@ TEST_F(JournalLogTest, SegmentsLeftByACrashBeforeTheTrimAreNoHarm) {
   EXPECT_EQ(read(*log, 1).size(), 10u);
 }
 
-TEST_F(JournalLogTest, ATailThatNobodyWasToldOfIsDropped) {
+TEST_F(JournalLogTest, ATailThatWasNotAcknowledgedIsDropped) {
   auto log = open();
   append(*log, 5);
   disk->damage(segment(0), kHeader + 4 * (kHeader + 100) + 50);  // in the fifth: no later record vouches for it
@@ -143,7 +143,7 @@ TEST_F(JournalLogTest, DamageBelowAnAcknowledgedRecordIsALossWithItsRange) {
   }
 }
 
-TEST_F(JournalLogTest, AnyFlippedBitIsHarmlessOrNamedOrOfTheLastRecord) {
+TEST_F(JournalLogTest, AnyFlippedBitIsHarmlessOrReportedOrInTheLastRecord) {
   auto log = open(0, 300);
   append(*log, 8, 40);
   for (std::size_t i = 0; i < segments().size(); ++i) {
@@ -167,7 +167,7 @@ TEST_F(JournalLogTest, AnyFlippedBitIsHarmlessOrNamedOrOfTheLastRecord) {
   }
 }
 
-TEST_F(JournalLogTest, DamageToWhatIsAppliedDoesNotMatter) {
+TEST_F(JournalLogTest, DamageToAppliedRecordsDoesNotMatter) {
   auto log = open();
   append(*log, 30);
   disk->damage(segment(0), kHeader + 50);
@@ -187,7 +187,7 @@ TEST_F(JournalLogTest, AMissingSegmentInTheMiddleIsALoss) {
   EXPECT_EQ(open(49)->last(), 50u);  // not needed, no loss
 }
 
-TEST_F(JournalLogTest, NumbersGoOnBehindWhatIsAppliedWhenTheJournalIsGone) {
+TEST_F(JournalLogTest, SequencesContinueAfterAppliedWhenTheJournalIsGone) {
   auto log = open(7);
   EXPECT_EQ(log->last(), 7u);
   append(*log, 1);
@@ -212,7 +212,7 @@ TEST_F(JournalLogTest, AFailedSyncLeavesNoTraceOfItsRecords) {
   EXPECT_EQ(read(*open(), 1).size(), 5u);
 }
 
-TEST_F(JournalLogTest, NothingAcknowledgedIsLostOrDoubledThoughSyncsFailAndThePowerAfterThem) {
+TEST_F(JournalLogTest, NothingAcknowledgedIsLostOrDoubledWhenSyncsAndThenThePowerFail) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     disk = ForgetfulFiles::create(seed);
     auto log = open();
@@ -243,7 +243,7 @@ TEST_F(JournalLogTest, AfterAFailedSyncTheNextSegmentIsBegun) {
   ASSERT_EQ(segments().size(), 2u);
   EXPECT_NE(segment(1).find("0004-"), std::string::npos);
   append(*log, 1);
-  // And at a segment's first record: its file is made anew, also if that fails once.
+  // The same at a segment's first record: its file is made anew, even if that fails once.
   disk->fail_syncs(1);
   EXPECT_FALSE(log->append({&failed, 1}).ok());
   EXPECT_TRUE(log->append({}).ok());
@@ -276,7 +276,7 @@ TEST_F(JournalLogTest, WhatAKilledProcessDidNotSyncIsSyncedBeforeItCounts) {
   }
 }
 
-TEST_F(JournalLogTest, ASegmentThatCannotBeReadIsALossThatNamesItUnlessItIsApplied) {
+TEST_F(JournalLogTest, ASegmentThatCannotBeReadIsALossThatNamesIt) {
   auto log = open();
   append(*log, 30);
   const auto faults = std::make_shared<DiskFaults>();
@@ -290,7 +290,7 @@ TEST_F(JournalLogTest, ASegmentThatCannotBeReadIsALossThatNamesItUnlessItIsAppli
   EXPECT_EQ((*broken)->append({&record, 1}).reason(), Reason::DATA_LOSS);
 }
 
-TEST_F(JournalLogTest, AFullDiskIsNamedAndPasses) {
+TEST_F(JournalLogTest, AFullDiskIsReportedAndAppendsGoOnOnceThereIsRoom) {
   const auto faults = std::make_shared<DiskFaults>();
   const auto log = JournalLog::open(faulty_files(disk, faults), "j", 0, {1000, false}).value();
   append(*log, 3);
@@ -332,9 +332,10 @@ TEST_F(JournalLogTest, AnUnknownVersionIsRefusedByName) {
   EXPECT_EQ(JournalLog::open(disk, "j", 0).reason(), Reason::UNKNOWN_FORMAT_VERSION);
 }
 
-// The best that a payload can hold: sound in all but the salt, next in turn, and vouching for what never was.
+// The worst that a payload can hold: a record that is sound in all but its salt, has the next sequence, and says that
+// records were acknowledged that never existed.
 TEST_F(JournalLogTest, ARecordInsideAPayloadIsNeverTakenForOne) {
-  append(*open(), 12);  // their segments' salts are known to whoever has a backup
+  append(*open(), 12);  // whoever has a backup knows the salts of its segments
   Bytes forged = unsalted_record(15, 14, record_of(15, 20));
   std::vector<std::uint64_t> guesses = {0, ~std::uint64_t{0}, 0x0123456789abcdef};
   for (const std::string& name : segments()) guesses.push_back(*SegmentName::parse(name)->salt);
@@ -350,7 +351,7 @@ TEST_F(JournalLogTest, ARecordInsideAPayloadIsNeverTakenForOne) {
     ASSERT_TRUE(log->append({&forged, 1}).ok());
     const std::uint64_t at = disk->open_read(segment(0)).value()->size() - forged.size() - kHeader;
     if (told) append(*log, 1);
-    disk->damage(segment(0), at + 9);  // the length: the payload is searched
+    disk->damage(segment(0), at + 9);  // its length field, so that the payload is searched
     log = open();
     EXPECT_EQ(log->last(), 12U);
     if (told) {
@@ -363,7 +364,7 @@ TEST_F(JournalLogTest, ARecordInsideAPayloadIsNeverTakenForOne) {
   }
 }
 
-// Why there is one.
+// Shows why segments have a salt.
 TEST_F(JournalLogTest, WithoutASaltAForgedRecordWasTakenForOne) {
   ByteWriter w;
   w.put_bytes(unsalted_header(1));
@@ -377,7 +378,8 @@ TEST_F(JournalLogTest, WithoutASaltAForgedRecordWasTakenForOne) {
   EXPECT_EQ(found->sequence, 2U);
 }
 
-// Of version 1, as map format 2 wrote them: read as they were, and the journal goes on in a segment of version 2.
+// Segments of version 1, as map format 2 wrote them, are read as they are; the journal goes on in a segment of version
+// 2.
 TEST_F(JournalLogTest, SegmentsWithoutASaltAreReadAndNotContinued) {
   ByteWriter w;
   w.put_bytes(unsalted_header(1));
@@ -399,7 +401,7 @@ TEST_F(JournalLogTest, SegmentsWithoutASaltAreReadAndNotContinued) {
   EXPECT_EQ(read(*open(5), 1).size(), 3U);
 }
 
-TEST_F(JournalLogTest, ATornTailOrAnEmptySegmentWithoutASaltIsNoHarm) {
+TEST_F(JournalLogTest, ATornTailOrAnEmptySegmentWithoutASaltDoesNoHarm) {
   for (const std::size_t records : {0U, 3U}) {
     disk = ForgetfulFiles::create(1);
     ByteWriter w;
@@ -442,7 +444,7 @@ TEST_F(JournalLogTest, ASegmentUnderAnothersNameIsALossThatNamesIt) {
 }
 
 // A segment whose first write failed is replaced by one of another salt; the power may fail between the two names.
-TEST_F(JournalLogTest, OfTwoSegmentsOfOneSequenceEitherOrderIsSound) {
+TEST_F(JournalLogTest, TwoSegmentsOfOneSequenceAreSoundInEitherOrder) {
   for (const std::uint64_t left_behind : {std::uint64_t{1}, ~std::uint64_t{0}}) {
     disk = ForgetfulFiles::create(1);
     append(*open(), 3);
@@ -450,7 +452,7 @@ TEST_F(JournalLogTest, OfTwoSegmentsOfOneSequenceEitherOrderIsSound) {
     write_file(empty.to_string(), segment_header(4, 77));
     ByteWriter w;
     w.put_bytes(segment_header(4, left_behind));
-    put_journal_record(w, left_behind, 4, 3, record_of(4, 100));  // nobody was told of it
+    put_journal_record(w, left_behind, 4, 3, record_of(4, 100));  // not acknowledged
     write_file(SegmentName{4, left_behind}.to_string(), w.bytes());
     auto log = open();
     EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();

@@ -11,9 +11,9 @@ namespace relmap::storage {
 namespace {
 
 constexpr std::uint16_t kVersion = 1;
-constexpr std::uint16_t kExtended = 2;  // extensions follow; of records that have some
+constexpr std::uint16_t kExtended = 2;  // of records that end in extensions
 
-// Kinds are numbers on disk: never changed.
+// Numbers on disk; they never change.
 enum Kind : std::uint8_t {
   kSession = 1,
   kKeyframe = 2,
@@ -205,7 +205,7 @@ bool get(ByteReader& r, RemoveChunkRecord& x) {
   return true;
 }
 
-// Records that have no room for extensions are never of the version that has them.
+// Record types without extensions are never written in the version that has them.
 template <typename Record>
 Extensions extensions_of(const Record&) {
   return {};

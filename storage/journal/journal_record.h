@@ -1,5 +1,5 @@
-// All that changes the map is a journal record; applying one is a pure function of the map and the record
-// (server/map/map_builder.h). The bytes are documented in docs/storage-format.md; each record carries the highest
+// Journal records. Every change of the map is a record, and applying a record is a pure function of the map and the
+// record (server/map/map_builder.h). docs/storage-format.md describes the bytes. Each record carries the highest
 // journal sequence that was acknowledged when it was written.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace relmap::storage {
 
-// The session `header.uuid` has number `number` from here on.
+// From here on the session `header.uuid` has the number `number`.
 struct SessionRecord {
   SessionNumber number = 0;
   std::string display_name;
@@ -23,11 +23,11 @@ struct SessionRecord {
 
 struct KeyframeRecord {
   SessionNumber session = 0;
-  std::uint32_t crc = 0;  // of payload
-  Bytes payload;          // decode_keyframe()
+  std::uint32_t crc = 0;  // CRC32C of payload
+  Bytes payload;          // an encoded keyframe: decode_keyframe()
 };
 
-// from..to are settled without keyframes: given up by the robot, or refused.
+// The sequences from..to are skipped: the robot gave them up, or they were refused.
 struct GapRecord {
   SessionNumber session = 0;
   std::uint32_t from = 0, to = 0;
@@ -40,20 +40,21 @@ struct RefusalRecord {
   Reason reason = Reason::INTERNAL;
 };
 
-// A re-observation found beside the worker: frame `frame` sees `landmark`, by its own tracked landmark (`track` >= 0,
-// index into Keyframe::tracks), by an appearance feature with this measurement, or aligned in its picture. An invalid
-// landmark: the track's own is not needed (AliasClaim).
+// A re-observation that was found beside the worker: the frame of the record sees `landmark`. It was found by the
+// frame's own tracked landmark (`track` >= 0, an index into Keyframe::tracks), by an appearance feature with this
+// measurement, or by alignment in the frame's picture (`aligned`). An invalid landmark says that the track's own
+// landmark is not needed (AliasClaim).
 struct ProposedBinding {
   LandmarkId landmark;
   std::int32_t track = -1;
-  float u_left = 0, v = 0, u_right = 0;
+  float u_left = 0, v = 0, u_right = 0;  // pixels
   std::uint8_t level = 0;
   bool aligned = false;
 };
 
 // A place that was recognised and verified: a closure, to be accepted or kept as a candidate.
 struct ClosureProposalRecord {
-  FrameId query, match;  // query is the newer: the closure will be stored there
+  FrameId query, match;  // query is the newer frame: the closure is stored with it
   SE3 T_match_query;
   Matrix6 covariance = Matrix6::Identity();
   Verification verification = Verification::kStereo;
@@ -62,10 +63,10 @@ struct ClosureProposalRecord {
   float spread = 0;
   std::vector<ProposedBinding> bindings;
   Uniqueness uniqueness;
-  Extensions unknown = {};  // of a later version: kept as they came
+  Extensions unknown = {};  // from a later version, kept unchanged
 };
 
-// Landmarks seen again by projection along an accepted closure, no new place needed (docs/method.md, 2).
+// Landmarks that were seen again by projection along an accepted closure, without a new place (docs/method.md, 2).
 struct BindingRecord {
   FrameId frame;
   ClosureId closure;
@@ -77,38 +78,38 @@ struct SetEdgeStateRecord {
   EdgeId edge;
   EdgeState state = EdgeState::kRemoved;
   std::string note;
-  // With kAccepted: it comes into force by the operator's word, whatever it is now, and is never outvoted. Else what
-  // was removed becomes what it was before.
+  // With kAccepted: true puts the edge into force by the operator's decision, whatever its state is now, and it is
+  // never outvoted. False returns a removed edge to the state that it had before.
   bool decided = false;
-  // With kRemoved: it goes alone. Those that agree with it stay in force, and later ones are judged as if it had never
-  // been proposed; else they go with it.
+  // With kRemoved: true removes this edge only. Those that agree with it stay in force, and later ones are judged as if
+  // it had never been proposed. False removes those that agree with it too.
   bool alone = false;
-  // With kRemoved: what would go when the operator looked (removal_mark(), server/map/edge_edit.h); where it is
-  // something else by now nothing goes. 0: whatever there is.
+  // With kRemoved: a mark of what would have been removed when the operator looked (removal_mark(),
+  // server/map/edge_edit.h). Nothing is removed where that has changed since. 0: no such condition.
   std::uint64_t shown = 0;
-  Extensions unknown = {};  // of a later version: kept as they came
+  Extensions unknown = {};  // from a later version, kept unchanged
 };
 struct SetLabelRecord {
   FrameId frame;
   std::string label;
-  bool present = true;      // false: taken off
-  Extensions unknown = {};  // of a later version: kept as they came
+  bool present = true;      // false: the label is removed
+  Extensions unknown = {};  // from a later version, kept unchanged
 };
 
-// A robot ended its session, or an operator's edit.
+// The robot ended its session, or an operator changed its state.
 struct SetSessionStateRecord {
   SessionNumber session = 0;
-  SessionState state = SessionState::kOpen;  // open: a frozen one is thawed, and what it was before (before_frozen)
-  Extensions unknown = {};                   // of a later version: kept as they came
+  SessionState state = SessionState::kOpen;  // kOpen thaws a frozen session to what it was before (before_frozen)
+  Extensions unknown = {};                   // from a later version, kept unchanged
 };
 
-// The last `chunk` of a session that is being deleted leaves the map (server/map/deletion.h).
+// Removes `chunk`, the last one of a session that is being deleted, from the map (server/map/deletion.h).
 struct RemoveChunkRecord {
   SessionNumber session = 0;
   std::uint32_t chunk = 0;
 };
 
-// Relaxation done in idle time: this many units of counted work (linearised observations).
+// Relaxation that was done in idle time. `budget` is the work, counted in linearised observations.
 struct IdleWorkRecord {
   std::uint64_t budget = 0;
 };

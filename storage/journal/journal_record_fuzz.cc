@@ -10,7 +10,7 @@ using relmap::Bytes;
 using relmap::ByteSpan;
 using namespace relmap::storage;
 
-// What decodes must encode to something that decodes to the same again.
+// What decodes must encode to bytes that decode to the same again.
 void round_trip(ByteSpan bytes) {
   if (const auto decoded = decode_record(bytes); decoded.ok()) {
     const Bytes once = encode_record(decoded->record, decoded->acknowledged_through);
@@ -28,7 +28,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const ByteSpan bytes(data, size);
   round_trip(bytes);
   if (size == 0) return 0;
-  // Past the checksum that random bytes do not pass: records without extensions and with, and sessions and state.
+  // Random bytes do not pass the checksum, so they are sealed as records without and with extensions, sessions and
+  // state.
   for (const std::uint16_t version : {1, 2, 4}) round_trip(seal(data[0], version, bytes.subspan(1)));
   return 0;
 }

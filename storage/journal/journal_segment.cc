@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint32_t kMagic = 0x4c4a4d52;  // "RMJL"
 constexpr std::uint16_t kUnsalted = 1, kVersion = 2;
 constexpr std::size_t kSaltBytes = sizeof(std::uint64_t);
-// Without the salt, which stands before the room to grow in a segment's header and before all else in a record's.
+// Sizes without the salt. It stands before the reserved field in a segment's header, and at the beginning of a
+// record's.
 constexpr std::size_t kSegmentHeaderBytes = 24;
 constexpr std::size_t kRecordHeaderBytes = 24;
 
@@ -39,7 +40,7 @@ std::array<std::uint8_t, kSaltBytes> salt_bytes(std::uint64_t salt) {
   return bytes;
 }
 
-// Of what stands before the checksum in a record (with its salt, if it has one) and behind it.
+// CRC of a record: of the bytes before the checksum (with the salt, if there is one), those behind it, and the payload.
 std::uint32_t record_crc(ByteSpan before, ByteSpan behind, ByteSpan payload) {
   return crc32c(payload, crc32c(behind, crc32c(before)));
 }
@@ -75,7 +76,7 @@ Bytes segment_header(std::uint64_t first, std::uint64_t salt) {
   w.put(std::uint16_t{0});
   w.put(first);
   w.put(salt);
-  w.put(std::uint32_t{0});  // room to grow
+  w.put(std::uint32_t{0});  // reserved
   w.put(crc32c(w.bytes()));
   return w.take();
 }
@@ -145,7 +146,7 @@ Result<std::optional<SegmentRecord>> SegmentReader::record_at(std::uint64_t offs
 }
 
 Result<std::optional<SegmentRecord>> SegmentReader::find_after(std::uint64_t offset, std::uint64_t after) const {
-  constexpr std::uint64_t kFar = 1u << 24;  // records that one segment cannot hold: a sequence beyond is no sequence
+  constexpr std::uint64_t kFar = 1u << 24;  // more records than a segment can hold: a sequence beyond is not one
   if (offset >= size()) return std::optional<SegmentRecord>();
   const auto rest = file_->read(offset, size() - offset);
   if (!rest.ok()) return rest.status();

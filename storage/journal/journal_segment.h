@@ -1,10 +1,10 @@
-// The bytes of a journal segment: a header, then records one after another (docs/storage-format.md, Segments). For
-// JournalLog, and for its repair.
+// The bytes of a journal segment: a header, then records one after another (docs/storage-format.md, Segments). Used by
+// JournalLog and by the repair of the journal.
 //
-// A salt, drawn at random when a segment is begun, stands in its name, its header and each of its records, and is what
-// their checksums begin with. Whoever made a payload could not know it, so nothing inside one can pass for a record.
-// The name has it too because a sector that is lost at the head of the file would take header and first record.
-// Segments of version 1 have none; they are read, and never written.
+// A salt is drawn at random when a segment is begun. It stands in the segment's name, its header and each of its
+// records, and the records' checksums begin with it. Whoever made a payload could not know the salt, so nothing inside
+// a payload can pass for a record. The name has the salt too because a sector that is lost at the head of the file
+// would take the header and the first record. Segments of version 1 have no salt; they are read, but never written.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +22,11 @@ inline constexpr std::uint32_t kMaxRecordBytes = 256u << 20;
 
 // "journal-00000000000000000001-0123456789abcdef.log"; of version 1 "journal-00000000000000000001.log".
 struct SegmentName {
-  std::uint64_t first = 0;            // sequence of its first record; 1 and above
-  std::optional<std::uint64_t> salt;  // none: of version 1
+  std::uint64_t first = 0;            // sequence of its first record; at least 1
+  std::optional<std::uint64_t> salt;  // nullopt: version 1
 
   std::string to_string() const;
-  static std::optional<SegmentName> parse(const std::string& file);  // nullopt: another file
+  static std::optional<SegmentName> parse(const std::string& file);  // nullopt: not a segment
 };
 
 std::uint64_t random_salt();
@@ -43,16 +43,16 @@ struct SegmentRecord {
 
 class SegmentReader {
  public:
-  // UNKNOWN_FORMAT_VERSION, IO_ERROR, NO_SUCH_FILE; CORRUPT if a whole header has another salt than the name. A damaged
-  // header is no error: the records say of themselves what they are.
+  // UNKNOWN_FORMAT_VERSION, IO_ERROR, NO_SUCH_FILE; CORRUPT if an undamaged header has another salt than the name. A
+  // damaged header is no error, because each record can be checked by itself.
   static Result<SegmentReader> open(const FileSystem& files, const std::string& path);
 
   bool header_whole() const { return header_whole_; }
   std::uint64_t size() const { return file_->size(); }
   std::uint64_t first_offset() const;  // of the first record
-  // The record at `offset`: nullopt if none begins there, or it is damaged or cut off.
+  // The record at `offset`; nullopt if none begins there, or if it is damaged or cut off.
   Result<std::optional<SegmentRecord>> record_at(std::uint64_t offset) const;
-  // The first whole record with a sequence above `after` that begins at `offset` or later.
+  // The first whole record at `offset` or behind it whose sequence is above `after`; nullopt if there is none.
   Result<std::optional<SegmentRecord>> find_after(std::uint64_t offset, std::uint64_t after) const;
 
  private:

@@ -1,9 +1,9 @@
-// Which frames there are, chunk by chunk, and beside each chunk the sums by which what is derived is compared with the
-// facts: some 60 bytes for 64 frames, all that verify keeps for the whole map.
+// The frames that exist, chunk by chunk, and for each chunk the sums by which derived fields are compared with the
+// facts. That is some 60 bytes for 64 frames, and all that verify keeps for the whole map.
 //
-// A sum adds a number drawn from each reference as it follows from the facts, and takes it away again for each as it is
-// stored. References agree as sets if the sum is zero (but for one case in 2^64), so one walk over the map in any order
-// compares them all; only where a sum is not zero, the references are gathered and compared one by one.
+// A sum adds a number drawn from each reference that follows from the facts, and subtracts it for each reference that
+// is stored. References agree as sets if the sum is zero (but for one case in 2^64), so one walk over the map in any
+// order compares them all. Only where a sum is not zero are the references gathered and compared one by one.
 #pragma once
 
 #include <algorithm>
@@ -49,7 +49,7 @@ class ChunkTable {
 
  private:
   std::vector<ChunkEntry> entries_;
-  std::size_t last_ = 0;  // found last: the next is most often the same
+  std::size_t last_ = 0;  // found last; the next one is most often the same
 };
 
 }  // namespace relmap::storage

@@ -1,4 +1,4 @@
-// What verify finds and repair mends, and how both tell their caller.
+// What verify finds and repair mends, and how both report it.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace relmap::storage {
 
 struct Finding {
   Reason reason = Reason::OK;  // DATA_LOSS: it cannot be read. CORRUPT: it is whole, and cannot be right
-  FrameId frame;               // the one affected; invalid: none in particular
+  FrameId frame;               // the frame affected; invalid: none in particular
   std::string what;            // in words, with the part, edge or landmark affected
   bool repaired = false;
 };
@@ -20,7 +20,7 @@ struct Finding {
 struct MaintenanceProgress {
   std::string step;
   std::uint64_t done = 0, total = 0;  // total 0: not known
-  std::string unit;                   // of both: "frames", "records", "keys"
+  std::string unit;                   // of `done` and `total`: "frames", "records", "keys"
 };
 
 // Both are called from the thread that verifies or repairs, and may be empty.

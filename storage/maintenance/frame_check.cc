@@ -12,13 +12,13 @@ namespace relmap::storage {
 namespace {
 
 constexpr double kOrthonormal = 1e-6;  // largest deviation of R'R from the identity: rounding stays far below
-constexpr double kCovariance = 1e-6;   // asymmetry, and the most negative eigenvalue, of a matrix of correlations
+constexpr double kCovariance = 1e-6;   // largest asymmetry and largest negative eigenvalue of a correlation matrix
 
 void check_transform(const SE3& T, const std::string& name, const Complain& complain) {
   if (!is_finite(T))
     complain(name + " is not finite");
   else if (!is_transform(T))
-    complain("the rotation of " + name + " is none");
+    complain("the rotation of " + name + " is not a rotation");
 }
 
 void check_edge(FrameId id, const Edge& edge, const Complain& complain_of_frame) {
@@ -29,8 +29,8 @@ void check_edge(FrameId id, const Edge& edge, const Complain& complain_of_frame)
   if ((edge.id.ordinal == 0) != (edge.kind != EdgeKind::kLoop)) complain("its kind does not go with its ordinal");
   check_transform(edge.T_ab, "its transform", complain);
   check_transform(edge.prior_T_ab, "its prior", complain);
-  if (!is_covariance(edge.covariance)) complain("its covariance is none");
-  if (!is_covariance(edge.prior_covariance)) complain("its prior's covariance is none");
+  if (!is_covariance(edge.covariance)) complain("its covariance is not a covariance");
+  if (!is_covariance(edge.prior_covariance)) complain("its prior's covariance is not a covariance");
   const float numbers[] = {edge.driven_s, edge.standing_s, edge.probability, edge.spread};
   if (!std::all_of(std::begin(numbers), std::end(numbers), [](float x) { return std::isfinite(x); }))
     complain("a number is not finite");
@@ -50,7 +50,7 @@ bool is_transform(const SE3& T) {
          T.R.determinant() > 0;
 }
 
-// Judged as correlations.
+// Judged as a correlation matrix, so that units do not matter.
 bool is_covariance(const Matrix6& m) {
   if (!m.allFinite() || m.diagonal().minCoeff() < 0) return false;
   const Vector6 sigma = m.diagonal().cwiseSqrt();
@@ -108,13 +108,13 @@ void check_session(const Session& session, const Complain& complain) {
   if (session.frames > 0 && session.first_time_us > session.last_time_us) complain("it ends before it begins");
 }
 
-void check_settled(const Session& session, const Settled& settled, std::uint64_t next, const Complain& complain) {
-  if (settled.from > settled.to || settled.from < next)
-    complain("what is settled without frames is not in order at " + std::to_string(settled.from));
-  if (settled.to >= session.next_sequence && session.next_sequence != 0)
-    complain("sequence " + std::to_string(settled.to) + " is settled and still expected");
-  if (!is_reason(static_cast<std::uint16_t>(settled.reason)))
-    complain("sequence " + std::to_string(settled.from) + " was settled for no reason that there is");
+void check_skipped(const Session& session, const Skipped& skipped, std::uint64_t next, const Complain& complain) {
+  if (skipped.from > skipped.to || skipped.from < next)
+    complain("skipped sequences are not in order at " + std::to_string(skipped.from));
+  if (skipped.to >= session.next_sequence && session.next_sequence != 0)
+    complain("sequence " + std::to_string(skipped.to) + " is skipped and still expected");
+  if (!is_reason(static_cast<std::uint16_t>(skipped.reason)))
+    complain("sequence " + std::to_string(skipped.from) + " was skipped for an unknown reason");
 }
 
 }  // namespace relmap::storage

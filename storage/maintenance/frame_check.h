@@ -1,5 +1,5 @@
-// What can be said of one record by itself: numbers that cannot be, ids that are not its own, order that is not kept.
-// References to other frames are storage/maintenance/references.h.
+// Checks of one record by itself: impossible numbers, ids that are not its own, wrong order. References to other frames
+// are checked by storage/maintenance/references.h.
 #pragma once
 
 #include <functional>
@@ -16,8 +16,8 @@ void check_hot(FrameId id, const FrameHot& frame, const Complain& complain);
 void check_warm(FrameId id, const FrameWarm& frame, const Complain& complain);
 void check_cold(FrameId id, const FrameCold& frame, const Complain& complain);
 void check_session(const Session& session, const Complain& complain);
-// `next`: the sequence behind what was settled before.
-void check_settled(const Session& session, const Settled& settled, std::uint64_t next, const Complain& complain);
+// `next` is the sequence behind the skipped range before.
+void check_skipped(const Session& session, const Skipped& skipped, std::uint64_t next, const Complain& complain);
 
 inline constexpr double kMinInverseDepth = 1e-5;  // of a landmark, per metre
 
@@ -25,6 +25,6 @@ bool is_finite(const SE3& T);
 bool is_finite(const Observation& z);  // u_right may be NaN: mono
 bool is_transform(const SE3& T);       // finite, and its rotation is one
 bool is_covariance(const Matrix6& m);  // finite, symmetric, positive semidefinite, whatever the units
-SE3 near_rotation(const SE3& T);  // with the rotation nearest to what stands there; the identity if that is not finite
+SE3 near_rotation(const SE3& T);       // T with the nearest rotation; the identity if T is not finite
 
 }  // namespace relmap::storage

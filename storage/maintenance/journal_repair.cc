@@ -22,7 +22,7 @@ struct Contents {
   std::uint64_t durable = 0;             // the highest sequence known to have been durable
 };
 
-// Every record that can still be read. Where segments overlap, the later one tells what was written last.
+// Finds every record that can still be read. Where segments overlap, the later one has what was written last.
 Result<Contents> read_all(const FileSystem& files, const std::string& directory, std::uint64_t applied) {
   Contents contents;
   contents.durable = applied;
@@ -33,11 +33,11 @@ Result<Contents> read_all(const FileSystem& files, const std::string& directory,
     const auto parsed = SegmentName::parse(name);
     if (!parsed) continue;
     const std::uint64_t first = parsed->first;
-    contents.durable = std::max(contents.durable, first - 1);  // begun only when all before it was
+    contents.durable = std::max(contents.durable, first - 1);  // a segment is begun when all before it is durable
     contents.whole.erase(contents.whole.lower_bound(first), contents.whole.end());
     const std::string path = directory + "/" + name;
     const auto reader = SegmentReader::open(files, path);
-    if (reader.reason() == Reason::CORRUPT) continue;  // not the segment that its name says: none of these records
+    if (reader.reason() == Reason::CORRUPT) continue;  // not the segment that its name says: its records do not count
     if (!reader.ok()) return reader.status();
     std::uint64_t previous = first - 1;
     for (std::uint64_t offset = reader->first_offset();;) {
@@ -53,7 +53,7 @@ Result<Contents> read_all(const FileSystem& files, const std::string& directory,
       offset = found.end;
     }
   }
-  // The rest of the last group, if it is whole: it may have been told of. What is torn behind it was not.
+  // The rest of the last group may have been acknowledged, if it is whole. What is torn behind it was not.
   while (contents.whole.contains(contents.durable + 1)) ++contents.durable;
   contents.whole.erase(contents.whole.upper_bound(contents.durable), contents.whole.end());
   return contents;
@@ -123,16 +123,16 @@ class JournalRepair {
     if (const auto* session = std::get_if<SessionRecord>(&record)) expected_.try_emplace(session->number, 0);
     if (const auto* keyframe = std::get_if<KeyframeRecord>(&record))
       if (const auto decoded = decode_keyframe(keyframe->payload); decoded.ok())
-        settled(keyframe->session, decoded->sequence);
-    if (const auto* gap = std::get_if<GapRecord>(&record)) settled(gap->session, gap->to);
-    if (const auto* refusal = std::get_if<RefusalRecord>(&record)) settled(refusal->session, refusal->sequence);
+        expect_after(keyframe->session, decoded->sequence);
+    if (const auto* gap = std::get_if<GapRecord>(&record)) expect_after(gap->session, gap->to);
+    if (const auto* refusal = std::get_if<RefusalRecord>(&record)) expect_after(refusal->session, refusal->sequence);
   }
-  void settled(SessionNumber session, std::uint32_t sequence) {
+  void expect_after(SessionNumber session, std::uint32_t sequence) {
     const auto known = expected_.find(session);
     if (known != expected_.end()) known->second = std::max(known->second, std::uint64_t{sequence} + 1);
   }
 
-  // What the records of a hole must have been, by the first that each session says behind it.
+  // Works out what the records of a hole must have been, from the first record of each session behind the hole.
   Status find_substitutes(std::uint64_t hole) {
     substitutes_.clear();
     std::map<SessionNumber, bool> seen;
@@ -155,7 +155,7 @@ class JournalRepair {
   void bridge(std::map<SessionNumber, bool>& seen, SessionNumber session, std::uint32_t sequence,
               const SessionHeader* header) {
     if (seen[session]) return;
-    if (!expected_.contains(session)) {  // its beginning is in the hole
+    if (!expected_.contains(session)) {  // the session began in the hole
       if (!header) return;
       expected_[session] = 0;
       substitutes_.push_back(SessionRecord{session, header->name, *header});
@@ -165,10 +165,10 @@ class JournalRepair {
     if (next >= sequence) return;
     const GapRecord gap{session, static_cast<std::uint32_t>(next), sequence - 1, Reason::DATA_LOSS};
     tell("frames " + FrameId{session, gap.from}.to_string() + ".." + std::to_string(gap.to) +
-         " are lost with their journal records, and settled as a gap");
+         " are lost with their journal records; they are recorded as a gap");
     substitutes_.push_back(gap);
   }
-  // Each of them stands for at least one record that was lost, so there is room for all.
+  // Each substitute stands for at least one record that was lost, so there is room for all.
   JournalRecord next_substitute() {
     if (substitutes_.empty()) return IdleWorkRecord{0};
     JournalRecord record = std::move(substitutes_.front());
@@ -194,7 +194,7 @@ Result<JournalCopy> repair_journal(const std::shared_ptr<FileSystem>& files, con
                                    const OnFinding& on_finding, const OnProgress& on_progress) {
   const auto contents = read_all(*files, from, applied);
   if (!contents.ok()) return contents.status();
-  // Whole and in order from applied + 1 to the last that was durable: at most a tail that nobody was told of is cut off
+  // All records from applied + 1 to the last durable one are whole. At most a tail that was not acknowledged is cut off
   // when the engine opens.
   if (contents->whole.size() == contents->durable - applied) {
     JournalCopy copy;

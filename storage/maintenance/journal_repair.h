@@ -1,7 +1,7 @@
-// Repair of the journal's files: a copy in which every record is whole. Records that were durable and cannot be read
-// are replaced, one for one, so that all behind them can still be applied: by the gap that they leave in each session
-// whose keyframes are missing, by a session's record as its keyframes repeat it, and otherwise by a record that does
-// nothing.
+// Repair of the journal's files: makes a copy in which every record is whole. Records that were durable and cannot be
+// read are replaced one for one, so that all records behind them can still be applied: by the gap that they leave in
+// each session whose keyframes are missing, by a session's record as its keyframes repeat it, and otherwise by a record
+// that does nothing.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace relmap::storage {
 
 struct JournalCopy {
   bool sound = true;              // nothing was lost: the journal can stay as it is, and no copy was made
-  std::vector<RecordRange> lost;  // replaced
+  std::vector<RecordRange> lost;  // records that were replaced
   std::uint64_t last = 0;         // sequence of the last record
 };
 

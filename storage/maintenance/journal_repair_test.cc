@@ -37,7 +37,7 @@ TEST(JournalRepair, TakesNothingInsideAPayloadForARecord) {
   const auto reader = SegmentReader::open(*disk, path).or_throw();
   const auto third = reader.find_after(0, 2).or_throw();
   ASSERT_TRUE(third && third->sequence == 3);
-  disk->damage(path, third->offset + 9);  // its length
+  disk->damage(path, third->offset + 9);  // its length field
 
   const auto copy = repair_journal(disk, "j", "mended", 0, {}, {}, {}).or_throw();
   EXPECT_FALSE(copy.sound);

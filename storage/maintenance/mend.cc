@@ -11,7 +11,7 @@
 namespace relmap::storage {
 namespace {
 
-// 10 m and a radian: as good as nothing, and still a prior that keeps the solution unique.
+// Standard deviations of 10 m and 1 rad: hardly any information, but a prior that keeps the solution unique.
 const Matrix6 kUnknownStep = Vector6(100, 100, 100, 1, 1, 1).asDiagonal();
 constexpr double kFarAway = 0.1;  // inverse depth of a landmark of which nothing is known, per metre
 
@@ -59,11 +59,11 @@ class Mender {
     if (map_.dirty_bytes() > dirty_bytes_)
       if (Status committed = map_.commit(); !committed.ok()) throw StatusError(committed);
   }
-  // The last index of the settled run that `id` lies in, so that a gap of millions costs one step.
+  // The last index of the skipped range that contains `id`, so that a gap of millions costs one step.
   std::uint64_t skip_absent(FrameId id) const {
     std::uint64_t last = id.index;
-    map_.visit_settled(id.session, id.index, [&](const Settled& settled) {
-      if (settled.from <= id.index) last = settled.to;
+    map_.visit_skipped(id.session, id.index, [&](const Skipped& skipped) {
+      if (skipped.from <= id.index) last = skipped.to;
       return false;
     });
     return last;
@@ -79,7 +79,8 @@ class Mender {
     return edge && edge->kind == EdgeKind::kLoop ? edge : nullptr;
   }
 
-  // Each frame of a session hangs on the one before; the first on none. (Those of a mono session all hang on none.)
+  // Each frame of a session has an odometry edge to the one before; the first has none. (In a mono session no frame has
+  // one.)
   void mend_motion(FrameId id, std::optional<FrameId> before) {
     const auto hot = map_.hot(id);
     const Edge* motion = hot->edge({id, 0});
@@ -91,7 +92,7 @@ class Mender {
       return;
     }
     if (motion && motion->a == *before) {
-      // What it had in common with a step that is lost it does not have with the bridge in its place.
+      // Its stored correlation is with the step that is lost, not with the bridge in that step's place.
       const auto from = map_.hot(*before);
       const Edge* step_before = from->edge({*before, 0});
       if (step_before && step_before->reason == Reason::DATA_LOSS && !is_zero(motion->correlation_with_previous))
@@ -105,7 +106,7 @@ class Mender {
     std::erase_if(edges, [](const Edge& edge) { return edge.id.ordinal == 0; });
     edges.insert(edges.begin(), bridge);
   }
-  // It keeps the id of the edge whose place it takes: this is still "how the robot came here from the frame before".
+  // The bridge keeps the id of the edge that it replaces: it is still "how the robot came here from the frame before".
   Edge bridge_to(FrameId id, FrameId before, const Edge* lost) const {
     const auto from = map_.hot(before), to = map_.hot(id);
     Edge edge;
@@ -164,7 +165,7 @@ class Mender {
     }
   }
 
-  // What no checksum told: numbers and orders that only a fault of our own or a hand can have made.
+  // Mends what no checksum shows: numbers and orders that only a bug of ours or an edit by hand can have made.
   void mend_numbers(FrameId id, FrameHot& frame) {
     if (sound(check_hot, id, frame)) return;
     changed_ = true;
@@ -186,7 +187,7 @@ class Mender {
       if (edge.id.ordinal >= frame.next_loop_ordinal)
         frame.next_loop_ordinal = static_cast<std::uint16_t>(edge.id.ordinal + 1);
     }
-    // What is not even its own edge cannot be mended.
+    // An edge that is not even this frame's cannot be mended.
     summary_.quarantined_edges += std::erase_if(frame.edges, [&](const Edge& edge) {
       return edge.id.frame != id || edge.b != id || edge.a == edge.b || !edge.a.valid() ||
              (edge.id.ordinal == 0) != (edge.kind != EdgeKind::kLoop);
@@ -251,7 +252,7 @@ class Mender {
   const OnFinding& told_;
   const OnProgress& on_progress_;
   std::uint64_t done_ = 0;
-  bool changed_ = false;  // the frame at hand
+  bool changed_ = false;  // the frame at hand has been changed
   std::array<std::uint64_t, 4> closures_{};
 };
 

@@ -1,5 +1,5 @@
-// The second step of a repair, on the map as the worker edits it: what refers to something lost lets go of it, sessions
-// hang together again, and numbers that cannot be are replaced by the best that is known.
+// The second step of a repair, on the map as the worker edits it: references to what is lost are removed, sessions are
+// joined again, and impossible numbers are replaced by the best that is known.
 #pragma once
 
 #include "storage/maintenance/repair.h"
@@ -7,7 +7,7 @@
 
 namespace relmap::storage {
 
-// Edits `map`, and commits whenever `dirty_bytes` are reached; the last edits are the caller's to commit. Throws
+// Edits `map`, and commits whenever `dirty_bytes` are dirty. The caller has to commit the last edits. Throws
 // StatusError.
 void mend_references(Map& map, std::size_t dirty_bytes, RepairSummary& summary, const OnFinding& told,
                      const OnProgress& on_progress);

@@ -1,4 +1,4 @@
-// A folder for what is broken, so that nothing is ever deleted for good by a repair.
+// A folder for what is broken, so that a repair never deletes anything for good.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ class Quarantine {
  public:
   explicit Quarantine(std::string directory) : directory_(std::move(directory)), files_(posix_file_system()) {}
 
-  // Durable on return, under `name` or name.2, name.3 ...; IO_ERROR.
+  // Writes `bytes` to the file `name` or, if that exists, name.2, name.3 ...; durable on return. IO_ERROR.
   Status keep(const std::string& name, ByteSpan bytes);
   bool used() const { return used_; }
   const std::string& directory() const { return directory_; }

@@ -6,9 +6,9 @@
 namespace relmap::storage {
 namespace {
 
-constexpr int kRounds = 4;  // what is rebuilt in one (incoming edges) others follow from (support)
+constexpr int kRounds = 4;  // what one round rebuilds (incoming edges) other items follow from (support)
 
-// What a derived item should be, into the map.
+// Writes a derived item to the map as it should be.
 void rebuild(Map& map, const Difference& difference) {
   FrameHot& frame = map.edit_hot(difference.frame);
   switch (difference.kind) {
@@ -43,7 +43,7 @@ void throw_if(const Status& status) {
   if (!status.ok()) throw StatusError(status);
 }
 
-// One round: how many items it put right.
+// One round. Returns how many items it corrected.
 std::uint64_t rebuild_once(Map& map, Engine& engine, std::size_t memory_bytes, const OnFinding& on_finding,
                            const OnProgress& on_progress) {
   std::uint64_t rebuilt = 0;

@@ -1,4 +1,4 @@
-// What is derived in a map (storage/graph/frame.h), worked out anew from the facts.
+// Computes what is derived in a map (storage/graph/frame.h) anew from the facts.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +11,10 @@
 
 namespace relmap::storage {
 
-// Puts right what is derived and is not as it should be, and commits: how many items there were. `map` is the engine's,
-// as it was last committed, and nobody else works on it. Each item is told as a finding that was mended. Interrupted,
-// it can be run again. IO_ERROR, STALE_OWNER; SHUTTING_DOWN if `on_progress` said so; INTERNAL if it did not help.
+// Corrects what is derived and is not as it should be, commits, and returns the number of items corrected. `map` must
+// be that of `engine`, as it was last committed, and nobody else may work on it. Each item is reported as a finding
+// that was repaired. If interrupted, it can be run again. IO_ERROR, STALE_OWNER; SHUTTING_DOWN if `on_progress` said
+// so; INTERNAL if something is still wrong afterwards.
 Result<std::uint64_t> rebuild_derived(Map& map, Engine& engine, std::size_t memory_bytes, const OnFinding& on_finding,
                                       const OnProgress& on_progress);
 

@@ -9,13 +9,13 @@
 namespace relmap::storage {
 namespace {
 
-// What one chunk's worth of items takes, to begin with; found to be more, the chunks are taken fewer at a time.
+// First guess of the bytes that the items of one chunk take. If they take more, fewer chunks are taken at a time.
 constexpr std::size_t kChunkBytes = std::size_t{128} << 10;
 constexpr std::size_t kNodeBytes = 64;  // of a map's node, with its key
 
 struct TooMuch {};
 
-// Items of some chunks, as they follow from the facts.
+// The derived items of some chunks, as they follow from the facts.
 class Expected {
  public:
   // `chunks`: ascending.
@@ -90,7 +90,7 @@ class Recount {
     return ids;
   }
 
-  // As many chunks at a time as fit.
+  // Calls `work` with as many chunks at a time as fit.
   template <typename Work>
   void in_batches(const std::vector<ChunkId>& ids, Work work) {
     std::size_t batch = std::max<std::size_t>(1, limit_ / 2 / kChunkBytes);
@@ -163,7 +163,7 @@ class Recount {
     for (auto& [id, list] : expected.unreached) sort_unique(list);
   }
 
-  // A place may have been passed by thousands; no list is longer than kMaxObservers.
+  // Thousands may have passed a place, but no list is longer than kMaxObservers.
   void keep_earliest(std::vector<FrameId>* list) const {
     const auto earlier = [&](FrameId l, FrameId r) { return taken_in(*graph_.hot(l)) < taken_in(*graph_.hot(r)); };
     std::sort(list->begin(), list->end(), earlier);

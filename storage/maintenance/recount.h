@@ -1,4 +1,4 @@
-// Where the sums of a ChunkTable are not zero, what is derived is worked out again from the facts, item by item, and
+// Where the sums of a ChunkTable are not zero, derived fields are computed again from the facts, item by item, and
 // compared with what is stored.
 #pragma once
 
@@ -11,10 +11,11 @@
 
 namespace relmap::storage {
 
-// What a frame's derived fields should be where they are not; empty optionals: as they are.
+// A derived field of a frame that is not as it should be, with its right value. `kind` says which of the members are
+// set.
 struct Difference {
   Derived kind = Derived::kIncoming;
-  FrameId frame;     // that holds the item
+  FrameId frame;     // the frame that holds the item
   std::string what;  // in words
 
   std::vector<EdgeId> incoming;      // kIncoming: all of the frame's
@@ -26,8 +27,8 @@ struct Difference {
   std::vector<EdgeId> closures;      //   all that agree with it, or say that the robot was carried along it
 };
 
-// Holds `memory_bytes` at most: what is more is done in several passes over the facts. Returns the most it held.
-// `progress` is told frames done, and may throw.
+// Holds `memory_bytes` at most; if that is not enough, it makes several passes over the facts. Returns the most that it
+// held. `progress` is called with the number of frames done, and may throw.
 std::size_t recount_derived(const EngineSnapshot& snapshot, const StoredGraph& graph, ChunkTable& table,
                             std::size_t memory_bytes, const std::function<void(const Difference&)>& differs,
                             const std::function<void(std::uint64_t)>& progress);

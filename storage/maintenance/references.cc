@@ -26,7 +26,8 @@ bool has_gone(const StoredGraph& graph, FrameId frame) {
   return session && is_removed(*session, frame);
 }
 
-// Complaints of one kind are counted, not listed: what a lost frame leaves behind is one line a frame.
+// Counts complaints of one kind instead of listing them: a lost frame then causes one line for each frame that refers
+// to it.
 class Tally {
  public:
   void note(const std::string& example) {
@@ -82,18 +83,18 @@ void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const Fra
     complain(name + ": the closures that carry it are not sorted");
 }
 
-// Whether the list of a landmark's observers, as stored, should have this one: all of a list that is not full, and of a
-// full one all that came before its last.
+// Whether the stored list of a landmark's observers should have this one: always if the list is not full, otherwise if
+// this one was taken in no later than the list's last one.
 bool belongs_to_first(const Graph& graph, LandmarkId landmark, FrameId observer) {
   const auto base = graph.hot(landmark.base);
   if (landmark.slot >= base->landmarks.size()) return true;
   const auto& list = base->landmarks[landmark.slot].observers;
-  if (!is_settled(list)) return true;
+  if (!is_fixed(list)) return true;
   const auto last = graph.hot(list.back()), own = graph.hot(observer);
   return !last || !own || taken_in(*own) <= taken_in(*last);
 }
 
-// What was said of a session that has been deleted, by a closure that was not in force, is void and no damage.
+// A reference to a deleted session by a closure that was not in force is void, and no damage.
 void note_lost(const StoredGraph& graph, LandmarkId landmark, Tally& lost) {
   if (!has_gone(graph, landmark.base)) lost.note(landmark.to_string());
 }
@@ -128,7 +129,7 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
     const Landmark& landmark = frame.landmarks[slot];
     const LandmarkId self{id, slot};
     for (const AliasClaim& claim : landmark.claims) {
-      if (claim.target.valid()) {  // else it says that there is no need of the landmark
+      if (claim.target.valid()) {  // otherwise it says that the landmark is not needed
         const auto target = graph.hot(claim.target.base);
         if (!target || claim.target.slot >= target->landmarks.size())
           note_lost(graph, claim.target, lost_targets);

@@ -1,5 +1,5 @@
-// The references of frames to each other, and what is derived from them (storage/graph/frame.h): whether they lead
-// anywhere, and into the sums of a ChunkTable.
+// The references of frames to each other, and what is derived from them (storage/graph/frame.h): checks that they lead
+// somewhere, and adds them to the sums of a ChunkTable.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,8 @@ class SightedPaths {
  public:
   explicit SightedPaths(const Graph& graph) : local_(graph) {}
 
-  // For each landmark in force that a frame sees: the landmark and the edges of the path; null: out of reach.
+  // Called for each landmark in force that a frame sees, with the edges of the path from the landmark's base; null if
+  // the frame is out of reach or the landmark is not needed.
   using Visit = std::function<void(LandmarkId, const std::vector<EdgeId>*)>;
   void visit(FrameId frame, const FrameWarm& warm, const Visit& visit);
 
@@ -28,13 +29,13 @@ class SightedPaths {
   std::vector<EdgeId> edges_;
 };
 
-// References of one frame, its observations excepted.
+// The references of one frame, except those of its observations.
 void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameHot& frame,
                         const Complain& complain);
 void add_observations(const StoredGraph& graph, ChunkTable& table, SightedPaths& paths, FrameId id,
                       const FrameWarm& frame, const Complain& complain);
 
-// Whether it can be supported at all by what the map stores: a prior edge always keeps its prior.
+// Whether an edge with this support keeps its prior. A prior edge always does.
 inline bool needs_prior(const Edge& edge, std::uint32_t support) {
   return edge.kind == EdgeKind::kPrior || support < kMinSupport;
 }

@@ -62,7 +62,7 @@ class Reindexer {
     commit({{keys::map_state(), encode_state(state_)}}, {});
   }
 
-  // The chunks in which a daemon looks for words.
+  // Goes through the chunks in which a daemon looks for words.
   void remake(const Session& session) {
     if (session.frames == 0) return;
     const std::uint32_t last = chunk_of({session.number, session.last});
@@ -105,7 +105,7 @@ class Reindexer {
     return words;
   }
 
-  // Words of the former vocabulary would be mistaken for this one's.
+  // The frames get no words, since those of the former vocabulary would be mistaken for words of this one.
   void lose(const PartDamage& damage) {
     const auto frames = static_cast<std::uint64_t>(__builtin_popcountll(damage.slots));
     summary_.unreadable += frames == 0 ? 1 : frames;

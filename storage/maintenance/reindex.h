@@ -1,4 +1,4 @@
-// Makes the words of a map anew, with another vocabulary, from the features that it keeps. Nothing else changes.
+// Makes the words of a map anew from its features, with another vocabulary. Nothing else changes.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,13 @@ struct ReindexSummary {
   std::uint32_t former_crc = 0;          // the vocabulary before; 0: none, or a reindex was interrupted
 };
 
-// A map that no daemon works on: takes the engine over, and leaves it committed. The first commit says that the words
-// are of no vocabulary, which every daemon refuses; then chunk by chunk; the last says which they are of. So
-// interrupted at any point it leaves a map that is whole but for its words, and can be run again, with any vocabulary.
-// What the journal holds beyond the last commit has no words yet. Holds the features of one chunk in memory, and works
-// with as many threads as there are processors. IO_ERROR, DISK_FULL, STALE_OWNER; DATA_LOSS if sessions or state cannot
-// be read (nothing is changed then); SHUTTING_DOWN if `on_progress` said so.
+// For a map that no daemon works on: takes the engine over, and leaves it committed. The first commit says that the
+// words are of no vocabulary, which every daemon refuses. Then follow the chunks, one by one; the last commit says
+// which vocabulary the words are of. So if it is interrupted at any point, the map is whole but for its words, and
+// reindex can be run again with any vocabulary. Records of the journal behind the last commit have no words yet. Holds
+// the features of one chunk in memory, and works with as many threads as there are processors. IO_ERROR, DISK_FULL,
+// STALE_OWNER; DATA_LOSS if sessions or state cannot be read (nothing is changed then); SHUTTING_DOWN if `on_progress`
+// said so.
 Result<ReindexSummary> reindex(const std::shared_ptr<Engine>& engine, const WordFunction& words,
                                std::uint32_t vocabulary_crc, const OnFinding& on_finding,
                                const OnProgress& on_progress);

@@ -32,7 +32,7 @@ WordFunction words_of(const std::shared_ptr<const place::Vocabulary>& vocabulary
 
 using Table = std::map<std::string, Bytes>;
 
-// All that is stored, the words and the map's state apart.
+// All that is stored, except the words and the map's state.
 Table all_but_words(const EngineSnapshot& snapshot) {
   Table table;
   EXPECT_TRUE(snapshot
@@ -156,7 +156,7 @@ TEST_F(ReindexTest, WhatTheJournalStillHoldsGetsItsWordsWhenItIsApplied) {
   EXPECT_EQ(mapper->places().size(), kWithAppearance + 1);
 }
 
-TEST_F(ReindexTest, WordsThatAreItsOwnAreLeftAlone) {
+TEST_F(ReindexTest, WordsOfTheSameVocabularyAreLeftAlone) {
   const auto engine = make_memory_engine();
   make_map(engine);
   ASSERT_TRUE(run(engine, other_).or_throw().changed);

@@ -42,7 +42,8 @@ class Repair {
         if (on_finding_) on_finding_(finding);
       };
       const auto done = rebuild_derived(*map, *engine_, options_.memory_bytes, count, on_progress_);
-      if (!done.ok() && done.reason() != Reason::INTERNAL) throw StatusError(done.status());  // else: see `remaining`
+      if (!done.ok() && done.reason() != Reason::INTERNAL)
+        throw StatusError(done.status());  // INTERNAL shows in `remaining`
       summary_.changed = summary_.changed || rebuilt > 0;
       summary_.rebuilt += rebuilt;
     }

@@ -1,5 +1,5 @@
-// Makes a damaged map whole again, and says what that cost. What is broken is moved aside, what is derived is rebuilt,
-// what refers to something lost is mended; a sound map is left as it is.
+// Makes a damaged map whole again, and says what that cost. What is broken is moved to quarantine, what is derived is
+// rebuilt, and references to what is lost are mended. A sound map is left as it is.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ struct RepairSummary {
   std::string quarantine;  // the folder to which broken things were moved; empty: none were
 
   std::vector<SessionNumber> lost_sessions;
-  std::vector<FrameRange> lost_frames;            // settled as gaps, with reason DATA_LOSS
+  std::vector<FrameRange> lost_frames;            // recorded as gaps, with reason DATA_LOSS
   std::vector<RecordRange> lost_records;          // of the journal
   std::uint64_t frames_without_observations = 0;  // their warm part was lost
   std::uint64_t frames_without_appearance = 0;    // their cold part was lost
@@ -40,11 +40,11 @@ struct RepairSummary {
   std::uint64_t quarantined_edges = 0;  // closures with a lost frame
   std::uint64_t bridges = 0;            // prior edges over lost frames, by the robot's own odometry
   std::uint64_t rebuilt = 0;            // derived items that were wrong
-  std::uint64_t remaining = 0;          // findings of a last verify; anything but 0 is a fault of repair itself
+  std::uint64_t remaining = 0;          // findings of a last verify; anything but 0 is a bug of repair itself
 };
 
-// A map that no daemon works on: takes the engine over, and leaves it committed. Broken records go to files in
-// `quarantine`, a folder that is made when it is needed. Interrupted at any point, it can be run again. IO_ERROR,
+// For a map that no daemon works on: takes the engine over, and leaves it committed. Broken records go to files in the
+// folder `quarantine`, which is made when it is needed. If interrupted at any point, it can be run again. IO_ERROR,
 // STALE_OWNER; DATA_LOSS if nothing can be saved.
 //
 // storage/rocksdb/repair_folder.h does this for a data folder, damaged files of RocksDB and of the journal included.

@@ -76,7 +76,7 @@ class RepairTest : public ::testing::Test {
     return files;
   }
 
-  // What every repair must leave: a sound map, by both judges; and nothing to do for a second one.
+  // What every repair must leave: a map that verify and the oracle find sound, and nothing to do for a second repair.
   RepairSummary repaired() {
     const auto first = repair(engine, folder / "quarantine", {}, {}, {}).or_throw();
     EXPECT_EQ(first.remaining, 0u);
@@ -118,7 +118,7 @@ TEST_F(RepairTest, ASoundMapIsLeftAsItIs) {
 }
 
 // What a later version writes: under keys of its own, and in the extensions of what is rewritten.
-TEST_F(RepairTest, WhatItDoesNotKnowIsKept) {
+TEST_F(RepairTest, WhatALaterVersionWroteIsKept) {
   const Table later{{"x", {1}}, {"zone/1", {2}}, {"\xff\xff", {3}}};
   for (const auto& [key, value] : later) put(key, value);
   const Extensions unknown = {{1000, {1, 2, 3}}};
@@ -186,27 +186,27 @@ TEST_F(RepairTest, AFlippedHotBodyCostsItsFrameAlone) {
   EXPECT_EQ(bridge.reason, Reason::DATA_LOSS);
   EXPECT_TRUE(build_path_tree(*map, {1, 120}).find({1, 135}));
   const Session session = *map->session(1);
-  std::vector<Settled> settled;
-  map->visit_settled(1, 0, [&](const Settled& item) { return settled.push_back(item), true; });
-  EXPECT_THAT(settled, ElementsAre(Settled{127, 127, 0, false, Reason::DATA_LOSS}));
+  std::vector<Skipped> skipped;
+  map->visit_skipped(1, 0, [&](const Skipped& item) { return skipped.push_back(item), true; });
+  EXPECT_THAT(skipped, ElementsAre(Skipped{127, 127, 0, false, Reason::DATA_LOSS}));
   EXPECT_EQ(session.given_up, 1u);
   EXPECT_EQ(session.frames, kDrivenFrames - 1);
 }
 
-TEST_F(RepairTest, WhatIsSettledAndCannotBeReadIsSettledAsLost) {
+TEST_F(RepairTest, UnreadableSkippedSequencesAreRecordedAsLost) {
   auto map = open_map(engine);
-  map->settle(1, {kDrivenFrames, kDrivenFrames + 4, 7, true, Reason::TRUNCATED});
-  map->settle(1, {kDrivenFrames + 5, kDrivenFrames + 9, 0, false, Reason::DROPPED_BY_ROBOT});
+  map->skip(1, {kDrivenFrames, kDrivenFrames + 4, 7, true, Reason::TRUNCATED});
+  map->skip(1, {kDrivenFrames + 5, kDrivenFrames + 9, 0, false, Reason::DROPPED_BY_ROBOT});
   map->state().gaps += 5;
   map->state().pending.insert({1, 100});
   ASSERT_TRUE(map->commit().ok());
   EXPECT_THAT(verified(*engine->snapshot()).findings, IsEmpty());
   sound = table_of(*engine->snapshot());
-  flip(keys::settled(1, kDrivenFrames + 4), 9);
+  flip(keys::skipped(1, kDrivenFrames + 4), 9);
   flip(keys::pending({1, 1}), 9);
   const Verified broken = verified(*engine->snapshot());
-  EXPECT_TRUE(broken.names("what session 1 settled without a frame"));
-  EXPECT_TRUE(broken.names("missing, and not settled"));
+  EXPECT_TRUE(broken.names("skipped sequences of session 1"));
+  EXPECT_TRUE(broken.names("missing, and not recorded as skipped"));
   EXPECT_TRUE(broken.names("frames that wait for relaxation in chunk 1:1"));
   const RepairSummary summary = repaired();
   EXPECT_THAT(summary.lost_frames, ElementsAre(FrameRange{1, kDrivenFrames, kDrivenFrames + 4}));
@@ -238,7 +238,7 @@ TEST_F(RepairTest, TheLastChunkLostLeavesTheOneBeforeOpen) {
   EXPECT_EQ(open_map(engine)->hot({1, 127})->mean_error, 0.25f);
 }
 
-TEST_F(RepairTest, TheFirstFramesLost) {
+TEST_F(RepairTest, LosingTheFirstFramesBeginsTheSessionLater) {
   flip(keys::part(Part::kHot, {1, 0}), 20);
   const RepairSummary summary = repaired();
   EXPECT_THAT(summary.lost_frames, ElementsAre(FrameRange{1, 0, 63}));
@@ -264,7 +264,7 @@ TEST_F(RepairTest, ALostWarmPartLeavesAFrameWithoutObservations) {
   EXPECT_EQ(readable(), kDrivenFrames);
 }
 
-TEST_F(RepairTest, ALostWarmChunk) {
+TEST_F(RepairTest, ALostWarmChunkLeavesFramesWithoutObservations) {
   erase(keys::part(Part::kWarm, kClosed));
   EXPECT_TRUE(verified(*engine->snapshot()).names("warm part of frame 1:100: missing"));
   EXPECT_EQ(repaired().frames_without_observations, kFramesPerChunk);
@@ -288,13 +288,13 @@ TEST_F(RepairTest, LostWordsLeaveTheFeatures) {
   EXPECT_EQ(open_map(engine)->cold(kInClosed)->appearance.size(), kDrivenFeatures);
 }
 
-TEST_F(RepairTest, ARecordOfAnotherFrameIsNone) {
+TEST_F(RepairTest, ARecordOfAnotherFrameCountsAsLost) {
   put(keys::frame(Part::kHot, kInOpen), sound.at(keys::frame(Part::kHot, {1, 141})));
   EXPECT_TRUE(verified(*engine->snapshot()).names("hot part of frame 1:140: the record is of another frame"));
   EXPECT_THAT(repaired().lost_frames, ElementsAre(FrameRange{1, 140, 140}));
 }
 
-TEST_F(RepairTest, PartsOfFramesThatAreNotThere) {
+TEST_F(RepairTest, PartsOfFramesThatDoNotExistAreDropped) {
   put(keys::frame(Part::kCold, {1, 149}), sound.at(keys::frame(Part::kCold, {1, 149})));
   erase(keys::frame(Part::kHot, {1, 149}));
   EXPECT_TRUE(verified(*engine->snapshot()).names("cold part of frame 1:149: there is no such frame"));
@@ -317,7 +317,7 @@ TEST_F(RepairTest, WithoutItsStateTheMapCountsAnew) {
   EXPECT_GT(open_map(engine)->state().closures_accepted, 0u);
 }
 
-TEST_F(RepairTest, WhateverByteIsFlipped) {
+TEST_F(RepairTest, AnyFlippedBytesAreRepaired) {
   std::mt19937 rng(11);
   std::vector<std::string> keys;
   for (const auto& [key, value] : sound)

@@ -8,7 +8,7 @@
 #include "storage/format/frame_codec.h"
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
-#include "storage/maintenance/settled_cursor.h"
+#include "storage/maintenance/skipped_cursor.h"
 #include "storage/maintenance/stored_graph.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
@@ -17,7 +17,7 @@ namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kBatchBytes = std::size_t{8} << 20;
-constexpr std::size_t kChunkKey = 9;  // of a closed chunk's part; that of a frame is longer
+constexpr std::size_t kChunkKey = 9;  // length of the key of a closed chunk's part; that of a frame's is longer
 
 void encode(ByteWriter& w, FrameId id, const FrameHot& frame) { encode_hot(w, id, frame); }
 void encode(ByteWriter& w, FrameId id, const FrameWarm& frame) { encode_warm(w, id, frame); }
@@ -61,7 +61,7 @@ class Rewriter {
       throw StatusError(Status(Reason::SHUTTING_DOWN, "the repair was stopped; it can be run again"));
   }
 
-  // Into quarantine, if it can be read at all; out of the map.
+  // Moves a value to quarantine, if it can be read at all, and removes it from the map.
   void remove(const std::string& key, const std::string& name) {
     const auto value = snapshot_->get(key);
     if (value.ok() && !*value) return;
@@ -93,14 +93,14 @@ class Rewriter {
     batch_bytes_ = 0;
   }
 
-  // Without its record nobody knows the robot, the camera or the uuid: its frames cannot be used.
+  // Without a session's record nobody knows the robot, the camera or the uuid, so its frames cannot be used.
   void lose_session(SessionNumber number, const std::string& key, const std::string& what) {
     if (number != 0) summary_.lost_sessions.push_back(number);
     tell(Reason::DATA_LOSS, {}, what + "; the session is lost, its frames are kept in quarantine");
     if (!key.empty()) remove(key, "session-" + std::to_string(number));
     if (number == 0) return;
-    (void)snapshot_->scan(keys::settled_in(number), [&](std::string_view settled, ByteSpan) {
-      deletes_.insert(std::string(settled));
+    (void)snapshot_->scan(keys::skipped_in(number), [&](std::string_view skipped, ByteSpan) {
+      deletes_.insert(std::string(skipped));
       return true;
     });
     lose_parts<FrameHot>(number);
@@ -164,7 +164,7 @@ class Rewriter {
     });
     for (; next != present.end(); ++next) absent(*next, next->second);
   }
-  // Every frame has observations, if only none; a frame without features needs neither cold part nor words.
+  // Every frame needs a warm part, be it empty. A frame without features needs neither a cold part nor words.
   template <typename Frame>
   bool needed(ChunkId id, std::uint64_t slots) {
     if (slots == 0 || kPartOf<Frame> == Part::kWarm) return slots != 0;
@@ -173,7 +173,7 @@ class Rewriter {
       if (((slots >> slot) & 1) && hot.frames[slot] && hot.frames[slot]->appearance_count > 0) return true;
     return false;
   }
-  // Features and words as many as the frame says.
+  // Whether there are as many features or words as the frames say.
   template <typename Frame>
   bool counts_agree(const StoredPart<Frame>& part) {
     if constexpr (kPartOf<Frame> == Part::kCold || kPartOf<Frame> == Part::kWords) {
@@ -230,7 +230,7 @@ class Rewriter {
     summary_.changed = summary_.changed || reshape;
     move_away(cold), move_away(words);
   }
-  // The number of its features, which the hot part has to say too.
+  // Returns the number of the frame's features, and makes the hot part say the same.
   std::uint32_t mend_appearance(FrameId id, std::shared_ptr<const FrameHot>& hot, const FrameCold* cold,
                                 bool& hot_changed) {
     const auto features = static_cast<std::uint32_t>(cold ? cold->appearance.size() : 0);
@@ -256,7 +256,7 @@ class Rewriter {
     if (damage.slots == 0) return {};
     return frame_in(damage.chunk, static_cast<std::uint32_t>(__builtin_ctzll(damage.slots)));
   }
-  // A part of a frame that is not there. True if there was one.
+  // Drops a part of a frame that does not exist. Returns true if there was one.
   template <typename Frame>
   bool drop(StoredPart<Frame>& part, std::uint32_t slot) {
     if (!part.frames[slot]) return false;
@@ -271,7 +271,7 @@ class Rewriter {
     }
     return true;
   }
-  // The damaged records of parts that stand frame by frame for good.
+  // Moves the damaged records of a part that is always stored frame by frame.
   template <typename Frame>
   void move_away(const StoredPart<Frame>& part) {
     for (const PartDamage& damage : part.damage) remove(damage.key, name_of(kPartOf<Frame>, part.id, damage.key));
@@ -282,8 +282,7 @@ class Rewriter {
     encode(body, frame, value);
     return frame_container(kPartOf<Frame>, frame, snapshot_->commit_number() + 1, body.bytes());
   }
-  // A hot or warm part anew, in place of all that stood there; what stood there is kept aside if some of it is
-  // lost.
+  // Writes a hot or warm part anew in place of all that stood there, which goes to quarantine if some of it is lost.
   template <typename Frame>
   void store(const StoredPart<Frame>& part, bool open, bool lost) {
     constexpr Part kPart = kPartOf<Frame>;
@@ -308,25 +307,26 @@ class Rewriter {
     if (any && !open) put(keys::part(kPart, part.id), writer.finish());
   }
 
-  // The session's record says what is there; what is neither there nor settled is settled as lost.
+  // Makes the session's record say what is there. A sequence that is neither there nor skipped is recorded as lost.
   void mend_record(const Session& session, const std::map<std::uint32_t, std::uint64_t>& present) {
     Session mended = session;
     mended.frames = mended.first = mended.last = 0;
     mended.refused = mended.given_up = 0;
-    SettledCursor old(*snapshot_, session.number, [&](const std::string& key, const std::string& what) {
-      if (key.empty()) throw StatusError(Status(Reason::IO_ERROR, what));  // what is behind it must not be lost
+    SkippedCursor old(*snapshot_, session.number, [&](const std::string& key, const std::string& what) {
+      if (key.empty()) throw StatusError(Status(Reason::IO_ERROR, what));  // the records behind it must not be lost
       tell(Reason::DATA_LOSS, {}, what);
       remove(key, "settled-" + std::to_string(session.number));
     });
-    bool intact = false, changed = false;  // the old one that stands is wanted as it is; some was not
+    bool intact = false,
+         changed = false;  // `intact`: the record at `old` stays as it is; `changed`: some record does not
     const auto pass = [&] {
-      if (!intact) deletes_.insert(keys::settled(session.number, old.get()->to)), changed = true;
+      if (!intact) deletes_.insert(keys::skipped(session.number, old.get()->to)), changed = true;
       intact = false;
       old.next();
     };
     std::uint64_t next = 0;
-    // Absent sequences next..end - 1: those settled before stay so.
-    const auto settle = [&](std::uint64_t end) {
+    // Records the absent sequences next..end - 1 as skipped. Those that were skipped before stay so.
+    const auto record_absent = [&](std::uint64_t end) {
       while (next < end) {
         while (old.get() && (old.get()->to < next || old.get()->from > old.get()->to)) pass();
         const bool known = old.get() && old.get()->from <= next;
@@ -335,7 +335,7 @@ class Rewriter {
           to = std::min<std::uint64_t>(to, old.get()->to);
         else if (old.get())
           to = std::min<std::uint64_t>(to, old.get()->from - 1);
-        Settled item = known ? *old.get() : Settled{0, 0, 0, false, Reason::DATA_LOSS};
+        Skipped item = known ? *old.get() : Skipped{0, 0, 0, false, Reason::DATA_LOSS};
         if (!is_reason(static_cast<std::uint16_t>(item.reason))) item.reason = Reason::DATA_LOSS;
         item.from = static_cast<std::uint32_t>(next);
         item.to = static_cast<std::uint32_t>(to);
@@ -343,7 +343,7 @@ class Rewriter {
         if (known && item == *old.get())
           intact = true;
         else
-          put(keys::settled(session.number, item.to), encode_settled(item)), changed = true;
+          put(keys::skipped(session.number, item.to), encode_skipped(item)), changed = true;
         if (!known) lose_frames({session.number, item.from, item.to});
         next = to + 1;
       }
@@ -352,13 +352,13 @@ class Rewriter {
       for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
         if (!((slots >> slot) & 1)) continue;
         const FrameId frame = frame_in({session.number, chunk}, slot);
-        settle(frame.index);
+        record_absent(frame.index);
         next = std::uint64_t{frame.index} + 1;
         if (mended.frames++ == 0) mended.first = frame.index;
         mended.last = frame.index;
       }
-    settle(end_of(session));
-    if (is_going(session)) {  // what was settled behind its end tells of frames that have gone
+    record_absent(end_of(session));
+    if (is_going(session)) {  // what was skipped behind its end stays recorded, though the frames have been removed
       for (; old.get() && old.get()->from <= old.get()->to; old.next())
         (old.get()->refused ? mended.refused : mended.given_up) += std::uint64_t{old.get()->to} - old.get()->from + 1;
     } else {
@@ -386,7 +386,7 @@ class Rewriter {
     summary_.lost_frames.push_back(range);
     tell(Reason::DATA_LOSS, {range.session, range.first},
          "frames " + FrameId{range.session, range.first}.to_string() + ".." + std::to_string(range.last) +
-             " are lost, and settled as a gap");
+             " are lost; they are recorded as a gap");
   }
 
   // The index has every label of every frame, and no other.

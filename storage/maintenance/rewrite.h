@@ -1,6 +1,6 @@
 // The first step of a repair, on the bytes as they are stored: what is broken goes to quarantine, what is whole beside
-// it stays, and every frame that has a hot part has the other parts too, empty ones in place of those that were lost.
-// Afterwards the map can be opened as any other.
+// it stays, and every frame that has a hot part gets the other parts too, empty ones in place of those that were lost.
+// Afterwards the map can be opened like any other.
 #pragma once
 
 #include "storage/maintenance/quarantine.h"

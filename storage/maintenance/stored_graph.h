@@ -1,6 +1,6 @@
-// The graph as it stands in a snapshot, read past whatever is damaged: a frame that cannot be read is not there. Chunks
-// are decoded into a cache of its own, bounded in bytes, so that a walk over the whole map does not push out of the
-// daemon's cache what its callers need.
+// The graph as it stands in a snapshot, read past whatever is damaged: a frame that cannot be read does not exist.
+// Chunks are decoded into a cache of its own, bounded in bytes, so that a walk over the whole map does not evict from
+// the daemon's cache what its callers need.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@
 
 #include "storage/graph/graph.h"
 #include "storage/maintenance/stored_parts.h"
-#include "storage/map/settled_index.h"
+#include "storage/map/skipped_index.h"
 
 namespace relmap::storage {
 
-// Used by one thread.
+// For one thread.
 class StoredGraph final : public Graph {
  public:
   StoredGraph(const EngineSnapshot& snapshot, std::vector<Session> sessions, std::size_t cache_bytes)
@@ -26,8 +26,8 @@ class StoredGraph final : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override { return sessions_; }
   std::optional<Session> session(SessionNumber number) const override;
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
-    relmap::storage::visit_settled(snapshot_, {}, session, sequence, visit);
+  void visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const override {
+    relmap::storage::visit_skipped(snapshot_, {}, session, sequence, visit);
   }
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;

@@ -11,7 +11,7 @@ constexpr std::size_t kCacheBytes = std::size_t{16} << 20;
 
 [[noreturn]] void lost(const std::string& what) { throw StatusError(Status(Reason::DATA_LOSS, what)); }
 
-// Frames in their order, a chunk at a time; where something is damaged, no map.
+// Gives frames that are asked for in order, a chunk at a time. Throws where something is damaged.
 class WholeGraph final : public ForwardingGraph<Graph> {
  public:
   using Progress = std::function<Status(std::uint64_t done, std::uint64_t total)>;

@@ -9,8 +9,8 @@
 
 namespace relmap::storage {
 
-// `progress`: frames done, of those that the sessions have; what it answers, if not ok, ends it with just that.
-// DATA_LOSS naming what cannot be read.
+// `progress` is called with the frames done and the number of frames that the sessions have. If it returns a status
+// other than OK, the hash ends with that status. DATA_LOSS naming what cannot be read.
 Result<MapHash> hash_stored(const EngineSnapshot& snapshot,
                             const std::function<Status(std::uint64_t done, std::uint64_t total)>& progress);
 

@@ -12,24 +12,24 @@ namespace {
 
 constexpr std::size_t kFamily = 1, kSessionKey = kFamily + 4, kChunkKey = kSessionKey + 4, kFrameKey = kChunkKey + 1;
 
-// The chunk of a part's key; nullopt: it is none of ours.
+// The chunk of a part's key; nullopt if it is not the key of a part.
 std::optional<ChunkId> chunk_of_key(std::string_view key) {
   if (key.size() != kChunkKey && key.size() != kFrameKey) return std::nullopt;
   const auto frame = keys::frame_of(std::string(key.substr(0, kChunkKey)) + '\0');
   return frame ? std::optional<ChunkId>(chunk_id(*frame)) : std::nullopt;
 }
 
-// Walks the keys of a part of a session in their order. A scan that breaks is taken up behind the break: over ever
-// longer prefixes, which narrows the break down, and at last key by key.
+// Walks the keys of a part of a session in their order. A scan that breaks off is resumed behind the break: over longer
+// and longer prefixes, which narrow the break down, and at last key by key.
 class Walk {
  public:
   Walk(const EngineSnapshot& snapshot, ChunkSpan span, const VisitRecord& visit)
       : snapshot_(snapshot), span_(span), visit_(visit) {}
 
-  // Keys that begin with `prefix`, the lowest of whose chunks is `first`. False: told to stop.
+  // Visits the keys that begin with `prefix`; `first` is the lowest chunk that they can have. False if told to stop.
   bool run(const std::string& prefix, std::uint32_t first) {
     const Status scanned = snapshot_.scan(prefix, [&](std::string_view key, ByteSpan value) {
-      if (key <= last_) return true;  // told before the break
+      if (key <= last_) return true;  // visited before the break
       last_ = key;
       going_ = visit_(key, value, Status());
       return going_;
@@ -64,7 +64,7 @@ class Walk {
   const EngineSnapshot& snapshot_;
   const ChunkSpan span_;
   const VisitRecord& visit_;
-  std::string last_;  // the last key told
+  std::string last_;  // the last key visited
   bool going_ = true;
 };
 

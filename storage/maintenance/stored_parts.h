@@ -1,4 +1,4 @@
-// What stands in a snapshot under the keys of one part of a session, read past whatever is damaged: where the loader of
+// What stands in a snapshot under the keys of one part of a session, read past whatever is damaged. Where the loader of
 // the map stops (storage/map/part_loader.h), this goes on, frame by frame, and names what it could not read.
 #pragma once
 
@@ -18,7 +18,7 @@ struct PartDamage {
   Part part = Part::kHot;
   std::string key;
   ChunkId chunk;
-  std::uint64_t slots = 0;  // bit by slot: the frames lost with it; 0: it cannot be told which
+  std::uint64_t slots = 0;  // bit by slot: the frames lost with it; 0: it is not known which
   std::string what;         // "hot part of frame 3:120: CORRUPT: ..."
 };
 
@@ -28,7 +28,7 @@ struct StoredPart {
   ChunkId id;
   Slots<Frame> frames;
   std::vector<PartDamage> damage;
-  std::vector<std::string> keys;  // under which it stands: that of the chunk, or those of its frames
+  std::vector<std::string> keys;  // where it is stored: the key of the chunk, or those of its frames
   std::size_t bytes = 0;          // in memory
 
   std::uint64_t present() const {  // bit by slot
@@ -42,19 +42,19 @@ using FrameWords = std::vector<std::uint32_t>;
 template <>
 inline constexpr Part kPartOf<FrameWords> = Part::kWords;
 
-// Chunks in which a session can have frames: where the keys themselves cannot be read, these are tried one by one.
+// The chunks in which a session can have frames. Where the keys themselves cannot be read, these are tried one by one.
 struct ChunkSpan {
   std::uint32_t first = 0, last = 0;
 };
 
-// Every record of a part of a session in the order of the keys, with its value or the reason why there is none, until
-// `visit` returns false. False if it did.
+// Visits every record of a part of a session in the order of the keys, with its value or the reason why there is none,
+// until `visit` returns false. Returns false if it did.
 using VisitRecord = std::function<bool(std::string_view key, ByteSpan value, const Status& status)>;
 bool for_each_record(const EngineSnapshot& snapshot, Part part, SessionNumber session, ChunkSpan span,
                      const VisitRecord& visit);
 
-// Every chunk of a session that has something of this part, ascending, until `visit` returns false. What was damaged so
-// that not even its chunk is known is told with the chunks of `span`. False if `visit` stopped it.
+// Visits every chunk of a session that has something of this part, ascending, until `visit` returns false. Damage of
+// which not even the chunk is known is reported with the chunks of `span`. Returns false if `visit` stopped it.
 template <typename Frame>
 bool for_each_part(const EngineSnapshot& snapshot, SessionNumber session, ChunkSpan span,
                    const std::function<bool(StoredPart<Frame>)>& visit);

@@ -12,7 +12,7 @@ namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kSessionKey = 5;
-constexpr SessionNumber kBehind = 16;  // numbers looked at behind the highest that is known
+constexpr SessionNumber kBehind = 16;  // numbers that are tried behind the highest known one
 
 SessionNumber number_in(std::string_view key) {
   SessionNumber number = 0;
@@ -41,8 +41,8 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
     return true;
   });
   // Numbers are given in order, so a record that is missing has a place among the others, or just behind them.
-  SessionNumber highest = seen.empty() ? 0 : *seen.rbegin();
-  for (SessionNumber number = 1; number <= highest + kBehind; ++number) {
+  SessionNumber max_number = seen.empty() ? 0 : *seen.rbegin();
+  for (SessionNumber number = 1; number <= max_number + kBehind; ++number) {
     if (seen.contains(number)) continue;
     const std::string key = keys::session(number);
     const auto value = snapshot.get(key);
@@ -51,11 +51,11 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
       take(key, **value, Status());
     else if (value.ok() && has_frames)
       all.unknown.push_back(number);
-    else if (!value.ok() && (has_frames || number <= std::max(highest, SessionNumber{1})))
+    else if (!value.ok() && (has_frames || number <= std::max(max_number, SessionNumber{1})))
       take(key, {}, value.status());
     else
       continue;
-    highest = std::max(highest, number);
+    max_number = std::max(max_number, number);
   }
   std::sort(all.sessions.begin(), all.sessions.end(),
             [](const Session& l, const Session& r) { return l.number < r.number; });

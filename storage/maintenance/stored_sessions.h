@@ -1,4 +1,4 @@
-// Sessions and the map's state as they stand in a snapshot, past whatever is damaged.
+// Sessions and the map's state as they stand in a snapshot, read past whatever is damaged.
 #pragma once
 
 #include <optional>
@@ -18,18 +18,18 @@ struct SessionDamage {
 };
 
 struct PendingDamage {
-  std::string key;  // empty: all that could not be read
+  std::string key;  // empty: stands for all that could not be read
   std::string what;
 };
 
 struct StoredSessions {
   std::vector<Session> sessions;  // ascending by number
   std::vector<SessionDamage> damage;
-  std::vector<SessionNumber> unknown;  // have frames, and no record at all
+  std::vector<SessionNumber> unknown;  // sessions that have frames and no record at all
   FrameSet pending;                    // as MapState has it
   std::vector<PendingDamage> pending_damage;
   std::optional<MapState> state;  // nullopt: damaged, or never written; without `pending`
-  std::string state_damage;       // not empty: damaged, and how
+  std::string state_damage;       // how it is damaged; empty if it is not
 };
 StoredSessions load_sessions(const EngineSnapshot& snapshot);
 

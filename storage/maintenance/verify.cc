@@ -9,7 +9,7 @@
 #include "storage/journal/journal_record.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/references.h"
-#include "storage/maintenance/settled_cursor.h"
+#include "storage/maintenance/skipped_cursor.h"
 #include "storage/maintenance/stored_sessions.h"
 #include "storage/maintenance/verify_derived.h"
 
@@ -88,7 +88,7 @@ class Verifier {
       numbers_.push_back(session.number);
       frames_expected_ += session.frames;
       if (!chosen(session.number)) continue;
-      if (!is_deleted(session)) ++summary_.sessions;  // as count_sessions(): of one that was deleted a record stays
+      if (!is_deleted(session)) ++summary_.sessions;  // as count_sessions() does: a deleted session keeps its record
       check_session(session, [&](const std::string& what) {
         find(Reason::CORRUPT, {}, "session " + std::to_string(session.number) + ": " + what);
       });
@@ -96,7 +96,7 @@ class Verifier {
     std::sort(numbers_.begin(), numbers_.end());
   }
 
-  // Every hot part: its checksum, what can be said of it by itself, and that it is there.
+  // Checks every hot part by itself, with its checksum, and notes which frames exist.
   void walk_hot() {
     std::uint64_t done = 0;
     for (const SessionNumber number : numbers_)
@@ -123,7 +123,7 @@ class Verifier {
     check_hot(id, frame, of(id));
   }
 
-  // Each sequence below the next one of a session is a frame, or settled without one.
+  // Checks that each sequence below a session's next one is a frame or skipped.
   void check_coverage() {
     for (const Session& session : stored_.sessions)
       if (chosen(session.number)) check_coverage(session);
@@ -131,25 +131,25 @@ class Verifier {
   void check_coverage(const Session& session) {
     const std::string name = "session " + std::to_string(session.number) + ": ";
     std::uint64_t expected = 0, frames = 0, behind = 0, refused = 0, given_up = 0;
-    const auto count = [&](const Settled& item) {
-      check_settled(session, item, behind, [&](const std::string& what) { find(Reason::CORRUPT, {}, name + what); });
+    const auto count = [&](const Skipped& item) {
+      check_skipped(session, item, behind, [&](const std::string& what) { find(Reason::CORRUPT, {}, name + what); });
       behind = std::uint64_t{item.to} + 1;
       (item.refused ? refused : given_up) += behind - std::min<std::uint64_t>(item.from, behind);
     };
     std::optional<std::uint32_t> first, last;
-    SettledCursor settled(snapshot_, session.number,
+    SkippedCursor skipped(snapshot_, session.number,
                           [&](const std::string&, const std::string& what) { find(Reason::DATA_LOSS, {}, what); });
-    // Steps over what is settled, up to `index`.
-    const auto skip_settled = [&](std::uint64_t index) {
-      for (; settled.get() && settled.get()->from <= expected; settled.next()) {
-        count(*settled.get());
+    // Steps over skipped sequences, up to `index`. Returns false after each hole that it reports.
+    const auto step_over = [&](std::uint64_t index) {
+      for (; skipped.get() && skipped.get()->from <= expected; skipped.next()) {
+        count(*skipped.get());
         expected = std::max(expected, behind);
       }
       if (expected < index) {
-        const std::uint64_t hole = settled.get() ? std::min<std::uint64_t>(index, settled.get()->from) : index;
+        const std::uint64_t hole = skipped.get() ? std::min<std::uint64_t>(index, skipped.get()->from) : index;
         find(Reason::DATA_LOSS, {session.number, static_cast<std::uint32_t>(expected)},
              name + "frames " + std::to_string(expected) + ".." + std::to_string(hole - 1) +
-                 " are missing, and not settled");
+                 " are missing, and not recorded as skipped");
         expected = hole;
         return false;
       }
@@ -163,21 +163,21 @@ class Verifier {
         if (!first) first = frame.index;
         last = frame.index;
         ++frames;
-        while (!skip_settled(frame.index)) {
+        while (!step_over(frame.index)) {
         }
         if (expected > frame.index)
-          find(Reason::CORRUPT, frame, name + "frame " + frame.to_string() + " is there, and settled without a frame");
+          find(Reason::CORRUPT, frame, name + "frame " + frame.to_string() + " exists, and is recorded as skipped");
         expected = std::max<std::uint64_t>(expected, std::uint64_t{frame.index} + 1);
       }
     }
-    while (!skip_settled(end_of(session))) {
+    while (!step_over(end_of(session))) {
     }
-    for (; settled.get(); settled.next())
+    for (; skipped.get(); skipped.next())
       if (is_going(session))
-        count(*settled.get());
+        count(*skipped.get());
       else
         find(Reason::CORRUPT, {},
-             name + "sequence " + std::to_string(settled.get()->to) + " is settled and still expected");
+             name + "sequence " + std::to_string(skipped.get()->to) + " is skipped and still expected");
     if (refused != session.refused || given_up != session.given_up)
       find(Reason::CORRUPT, {},
            name + "its record says " + std::to_string(session.refused) + " sequences refused, " +
@@ -194,7 +194,7 @@ class Verifier {
     frames_found_ += frames;
   }
 
-  // Every warm part, and all references.
+  // Checks every warm part and all references.
   void walk_warm() {
     std::uint64_t done = 0;
     for (const SessionNumber number : numbers_)
@@ -247,7 +247,7 @@ class Verifier {
         [&](std::uint64_t done) { progress("what is derived", done); });
   }
 
-  // Cold parts and words, each as many as the frame says.
+  // Checks cold parts and words: as many features and words as each frame says.
   void walk_appearance() {
     std::uint64_t done = 0;
     for (const SessionNumber number : numbers_) {
@@ -263,7 +263,7 @@ class Verifier {
     done = 0;
     for (const SessionNumber number : numbers_) {
       if (!chosen(number)) continue;
-      // None at all: they are made anew when the daemon starts.
+      // A frame without any is no finding: the daemon makes its words anew when it starts.
       walk_counted<FrameWords>(number, "words", done, [&](FrameId id, const FrameWords& words, std::size_t expected) {
         if (words.size() != expected && !words.empty())
           of(id)("it has " + std::to_string(words.size()) + " words, and should have " + std::to_string(expected));
@@ -308,7 +308,7 @@ class Verifier {
     for (; next != table_.entries().end() && next->id.session == number; ++next) missing(next->id, next->present);
   }
 
-  // Labels are a fact of the frame; the index has each, and no more.
+  // Labels are a fact of the frame. The index must have each of them, and no other.
   void check_labels_of(FrameId id, const FrameHot& frame) {
     for (const std::string& label : frame.labels) {
       const auto entry = snapshot_.get(keys::label(label, id));
@@ -323,7 +323,7 @@ class Verifier {
       const auto entry = keys::label_of(key);
       const auto hot = entry ? graph_.hot(entry->frame) : nullptr;
       if (!entry)
-        find(Reason::CORRUPT, {}, "index of labels: a key that is none");
+        find(Reason::CORRUPT, {}, "index of labels: a key that cannot be read");
       else if (!hot || std::find(hot->labels.begin(), hot->labels.end(), entry->label) == hot->labels.end())
         find(Reason::CORRUPT, entry->frame,
              "index of label \"" + entry->label + "\": frame " + entry->frame.to_string() + " does not have it");
@@ -332,7 +332,7 @@ class Verifier {
     if (!scanned.ok()) find(Reason::DATA_LOSS, {}, "index of labels: " + scanned.to_string());
   }
 
-  // Frames waiting for work are there, and the counters say what there is.
+  // Checks that frames that wait for work exist, and that the counters are right.
   void check_state() {
     for (const PendingDamage& damage : stored_.pending_damage) find(Reason::DATA_LOSS, {}, damage.what);
     if (!stored_.state_damage.empty()) find(Reason::DATA_LOSS, {}, "the map's state: " + stored_.state_damage);
@@ -368,7 +368,7 @@ class Verifier {
   const StoredSessions stored_;
   const StoredGraph graph_;
   SightedPaths paths_{graph_};
-  std::vector<SessionNumber> numbers_;  // that have a record, or frames
+  std::vector<SessionNumber> numbers_;  // of sessions that have a record, or frames
   ChunkTable table_;
   std::uint64_t frames_expected_ = 0, frames_found_ = 0, gaps_found_ = 0;
   std::array<std::uint64_t, 4> closures_{};  // by state
@@ -403,7 +403,7 @@ Result<VerifySummary> verify_journal(const Engine& engine, const OnFinding& on_f
   };
   const std::uint64_t from = engine.applied_sequence() + 1, last = engine.last_journal_sequence();
   std::uint64_t next = from;
-  // But for those that were applied and trimmed meanwhile.
+  // Records that were applied and trimmed meanwhile do not count as missing.
   const auto missing_before = [&](std::uint64_t sequence) {
     if (next < sequence) next = std::max(next, std::min(sequence, engine.first_journal_sequence()));
     if (next < sequence)

@@ -1,4 +1,4 @@
-// verify(), which also hands out what each derived item should be: for repair.
+// verify() for repair: it also reports what each wrong derived item should be.
 #pragma once
 
 #include "storage/maintenance/recount.h"

@@ -70,7 +70,7 @@ TEST_F(Verify, NothingIsFoundInASoundMap) {
 }
 
 // What a later version writes under keys of its own.
-TEST_F(Verify, KeysThatItDoesNotKnowAreNoFindings) {
+TEST_F(Verify, KeysOfALaterVersionAreNoFindings) {
   const std::vector<Put> puts{{"x", {1}}, {"zone/1", {2}}, {"\xff", {3}}};
   ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), puts, {}).ok());
   EXPECT_THAT(found().findings, IsEmpty());
@@ -191,26 +191,26 @@ std::vector<HandMadeFault> hand_made_faults() {
       {"AppearanceCount", "features", [](Map& m) { ++m.edit_hot(kFrame).appearance_count; }},
       {"Features", "its record says", [=](Map& m) { ++session(m).frames; }},
       {"Last", "its record says", [=](Map& m) { --session(m).first_time_us, session(m).first = 1; }},
-      {"NextSequence", "missing, and not settled", [=](Map& m) { session(m).next_sequence += 5; }},
-      {"SettledTwice", "settled without a frame",
+      {"NextSequence", "missing, and not recorded as skipped", [=](Map& m) { session(m).next_sequence += 5; }},
+      {"SkippedTwice", "recorded as skipped",
        [=](Map& m) {
-         m.settle(1, {20, 22, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.skip(1, {20, 22, 0, false, Reason::DROPPED_BY_ROBOT});
        }},
-      {"SettledOutOfOrder", "not in order",
+      {"SkippedOutOfOrder", "not in order",
        [=](Map& m) {
-         m.settle(1, {150, 156, 0, false, Reason::DROPPED_BY_ROBOT});
-         m.settle(1, {155, 159, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.skip(1, {150, 156, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.skip(1, {155, 159, 0, false, Reason::DROPPED_BY_ROBOT});
          m.state().gaps = 12;
        }},
-      {"SettledAndExpected", "still expected",
+      {"SkippedAndExpected", "still expected",
        [=](Map& m) {
-         m.settle(1, {150, 159, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.skip(1, {150, 159, 0, false, Reason::DROPPED_BY_ROBOT});
          session(m).next_sequence = 155;
          m.state().gaps = 10;
        }},
-      {"SettledUncounted", "sequences refused",
+      {"SkippedUncounted", "sequences refused",
        [=](Map& m) {
-         m.settle(1, {150, 159, 0, true, Reason::CORRUPT});
+         m.skip(1, {150, 159, 0, true, Reason::CORRUPT});
          session(m).refused = 9;
        }},
       {"Pending", "waits for relaxation",
@@ -278,7 +278,7 @@ TEST_F(Verify, ThatALandmarkIsNotNeededIsAFactThatRepairKeeps) {
   EXPECT_THAT(map::derived_differences(*open_map(engine)->view()), IsEmpty());
 }
 
-TEST_F(Verify, WhoCarriedTheRobotIsToldByTheClosuresAndRebuilt) {
+TEST_F(Verify, CarriedByFollowsFromTheClosuresAndIsRebuilt) {
   EdgeId closure;
   change([&](Map& map) {
     closure = some_closure(map);

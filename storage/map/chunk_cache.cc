@@ -24,7 +24,7 @@ std::shared_ptr<const PackedPart<Frame>> ChunkCache::part(const EngineSnapshot& 
   if (auto cached = find(key, snapshot.commit_number()))
     return std::static_pointer_cast<const PackedPart<Frame>>(std::move(cached));
   auto loaded = load_packed<Frame>(snapshot, id, budget_);
-  if (loaded.commit == 0) {  // it never was, or is no more: what is known is that it is not there now
+  if (loaded.commit == 0) {  // it never existed, or was removed: all that is known is that it is not there now
     loaded.part = std::get<std::shared_ptr<const PackedPart<Frame>>>(absent_);
     loaded.commit = snapshot.commit_number();
   }
@@ -113,7 +113,8 @@ void ChunkCache::insert(Entry entry, std::uint64_t loaded_at) {
   evict_locked();
 }
 
-// A version that is there already (its writer is its identity) only learns how long it holds.
+// If the cache has this version already (the commit that wrote it identifies it), only the last commit for which it
+// holds is raised.
 void ChunkCache::insert_locked(Entry entry) {
   const auto [first, last] = index_.equal_range(entry.key);
   for (auto at = first; at != last; ++at)

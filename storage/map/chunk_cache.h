@@ -1,10 +1,10 @@
-// What is committed, as a snapshot shows it, through one cache of decoded parts shared by the worker and all views.
+// Committed parts, as a snapshot shows them, through one cache of decoded parts that the worker and all views share.
 //
-// An entry is one version of a part, and knows for which commits it is known to be the right one: from the commit that
-// wrote it, through the last at which a snapshot was seen to hold it (the newest version: every commit to come). A
-// reader gets an entry only if its own snapshot's commit lies between, so no reader ever sees a version that is not its
-// own; and readers of an old snapshot are served as well as those of the newest. That a chunk does not exist is cached
-// as well: a gap in a session is walked over in memory.
+// An entry is one version of a part. It knows for which commits that version is known to be right: from the commit that
+// wrote it through the last commit at which a snapshot was seen to hold it; for the newest version, through all commits
+// to come. A reader gets an entry only if the commit of its own snapshot lies in that range, so no reader ever sees a
+// version that is not its own, and readers of an old snapshot are served as well as those of the newest. That a chunk
+// does not exist is cached too, so that a gap in a session is walked over in memory.
 #pragma once
 
 #include <cstdint>
@@ -32,35 +32,37 @@ class ChunkCache {
   ChunkCache(const ChunkCache&) = delete;
   ChunkCache& operator=(const ChunkCache&) = delete;
 
-  // Never null; a chunk that does not exist has no frames.
+  // Never null; a chunk that does not exist gives a part without frames.
   template <typename Frame>  // FrameHot or FrameWarm
   std::shared_ptr<const PackedPart<Frame>> part(const EngineSnapshot& snapshot, ChunkId id);
-  // A frame of it: part.frame(slot), which may take more memory; then others give way.
+  // part.frame(slot). Decoding the frame may take more memory; then other entries are evicted.
   template <typename Frame>
   std::shared_ptr<const Frame> frame(const PackedPart<Frame>& part, std::uint32_t slot);
 
-  // Null: there is no such frame.
+  // Null if there is no such frame.
   template <typename Frame>
   std::shared_ptr<const Frame> frame(const EngineSnapshot& snapshot, FrameId id) {
     return frame(*part<Frame>(snapshot, chunk_id(id)), slot_of(id));
   }
-  // Frames of a chunk whose bit, by slot, is set.
+  // The frames of a chunk whose bits are set in `slots`.
   Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id, std::uint64_t slots);
   // Cold parts are cached frame by frame.
   std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
 
-  // What a commit wrote of a part. Whole: all of it; else the frames that are there, the others are as before.
+  // What a commit wrote of a part. `whole`: `records` is all of the part; otherwise it has the frames that were
+  // written, and the others are as before.
   template <typename Frame>
   struct Written {
     ChunkId id;
     typename PackedPart<Frame>::Records records;
     bool whole = false;
   };
-  // Commit `number` is the newest from now on; called before any reader has a snapshot of it.
+  // Tells the cache that commit `number` is the newest from now on. To be called before any reader has a snapshot of
+  // it.
   void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
                  std::span<const Written<FrameWarm>> warm);
 
-  // Drops the least recently used until the cache's allowance is kept.
+  // Drops the least recently used entries until the cache keeps to its allowance.
   void evict();
   void clear();
 
@@ -82,7 +84,7 @@ class ChunkCache {
     std::shared_ptr<const void> value;
     std::uint64_t from = 0;           // the commit that wrote it
     std::uint64_t through = kNewest;  // the last commit at which it is known to hold
-    std::size_t bytes = 0;            // beside those that a part answers for itself
+    std::size_t bytes = 0;            // besides those that a part charges itself
   };
   using Lru = std::list<Entry>;  // most recently used first
   using Versions = std::unordered_multimap<Key, Lru::iterator, KeyHash>;

@@ -1,5 +1,5 @@
-// What is dirty since the last commit, as a view holds it: immutable, and shared between views as far as nothing
-// changed.
+// What is dirty since the last commit, as a view holds it: immutable, and shared by views as far as nothing has changed
+// between them.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ struct DirtyChunk {
   Slots<FrameHot> hot;
   Slots<FrameWarm> warm;
   Slots<FrameCold> cold;
-  bool removed = false;  // what the snapshot has of it is not in the map any more
+  bool removed = false;  // the committed chunk is not in the map any more
 };
 
 // Dirty chunks, ascending. Publishing copies this table (some dozens of pointers) and the chunks edited since.
@@ -39,10 +39,10 @@ inline const Session* find_session(const SessionTable& table, SessionNumber numb
   return it != table.end() && (*it)->number == number ? it->get() : nullptr;
 }
 
-// Labels put on (true) and taken off (false) since the last commit.
+// Labels set (true) and removed (false) since the last commit.
 using LabelChanges = std::map<std::pair<std::string, FrameId>, bool>;
 
-// What was settled without a frame since the last commit, by session and last sequence.
-using SettledTable = std::map<std::pair<SessionNumber, std::uint32_t>, Settled>;
+// Sequences that were skipped since the last commit, by session and last sequence.
+using SkippedTable = std::map<std::pair<SessionNumber, std::uint32_t>, Skipped>;
 
 }  // namespace relmap::storage

@@ -1,4 +1,4 @@
-// A graph that can be edited over one that stays as it is, to see what would come of an edit; then it is thrown away.
+// An editable graph on top of one that stays as it is, to find out what an edit would do. It is thrown away afterwards.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,11 @@ namespace relmap::storage {
 // Not thread-safe.
 class Draft final : public ForwardingGraph<EditableGraph> {
  public:
-  // Asked at each frame that is copied, with the bytes of all copies; a status that is not ok is thrown (StatusError).
+  // Called for each frame that is copied, with the bytes of all copies so far. A status other than OK is thrown
+  // (StatusError).
   using Proceed = std::function<Status(std::size_t bytes)>;
 
-  // `base` must outlive it. `facts`: what the base counts.
+  // `base` must outlive the draft. state() begins with `facts`, the counts of the base.
   explicit Draft(const Graph& base, const MapFacts& facts = {}, Proceed proceed = {});
 
   std::shared_ptr<const FrameHot> hot(FrameId id) const override;

@@ -52,7 +52,7 @@ TEST_F(DraftTest, WhatIsNotEditedIsThatOfTheBase) {
   FrameCold cold;
   cold.picture = {1, 2, 3};
   map_->add_frame({1, 1}, hot, {}, cold);
-  map_->settle(1, {2, 2, 3});
+  map_->skip(1, {2, 2, 3});
   map_->publish();
   const auto view = map_->view();
   const Draft draft(*view);
@@ -61,9 +61,9 @@ TEST_F(DraftTest, WhatIsNotEditedIsThatOfTheBase) {
   EXPECT_FALSE(draft.session(2));
   EXPECT_EQ(draft.labelled("door"), std::vector<FrameId>{kFrame});
   EXPECT_EQ(draft.labels("d"), std::vector<std::string>{"door"});
-  std::uint32_t settled = 0;
-  draft.visit_settled(1, 0, [&](const Settled&) { return ++settled, true; });
-  EXPECT_EQ(settled, 1u);
+  std::uint32_t skipped = 0;
+  draft.visit_skipped(1, 0, [&](const Skipped&) { return ++skipped, true; });
+  EXPECT_EQ(skipped, 1u);
 }
 
 TEST_F(DraftTest, AFrameThatIsNotThereCannotBeEdited) {

@@ -1,4 +1,4 @@
-// The index of labels: what is committed, with the changes since laid over it.
+// The index of labels: what is committed, with the changes made since.
 #pragma once
 
 #include <string>

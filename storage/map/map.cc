@@ -9,7 +9,7 @@
 #include "storage/map/label_index.h"
 #include "storage/map/map_impl.h"
 #include "storage/map/pending_frames.h"
-#include "storage/map/settled_index.h"
+#include "storage/map/skipped_index.h"
 
 namespace relmap::storage {
 namespace {
@@ -108,8 +108,8 @@ std::optional<Session> Map::session(SessionNumber number) const {
   return session ? std::optional<Session>(*session) : std::nullopt;
 }
 
-void Map::visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const {
-  relmap::storage::visit_settled(*impl_->snapshot, impl_->settled, session, sequence, visit);
+void Map::visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const {
+  relmap::storage::visit_skipped(*impl_->snapshot, impl_->skipped, session, sequence, visit);
 }
 
 std::vector<FrameId> Map::labelled(const std::string& label) const {
@@ -163,7 +163,7 @@ void Map::remove_last_chunk(SessionNumber number) {
   assert(is_going(before) && before.frames > 0);
   const ChunkId id = chunk_id({number, before.last});
   std::uint32_t frames = 0;
-  std::optional<FrameId> left;  // the last that stays
+  std::optional<FrameId> left;  // the last frame that stays
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     const auto frame = hot(frame_in(id, slot));
     if (!frame) continue;
@@ -178,7 +178,7 @@ void Map::remove_last_chunk(SessionNumber number) {
       left = at;
       break;
     }
-    visit_settled(number, at.index, [&](const Settled& gap) {  // however long
+    visit_skipped(number, at.index, [&](const Skipped& gap) {  // a gap of any length is one step
       if (gap.from <= at.index) index = gap.from;
       return false;
     });
@@ -230,13 +230,13 @@ Session& Map::Impl::edit_session(SessionNumber number) {
   return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
 }
 
-void Map::settle(SessionNumber number, const Settled& settled) {
+void Map::skip(SessionNumber number, const Skipped& skipped) {
   Session& session = impl_->edit_session(number);
-  (settled.refused ? session.refused : session.given_up) += std::uint64_t{settled.to} - settled.from + 1;
-  session.next_sequence = std::max(session.next_sequence, settled.to + 1);
-  if (!impl_->settled.insert_or_assign({number, settled.to}, settled).second) return;
-  impl_->settled_touched = true;
-  constexpr std::size_t kEntry = 2 * 64;  // a node of a tree, and as much where it is published
+  (skipped.refused ? session.refused : session.given_up) += std::uint64_t{skipped.to} - skipped.from + 1;
+  session.next_sequence = std::max(session.next_sequence, skipped.to + 1);
+  if (!impl_->skipped.insert_or_assign({number, skipped.to}, skipped).second) return;
+  impl_->skipped_touched = true;
+  constexpr std::size_t kEntry = 2 * 64;  // a node of this tree, and one of the published tree
   impl_->budget->charge(Share::kDirty, kEntry);
   impl_->dirty_bytes += kEntry;
 }

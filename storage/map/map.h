@@ -24,62 +24,63 @@ class MapView;
 
 class Map final : public EditableGraph {
  public:
-  // Loads sessions and state; frames stay on disk. The journal from applied_sequence + 1 on is the caller's to
-  // re-apply.
+  // Loads sessions and state; frames stay on disk. The caller has to apply the journal again from applied_sequence + 1
+  // on.
   static Result<std::unique_ptr<Map>> open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
                                            std::shared_ptr<Budget> budget);
   ~Map() override;
 
-  // Graph, as the worker sees it: its own edits included. Worker only.
+  // The graph as the worker sees it, with its own edits. Worker only.
   std::shared_ptr<const FrameHot> hot(FrameId id) const override;
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override;
   std::optional<Session> session(SessionNumber number) const override;
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override;
+  void visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // The copy is dirty, and made at the first edit since the last publish(). The reference is good until the next
-  // publish() or commit().
+  // Return the worker's copy of a frame's part, which is made at the first edit since the last publish() and is dirty.
+  // The reference is valid until the next publish() or commit().
   FrameHot& edit_hot(FrameId id) override;
   FrameWarm& edit_warm(FrameId id) override;
   void add_frame(FrameId id, FrameHot hot, FrameWarm warm, FrameCold cold);
 
-  // Takes the last chunk of a session that is being deleted (SessionState::kDeleting) out of the map, frames, labels
-  // and all.
+  // Removes the last chunk of a session that is being deleted (SessionState::kDeleting) from the map, with its frames
+  // and their labels.
   void remove_last_chunk(SessionNumber number);
 
   void add_session(Session session);
   Session& edit_session(SessionNumber number);
-  // Sequences that end without a frame, behind all that the session settled so: counts them, and moves its next
-  // sequence on.
-  void settle(SessionNumber number, const Settled& settled);
+  // Records sequences as skipped, counts them, and moves the session's next sequence on. They must lie behind all that
+  // the session has skipped so far.
+  void skip(SessionNumber number, const Skipped& skipped);
   // Edits FrameHot::labels and the derived index together.
   void set_label(FrameId id, const std::string& label, bool present);
   MapState& state() override;
 
-  // Makes all edits visible to new readers.
+  // Makes all edits visible to new readers, and returns the new view.
   std::shared_ptr<const MapView> publish();
-  // Called by publish() with the chunks in which the hot part of a frame was edited, and the version of the view that
-  // shows it, before anyone can have that view. Worker only.
+  // publish() calls the watcher with the chunks in which the hot part of a frame was edited, and with the version of
+  // the view that shows the edits, before anyone can have that view. Worker only.
   using EditWatcher = std::function<void(std::uint64_t version, std::span<const ChunkId> chunks)>;
   void watch_edits(EditWatcher watcher);
   // The newest published view. Any thread.
   std::shared_ptr<const MapView> view() const;
 
-  // Publishes, writes everything dirty with state().applied_sequence, and trims the journal. On failure everything
-  // stays dirty and can be committed again. Finishes a commit under way before it.
+  // Publishes, writes everything that is dirty together with state().applied_sequence, and trims the journal. If it
+  // fails, everything stays dirty and can be committed again. A commit under way is finished first.
   Status commit();
-  // The same beside the worker, which goes on to edit: encodes what is dirty, finishes the commit under way, leaves
-  // this one to a thread to write, and returns. `written` is called by that thread when it is done. Not ok: nothing has
-  // begun, since the commit before has failed, or a part to be gathered could not be read.
+  // Begins a commit that is written while the worker goes on editing: encodes what is dirty, finishes the commit under
+  // way, lets a thread write this one, and returns. That thread calls `written` when it is done. If the result is not
+  // OK, nothing has begun: the commit before has failed, or a part that had to be gathered could not be read.
   Status begin_commit(std::function<void()> written);
-  // Waits for the commit under way, and says what came of it; nullopt: none was.
+  // Waits for the commit under way and returns its outcome; nullopt if there was none.
   std::optional<Status> finish_commit();
-  // Of what no commit under way writes.
+  // Bytes that are dirty, without those that a commit under way is writing.
   std::size_t dirty_bytes() const;
-  // So much is dirty that a commit ought to begin: while one is being written the share has room for more.
+  // Whether so much is dirty that a commit ought to begin. The share still has room for what is edited while it is
+  // written.
   bool commit_is_due() const;
 
  private:
@@ -88,8 +89,8 @@ class Map final : public EditableGraph {
   std::unique_ptr<Impl> impl_;
 };
 
-// An immutable map version: the engine's snapshot at the last commit, and over it what was dirty at publish().
-// Thread-safe.
+// An immutable version of the map: the engine's snapshot of the last commit, and on top of it what was dirty at
+// publish().
 class MapView final : public Graph {
  public:
   ~MapView() override;
@@ -99,19 +100,20 @@ class MapView final : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override;
   std::optional<Session> session(SessionNumber number) const override;
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override;
+  void visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // The words of every frame that has any and is not `known`, without the descriptors (what the place index has yet to
-  // learn at start). Chunks of which all frames are known are not read. DATA_LOSS, IO_ERROR, VIEW_EXPIRED.
+  // Visits the words of every frame that has any and is not `known`, without reading the descriptors: what the place
+  // index has yet to learn at start. Chunks of which all frames are known are not read. DATA_LOSS, IO_ERROR,
+  // VIEW_EXPIRED.
   Status scan_words(const std::function<bool(FrameId)>& known,
                     const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started
   const MapFacts& state() const;
-  std::size_t pending_frames() const;  // MapState::pending, their number
-  // The last commit, without what was dirty over it: for whoever verifies or copies what stands on disk.
+  std::size_t pending_frames() const;  // number of frames in MapState::pending
+  // The last commit, without what was dirty on top of it: for verifying or copying what stands on disk.
   std::shared_ptr<const EngineSnapshot> committed() const;
 
   struct Impl;
@@ -121,10 +123,10 @@ class MapView final : public Graph {
   std::unique_ptr<Impl> impl_;
 };
 
-// The map as 64-bit hashes that do not depend on session numbers: structure (frames, tracks, observations, edge states,
-// keyed by uuid and sequence), and estimates (every number bit for bit). What tells how a map came about and not what
-// it is has no part in them: its identity, epoch and owner, journal sequences, the wall time and the author of edits.
-// For tests of recovery and replay, and for backups. A later version of the hash has another number.
+// The map as two 64-bit hashes that do not depend on session numbers: structure (frames, tracks, observations, edge
+// states, keyed by uuid and sequence) and estimates (every number bit for bit). What says how a map came about and not
+// what it is has no part in them: its identity, epoch and owner, journal sequences, the wall time and the author of
+// edits. For tests of recovery and replay, and for backups. A later version of the hash gets another number.
 inline constexpr int kMapHashVersion = 1;
 struct MapHash {
   std::uint64_t structure = 0;

@@ -28,15 +28,15 @@ struct Map::Impl::Batch {
   std::uint64_t number = 0;  // of the commit
   std::vector<Put> puts;
   std::vector<std::string> deletes;
-  Status trimmed;  // the journal, after it
+  Status trimmed;  // the outcome of trimming the journal afterwards
 
-  // A part that is written: by one put (whole) or frame by frame.
+  // What is written of a part. `whole`: its puts are all there is; otherwise other frames stay as they are.
   template <typename Frame>
   struct Part {
     ChunkId id;
     bool whole = false;
-    std::size_t first = 0, last = 0;                                    // its puts
-    std::array<std::shared_ptr<const Frame>, kFramesPerChunk> decoded;  // those of its frames that are
+    std::size_t first = 0, last = 0;                                    // its puts: from first up to last
+    std::array<std::shared_ptr<const Frame>, kFramesPerChunk> decoded;  // its frames, where they are decoded
 
     Part after(std::size_t puts) && {
       first += puts;
@@ -82,7 +82,7 @@ bool any(const std::array<std::shared_ptr<Frame>, kFramesPerChunk>& frames) {
   return std::any_of(frames.begin(), frames.end(), [](const auto& frame) { return frame != nullptr; });
 }
 
-// The dirty frames of a part by themselves.
+// Writes the dirty frames of a part, one put each.
 template <typename Frame, typename Batch>
 void write_frames(Batch& batch, ChunkId id, bool chunk_is_new, const WorkingPart<Frame>& dirty) {
   if (!any(dirty.frames)) return;
@@ -99,8 +99,8 @@ void write_frames(Batch& batch, ChunkId id, bool chunk_is_new, const WorkingPart
   batch.add(std::move(part));
 }
 
-// The whole part: dirty frames, those that the commit before is still writing, and the records of the others as they
-// stand, damaged or not. Which frames it has.
+// Writes a whole part: dirty frames, frames that the commit before is still writing, and the stored records of the
+// others, damaged or not. Returns the frames that it has, one bit for each slot.
 template <typename Frame, typename Batch>
 std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* committed,
                           const WorkingPart<Frame>& before, const WorkingPart<Frame>& dirty) {
@@ -130,7 +130,7 @@ std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* com
 
 }  // namespace
 
-// Of a session, what the engine holds once the commit under way is through.
+// The session as the engine has it once the commit under way is through.
 const Session* Map::Impl::last_committed(SessionNumber number) const {
   if (committing)
     for (const Session& session : committing->sessions)
@@ -169,7 +169,8 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
               single(Part::kWords, frame, batch.number, [&](ByteWriter& w) { encode_words(w, cold.words); }));
   }
 
-  // How it stood at the last commit, and how it stands now. Of a session that is being deleted no chunk is open.
+  // Whether the chunk was open at the last commit, and whether it is now. A session that is being deleted has no open
+  // chunk.
   const auto is_open = [&](const Session& session) {
     return !is_going(session) && id.chunk >= chunk_of({id.session, session.last});
   };
@@ -210,8 +211,8 @@ void Map::Impl::write_rest(Batch& batch) {
     else
       batch.deletes.push_back(keys::label(entry.first, entry.second));
   }
-  for (const auto& [entry, item] : settled)
-    batch.puts.push_back({keys::settled(entry.first, entry.second), encode_settled(item)});
+  for (const auto& [entry, item] : skipped)
+    batch.puts.push_back({keys::skipped(entry.first, entry.second), encode_skipped(item)});
   write_pending(state.pending, batch.puts, batch.deletes);
   batch.puts.push_back({keys::map_state(), encode_state(state)});
 }
@@ -222,7 +223,7 @@ void Map::Impl::write_all(Batch& batch) {
   for (const SessionNumber number : dirty_sessions) {  // an open chunk may have closed without being touched
     if (const Session* before = last_committed(number)) touched_chunks.insert(chunk_id({number, before->last}));
   }
-  // To encode and compress is most of a large commit: two threads share it.
+  // Encoding and compressing are most of the work of a large commit, so two threads share it.
   const std::vector<ChunkId> chunks(touched_chunks.begin(), touched_chunks.end());
   const std::size_t half = dirty_bytes < kWorthAThread ? chunks.size() : chunks.size() / 2;
   Batch second;
@@ -249,11 +250,11 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   for (const SessionNumber number : std::exchange(dirty_sessions, {}))
     committing->sessions.push_back(*find_session(sessions, number));
   committing->labels = labels;
-  committing->settled = settled;
+  committing->skipped = skipped;
   committing->pending = state.pending.take_changes();
   committing->batch = batch;
-  // What it encodes, and the engine's copy of that, take the place of what the cache holds, as far as that goes:
-  // beyond, others would be refused for a moment's sake.
+  // The encoded bytes and the engine's copy of them take memory from the cache, but no more than the cache holds:
+  // charging more would refuse others memory that is needed for a moment only.
   std::size_t encoded = 0;
   for (const Put& put : batch->puts) encoded += put.key.size() + put.value.size();
   committing->cache_bytes = std::min(2 * encoded, budget->used(Share::kCache));
@@ -272,7 +273,7 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
     if (written) written();
     return status;
   };
-  // Where no thread can be had, it is written when it is finished.
+  // If no thread can be started, finish_commit() writes it.
   committing->written = std::async(std::launch::async | std::launch::deferred, write);
   return {};
 } catch (const StatusError& error) {
@@ -289,11 +290,11 @@ std::optional<Status> Map::Impl::finish_commit() {
     restore(*commit);
     return status;
   }
-  settle(*commit);
+  complete(*commit);
   return commit->batch->trimmed;
 }
 
-// What it had is dirty again, where nothing newer is. All is published.
+// Makes what the commit held dirty again, except where something newer is dirty. All of it has been published.
 void Map::Impl::restore(Commit& commit) {
   const auto take_back = [&](auto& old, auto& now, bool removed) {
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
@@ -323,13 +324,13 @@ void Map::Impl::restore(Commit& commit) {
   }
   for (const Session& session : commit.sessions) dirty_sessions.insert(session.number);
   state.pending.add_changes(commit.pending);
-  spare_hot.clear();  // what cannot be written needs the room
-  charge_for_what_waits();
+  spare_hot.clear();  // what could not be written needs the room
+  charge_pending_and_spares();
 }
 
 namespace {
 
-// What was put, as the cache keeps it: the same bytes.
+// The parts of a batch as the cache keeps them. Takes their bytes out of the puts.
 template <typename Frame, typename Batch>
 std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
                                                 const std::vector<typename Batch::template Part<Frame>>& parts) {
@@ -340,7 +341,7 @@ std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
     std::uint64_t commit = 0;
     for (std::size_t put = parts[i].first; put < parts[i].last; ++put)
       (void)unpack<Frame>(std::make_shared<const Bytes>(std::move(batch.puts[put].value)), parts[i].id, all[i].records,
-                          &commit);  // it was packed a moment ago
+                          &commit);  // cannot fail: packed a moment ago
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) all[i].records[slot].frame = parts[i].decoded[slot];
   }
   return all;
@@ -348,14 +349,14 @@ std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
 
 }  // namespace
 
-void Map::Impl::settle(Commit& commit) {
+void Map::Impl::complete(Commit& commit) {
   snapshot = engine->snapshot();
   recent_hot.clear();
   recent_warm.clear();
   cache->committed(snapshot->commit_number(), written<FrameHot>(*commit.batch, commit.batch->hot),
                    written<FrameWarm>(*commit.batch, commit.batch->warm));
 
-  // Hot and warm parts go on in the cache; cold ones only with the views that still have them.
+  // Hot and warm parts live on in the cache, cold ones only in the views that still have them.
   for (const auto& [id, chunk] : commit.chunks)
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
       if (chunk.cold.frames[slot]) ledger->retire(chunk.cold.since[slot], version + 1, chunk.cold.bytes[slot]);
@@ -364,12 +365,12 @@ void Map::Impl::settle(Commit& commit) {
   for (const Session& session : commit.sessions) committed_sessions[session.number] = session;
   for (const auto& [entry, present] : commit.labels)
     if (const auto at = labels.find(entry); at->second == present) labels.erase(at);
-  for (const auto& [entry, item] : commit.settled) settled.erase(entry);
+  for (const auto& [entry, item] : commit.skipped) skipped.erase(entry);
 
-  spare_hot.clear();  // as what was dirty, they make room for what is read
-  charge_for_what_waits();
+  spare_hot.clear();  // like what was dirty, they make room for what is read
+  charge_pending_and_spares();
 
-  // What was edited meanwhile stays over the new snapshot.
+  // What was edited meanwhile stays dirty on top of the new snapshot.
   auto table = std::make_shared<DirtyTable>();
   for (const auto& [id, chunk] : dirty) {
     auto left = std::make_shared<DirtyChunk>();
@@ -381,7 +382,7 @@ void Map::Impl::settle(Commit& commit) {
   }
   published_dirty = std::move(table);
   published_labels = std::make_shared<const LabelChanges>(labels);
-  published_settled = std::make_shared<const SettledTable>(settled);
+  published_skipped = std::make_shared<const SkippedTable>(skipped);
   show();
 }
 

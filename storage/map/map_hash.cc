@@ -76,7 +76,7 @@ class MapHasher {
   std::uint64_t key(EdgeId id) const { return Hash(4).mix(key(id.frame)).mix(std::uint64_t{id.ordinal}).value(); }
   std::uint64_t key(LandmarkId id) const { return Hash(5).mix(key(id.base)).mix(std::uint64_t{id.slot}).value(); }
 
-  // Of lists that are sorted by id, or whose order does not count.
+  // For lists that are sorted by id, or whose order does not count.
   template <typename Id>
   std::uint64_t set_of(const std::vector<Id>& ids) const {
     std::uint64_t sum = ids.size();
@@ -89,7 +89,7 @@ class MapHasher {
     h.mix(std::uint64_t{s.last}).mix(std::uint64_t{s.frames}).mix(std::uint64_t{s.next_sequence});
     add_extensions(header_extensions(s.header), h);
     add_extensions(s.unknown, h);
-    graph_.visit_settled(s.number, 0, [&](const Settled& item) {
+    graph_.visit_skipped(s.number, 0, [&](const Skipped& item) {
       h.mix(std::uint64_t{item.from}).mix(std::uint64_t{item.to}).mix(std::uint64_t{item.crc}).mix(number(item.reason));
       return true;
     });

@@ -17,8 +17,8 @@
 
 namespace relmap::storage {
 
-// The chunks the worker read last, so that a search over clean frames does not take the shared cache's lock for each.
-// Good until the next commit; holds a few chunks beyond their eviction at most.
+// The chunks that the worker read last, so that a search over clean frames does not take the shared cache's lock for
+// each frame. Valid until the next commit. A few chunks may stay here after they have been evicted.
 template <typename Frame>
 class RecentChunks {
  public:
@@ -33,7 +33,7 @@ class RecentChunks {
   std::array<std::pair<ChunkId, std::shared_ptr<const PackedPart<Frame>>>, 8> recent_;
 };
 
-// Bytes of a dirty chunk without any frame, here and where it is published.
+// Bytes of a dirty chunk without frames: the worker's copy, and the published one.
 inline constexpr std::size_t kEmptyChunk = sizeof(WorkingChunk) + sizeof(DirtyChunk);
 
 using WorkingChunks = std::map<ChunkId, WorkingChunk>;
@@ -54,37 +54,38 @@ struct Map::Impl {
   WorkingChunks dirty;           // since the last commit was begun
   std::vector<ChunkId> touched;  // since the last publish
   EditWatcher edit_watcher;
-  std::vector<ChunkId> hot_edits;  // for it
+  std::vector<ChunkId> hot_edits;  // what edit_watcher is told next
   SessionTable sessions;
   std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
   std::set<SessionNumber> dirty_sessions;  // since the last commit was begun
   std::map<SessionNumber, Session> committed_sessions;
-  LabelChanges labels;  // over the snapshot, those that a commit is writing among them
+  LabelChanges labels;  // changes to the snapshot, including those that a commit is writing
   bool labels_touched = false;
-  SettledTable settled;  // as labels
-  bool settled_touched = false;
+  SkippedTable skipped;  // likewise
+  bool skipped_touched = false;
   MapState state;
-  std::size_t dirty_bytes = 0;    // charged, for what a commit is writing, too
+  std::size_t dirty_bytes = 0;    // charged, including what a commit is writing
   std::size_t pending_bytes = 0;  // charged for state.pending
   RecentChunks<FrameHot> recent_hot;
   RecentChunks<FrameWarm> recent_warm;
 
-  // A commit under way: an engine writes it in a thread of its own. What it writes is read here until it is there.
+  // A commit under way, which the engine writes in a thread of its own. What it writes is read here until the engine
+  // has it.
   struct Batch;
   struct Commit {
     WorkingChunks chunks;
-    std::size_t bytes = 0;  // of dirty_bytes
+    std::size_t bytes = 0;  // part of dirty_bytes
     std::vector<Session> sessions;
     LabelChanges labels;
-    SettledTable settled;
+    SkippedTable skipped;
     std::set<ChunkId> pending;
     std::shared_ptr<Batch> batch;
-    std::size_t cache_bytes = 0;  // charged for the batch
+    std::size_t cache_bytes = 0;  // charged to the cache's share for the batch
     std::future<Status> written;
   };
   std::unique_ptr<Commit> committing;
 
-  // Where the next copies are made: a frame is edited many times in a row, as are the tables that show it.
+  // Memory for the next copies: the same frame is edited many times in a row, and so are the tables that show it.
   static constexpr std::size_t kSpareFrames = 128, kSpareTables = 8;
   Spares<FrameHot> spare_hot{kSpareFrames};
   Spares<DirtyChunk> spare_chunks{kSpareTables};
@@ -96,20 +97,21 @@ struct Map::Impl {
   std::shared_ptr<const DirtyTable> published_dirty = std::make_shared<DirtyTable>();
   std::shared_ptr<const SessionTable> published_sessions;
   std::shared_ptr<const LabelChanges> published_labels = std::make_shared<LabelChanges>();
-  std::shared_ptr<const SettledTable> published_settled = std::make_shared<SettledTable>();
+  std::shared_ptr<const SkippedTable> published_skipped = std::make_shared<SkippedTable>();
   struct Shown {
     std::shared_ptr<const MapView> view;
-    MapView::Impl* parts = nullptr;  // its own
+    MapView::Impl* parts = nullptr;  // of `view`
   };
   mutable std::mutex view_mutex;
   Shown shown;
-  Shown spare_view;  // let go
+  Shown spare_view;  // one that was released, to be used again
 
   const WorkingChunk* find(ChunkId id) const { return find_chunk(dirty, id); }
   const WorkingChunk* find_writing(ChunkId id) const {
     return committing ? find_chunk(committing->chunks, id) : nullptr;
   }
-  // What is not in the snapshot, edited or being written; nullopt: what the snapshot has is right.
+  // The part of a frame if it is edited or being written, null if its chunk was removed; nullopt: the snapshot's is
+  // current.
   template <typename Frame>
   std::optional<std::shared_ptr<const Frame>> unwritten(FrameId id) const {
     for (const WorkingChunk* chunk : {find(chunk_id(id)), find_writing(chunk_id(id))}) {
@@ -123,7 +125,7 @@ struct Map::Impl {
   Session& edit_session(SessionNumber number);
   std::shared_ptr<const MapView> publish();
   std::shared_ptr<const MapView> show();  // a new version of what is published
-  void charge_for_what_waits();
+  void charge_pending_and_spares();
 
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
   const Session* last_committed(SessionNumber number) const;
@@ -134,8 +136,8 @@ struct Map::Impl {
   void write_rest(Batch& batch);
   Status begin_commit(std::function<void()> written);
   std::optional<Status> finish_commit();
-  void settle(Commit& commit);   // the engine has it
-  void restore(Commit& commit);  // it has not
+  void complete(Commit& commit);  // the engine has it
+  void restore(Commit& commit);   // it failed: what it held is dirty again
 };
 
 }  // namespace relmap::storage

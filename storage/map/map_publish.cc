@@ -1,5 +1,5 @@
-// How edits become visible: frozen copies of the chunks touched, a new table, one pointer swap. All of them are made in
-// the memory of versions that nobody reads any more, where there are such.
+// How edits become visible: frozen copies of the chunks touched, a new table, one pointer swap. Where possible they are
+// made in the memory of versions that nobody reads any more.
 #include "storage/graph/precision.h"
 #include "storage/map/map_impl.h"
 
@@ -52,7 +52,7 @@ WorkingChunk& Map::Impl::touch(ChunkId id) {
 }
 
 std::shared_ptr<const MapView> Map::Impl::publish() {
-  if (budget->used(Share::kCache) > budget->allowance(Share::kCache)) {  // what was evicted may live on in these
+  if (budget->used(Share::kCache) > budget->allowance(Share::kCache)) {  // these may keep evicted parts alive
     recent_hot.clear();
     recent_warm.clear();
   }
@@ -98,10 +98,10 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     published_labels = std::make_shared<const LabelChanges>(labels);
     labels_touched = false;
   }
-  charge_for_what_waits();
-  if (settled_touched) {
-    published_settled = std::make_shared<const SettledTable>(settled);
-    settled_touched = false;
+  charge_pending_and_spares();
+  if (skipped_touched) {
+    published_skipped = std::make_shared<const SkippedTable>(skipped);
+    skipped_touched = false;
   }
   return show();
 }
@@ -120,7 +120,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts.dirty = published_dirty;
   parts.sessions = published_sessions;
   parts.labels = published_labels;
-  parts.settled = published_settled;
+  parts.skipped = published_skipped;
   parts.state = state;
   parts.pending_frames = state.pending.size();
   ledger->add(version);
@@ -130,17 +130,17 @@ std::shared_ptr<const MapView> Map::Impl::show() {
     const std::lock_guard lock(view_mutex);
     std::swap(shown, next);
   }
-  if (only_ours(next.view)) {  // else it ends with whoever still reads it
+  if (only_ours(next.view)) {  // otherwise it ends with its last reader
     next.parts->let_go();
     spare_view = std::move(next);
   }
-  // What they showed may be a spare of its own now.
+  // Cleared, so that what they showed can become a spare itself.
   spare_tables.for_each_free([](DirtyTable& table) { table.clear(); });
   spare_chunks.for_each_free([](DirtyChunk& chunk) { chunk = {}; });
   return view;
 }
 
-void Map::Impl::charge_for_what_waits() {
+void Map::Impl::charge_pending_and_spares() {
   const auto charge = [this](Share share, std::size_t& charged, std::size_t bytes) {
     if (bytes == charged) return;
     budget->release(share, charged);

@@ -35,7 +35,7 @@ struct MapTest : ::testing::Test {
     session.last = id.index;
     ++session.frames;
   }
-  // The last chunk of a session that is being deleted from then on.
+  // Removes the last chunk of a session, which is being deleted from then on.
   void remove_chunk(Map& map, SessionNumber number) {
     if (map.session(number)->frames == 0) return;
     map.edit_session(number).state = SessionState::kDeleting;
@@ -48,22 +48,22 @@ struct MapTest : ::testing::Test {
   }
 };
 
-TEST_F(MapTest, WhatIsSettledWithoutAFrameIsFoundBySequence) {
+TEST_F(MapTest, SkippedSequencesAreFoundBySequence) {
   auto map = open();
   for (const SessionNumber number : {1u, 2u}) begin(*map, number);
   const Session before = *map->session(1);
-  std::vector<Settled> all;
+  std::vector<Skipped> all;
   const auto found = [](const Graph& graph, std::uint32_t from) {
-    std::vector<Settled> items;
-    graph.visit_settled(1, from, [&](const Settled& item) { return items.push_back(item), true; });
+    std::vector<Skipped> items;
+    graph.visit_skipped(1, from, [&](const Skipped& item) { return items.push_back(item), true; });
     return items;
   };
-  map->settle(2, {0, 5, 0, false, Reason::CAPTURE_FAILED});
+  map->skip(2, {0, 5, 0, false, Reason::CAPTURE_FAILED});
   for (std::uint32_t from = 20000; from < 20100; from += 10) {
     const bool refused = from % 20 == 0;
     all.push_back({from, from + (refused ? 0 : 4), refused ? from : 0, refused, Reason::CORRUPT});
     const auto view = map->view();
-    map->settle(1, all.back());
+    map->skip(1, all.back());
     EXPECT_EQ(found(*view, 0).size(), all.size() - 1);
     EXPECT_EQ(found(*map, 0), all);
     EXPECT_EQ(found(*map->publish(), 0), all);
@@ -78,14 +78,14 @@ TEST_F(MapTest, WhatIsSettledWithoutAFrameIsFoundBySequence) {
   EXPECT_EQ(found(*map, 20055).front(), all[6]);
   EXPECT_TRUE(found(*map, 20095).empty());
   std::size_t visited = 0;
-  map->visit_settled(1, 0, [&](const Settled&) { return ++visited < 3; });
+  map->visit_skipped(1, 0, [&](const Skipped&) { return ++visited < 3; });
   EXPECT_EQ(visited, 3u);
   ASSERT_TRUE(map->commit().ok());
   EXPECT_EQ(budget->used(Share::kDirty), 0u);
   EXPECT_EQ(found(*open(), 0), all);
 }
 
-TEST_F(MapTest, FramesThatWaitAreWrittenChunkByChunkAsTheyChange) {
+TEST_F(MapTest, PendingFramesAreWrittenChunkByChunkAsTheyChange) {
   auto map = open();
   begin(*map, 1);
   std::set<FrameId> expected;
@@ -179,7 +179,7 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
   EXPECT_EQ(left, 0u);
 }
 
-TEST_F(MapTest, ASessionGoesChunkByChunkAndViewsOfBeforeStillHaveIt) {
+TEST_F(MapTest, ASessionIsRemovedChunkByChunkAndEarlierViewsStillHaveIt) {
   auto map = open();
   for (const SessionNumber number : {1u, 2u}) begin(*map, number);
   for (std::uint32_t i = 0; i < 200; ++i) {
@@ -244,8 +244,8 @@ TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
   EXPECT_EQ(large, small);
 }
 
-// Edits go on while a commit is being written, which fails now and then: no reader sees anything of it, and what comes
-// back is what was committed last.
+// Edits go on while a commit is being written, and commits fail now and then. No reader notices any of it, and a reload
+// gives what was committed last.
 TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
   const auto faults = std::make_shared<Faults>();
   engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
@@ -268,7 +268,7 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
       if (random.below(4) == 0) map->state().pending.erase(id);
     }
     if (random.below(40) == 0) remove_chunk(*map, 2);
-    if (step % 40 == 0) map->settle(1, {100000u + static_cast<std::uint32_t>(step), 100000u + step, 1, true, {}});
+    if (step % 40 == 0) map->skip(1, {100000u + static_cast<std::uint32_t>(step), 100000u + step, 1, true, {}});
     if (random.below(2) == 0) map->publish();
     if (step % 7 == 0) {
       const auto view = map->publish();
@@ -421,7 +421,7 @@ TEST_F(MapTest, DamagedPartsAreNamed) {
   ASSERT_EQ(before.size(), 1u);  // the others are as readable as ever
   EXPECT_NE(before[0].find("hot part of frame 1:"), std::string::npos) << before[0];
 
-  // A commit that writes other frames of the chunk carries the damage along, neither hidden nor spread.
+  // A commit that writes other frames of the chunk keeps the damage as it is, neither hidden nor spread.
   std::uint32_t sound = 0;
   while (before[0].find("1:" + std::to_string(sound) + ":") != std::string::npos) ++sound;
   map->edit_hot({1, sound}).mean_error = 0.5F;
@@ -496,7 +496,7 @@ TEST_F(MapTest, WordsAreScannedWithoutTheDescriptors) {
   EXPECT_EQ(seen, with_words) << "what is known is passed over";
 }
 
-TEST_F(MapTest, HashesDependOnWhatIsSaidAndNotOnSessionNumbers) {
+TEST_F(MapTest, HashesDependOnContentAndNotOnSessionNumbers) {
   const auto build = [&](SessionNumber a, SessionNumber b, float error) {
     engine = make_memory_engine();
     epoch = engine->acquire().value();
@@ -530,7 +530,7 @@ TEST_F(MapTest, HashesDependOnWhatIsSaidAndNotOnSessionNumbers) {
   EXPECT_NE(other.estimates, one.estimates);
 }
 
-TEST_F(MapTest, EditingWhatIsNotThereIsRefused) {
+TEST_F(MapTest, EditingWhatDoesNotExistIsRefused) {
   auto map = open();
   begin(*map, 1);
   EXPECT_THROW(map->edit_hot({1, 0}), StatusError);

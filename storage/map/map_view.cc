@@ -2,7 +2,7 @@
 #include "storage/map/label_index.h"
 #include "storage/map/map_view_impl.h"
 #include "storage/map/part_loader.h"
-#include "storage/map/settled_index.h"
+#include "storage/map/skipped_index.h"
 
 namespace relmap::storage {
 
@@ -73,9 +73,9 @@ std::optional<Session> MapView::session(SessionNumber number) const {
   return session ? std::optional<Session>(*session) : std::nullopt;
 }
 
-void MapView::visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const {
+void MapView::visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const {
   impl_->check_alive();
-  relmap::storage::visit_settled(*impl_->snapshot, *impl_->settled, session, sequence, visit);
+  relmap::storage::visit_skipped(*impl_->snapshot, *impl_->skipped, session, sequence, visit);
 }
 
 std::vector<FrameId> MapView::labelled(const std::string& label) const {

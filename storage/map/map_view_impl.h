@@ -16,16 +16,16 @@ struct MapView::Impl {
   std::shared_ptr<ChunkCache> cache;
   std::shared_ptr<ViewLedger> ledger;
   std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
-  std::shared_ptr<const DirtyTable> dirty;         // over it
+  std::shared_ptr<const DirtyTable> dirty;         // on top of it
   std::shared_ptr<const SessionTable> sessions;
   std::shared_ptr<const LabelChanges> labels;
-  std::shared_ptr<const SettledTable> settled;
+  std::shared_ptr<const SkippedTable> skipped;
   MapFacts state;
   std::size_t pending_frames = 0;
 
   ~Impl() { let_go(); }
   void check_alive() const;
-  // Ends the version: nobody reads it any more.
+  // Releases what the view holds, once nobody reads it any more.
   void let_go() {
     if (!ledger) return;
     dirty.reset();
@@ -34,7 +34,7 @@ struct MapView::Impl {
     snapshot.reset();
     sessions.reset();
     labels.reset();
-    settled.reset();
+    skipped.reset();
   }
 };
 

@@ -46,7 +46,7 @@ TEST_F(MapViewTest, GivesAllFramesOfAChunkAsOneByOne) {
   begin(1, 100);
   ASSERT_TRUE(map->commit().ok());
   add({1, 130});                          // behind a gap
-  map->edit_hot({1, 70}).mean_error = 3;  // over what is committed
+  map->edit_hot({1, 70}).mean_error = 3;  // on top of what is committed
   const auto view = map->publish();
   for (const ChunkId chunk : {ChunkId{1, 0}, ChunkId{1, 1}, ChunkId{1, 2}, ChunkId{1, 3}, ChunkId{2, 0}}) {
     const Slots<FrameHot> frames = view->hot_frames(chunk);
@@ -189,7 +189,7 @@ TEST_F(MapViewTest, AnOldViewOverItsShareIsCutOffAndTheNewestNever) {
   EXPECT_NO_THROW(map->view()->hot({1, 0}));
 }
 
-// A writer edits two frames of different chunks always together; readers hold views while commits and evictions go on.
+// A writer always edits two frames of different chunks together; readers hold views during commits and evictions.
 TEST_F(MapViewTest, StaysConsistentUnderEditsCommitsAndEvictions) {
   open(std::size_t{300} << 10);
   constexpr std::uint32_t kFrames = 3 * kFramesPerChunk;
@@ -237,7 +237,7 @@ TEST_F(MapViewTest, StaysConsistentUnderEditsCommitsAndEvictions) {
   EXPECT_LE(budget->used(Share::kCache), budget->limit());
 }
 
-TEST_F(MapViewTest, AChunkShowsNothingOfTheOneInWhoseMemoryItIsMade) {
+TEST_F(MapViewTest, AChunkShowsNothingOfTheOneWhoseMemoryItReuses) {
   open(std::size_t{64} << 20);
   begin(1, 2 * kFramesPerChunk);
   ASSERT_TRUE(map->commit().ok());
@@ -251,9 +251,9 @@ TEST_F(MapViewTest, AChunkShowsNothingOfTheOneInWhoseMemoryItIsMade) {
   EXPECT_EQ(map->view()->hot({1, kFramesPerChunk + 1})->mean_error, 3);
 }
 
-// The same frames edited over and over, so that each version is made in the memory of one that was let go, while
-// readers hold views and, longer than those, frames.
-TEST_F(MapViewTest, WhatIsHeldStaysAsItIsWhileMemoryGoesRound) {
+// The same frames are edited over and over, so that each version is made in the memory of a released one, while readers
+// hold views and, for longer, frames.
+TEST_F(MapViewTest, WhatIsHeldDoesNotChangeWhileMemoryIsReused) {
   open(std::size_t{64} << 20);
   constexpr std::uint32_t kFrames = 3;
   begin(1, kFrames);
@@ -299,7 +299,7 @@ TEST_F(MapViewTest, AFrameIsEditedInTheMemoryOfTheVersionBeforeTheLast) {
   open(std::size_t{64} << 20);
   begin(1, 1);
   map->publish();
-  const std::weak_ptr<const FrameHot> first = map->hot({1, 0});  // its memory is not given back meanwhile
+  const std::weak_ptr<const FrameHot> first = map->hot({1, 0});  // so that its memory is not freed meanwhile
   const FrameHot* const at = first.lock().get();
   map->edit_hot({1, 0}).mean_error = 1;
   map->publish();

@@ -10,7 +10,7 @@ std::optional<Bytes> get(const EngineSnapshot& snapshot, const std::string& key)
   return snapshot.get(key).or_throw();
 }
 
-// Calls take(slot, body) for the frame of a container of one; the number of the commit that wrote it.
+// Calls take(body) for the frame in a container of one, and returns the number of the commit that wrote it.
 template <typename Take>
 std::uint64_t open_single(ByteSpan bytes, Part part, FrameId id, Take take) {
   const auto reader = PartReader::open(bytes, part, chunk_id(id));

@@ -1,4 +1,4 @@
-// Reads parts from a snapshot; no cache. All throw StatusError (IO_ERROR, DATA_LOSS naming the part).
+// Reads parts from a snapshot, without a cache. All functions throw StatusError (IO_ERROR, DATA_LOSS naming the part).
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@ namespace relmap::storage {
 template <typename Frame>  // FrameHot or FrameWarm
 struct LoadedPart {
   std::shared_ptr<const PackedPart<Frame>> part;
-  std::uint64_t commit = 0;  // the last that wrote to it; 0: there is no such chunk
+  std::uint64_t commit = 0;  // the last that wrote to it; 0 if there is no such chunk
 };
-// A closed chunk's part, or an open chunk's frames gathered.
+// The part of a closed chunk, or of an open one, gathered from its frames.
 template <typename Frame>
 LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget);
 

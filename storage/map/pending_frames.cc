@@ -17,7 +17,7 @@ Status load_pending(const EngineSnapshot& snapshot, FrameSet& pending,
                        ": " + frames.status().to_string());
     return true;
   });
-  pending.take_changes();  // it is as it stands there
+  pending.take_changes();  // it is the same as what is stored
   return scanned;
 }
 

@@ -1,4 +1,4 @@
-// Frames that wait for relaxation, as they are written down: chunk by chunk, those that changed.
+// Frames that wait for relaxation, as they are stored: by chunk, each chunk when it changes.
 #pragma once
 
 #include <functional>
@@ -10,10 +10,12 @@
 
 namespace relmap::storage {
 
-// IO_ERROR. A record that cannot be read is left out, and `damaged` told its key and what is wrong.
+// Reads them into `pending`. A record that cannot be read is left out; `damaged` is called with its key and with what
+// is wrong. IO_ERROR.
 Status load_pending(const EngineSnapshot& snapshot, FrameSet& pending,
                     const std::function<void(std::string_view key, const std::string& what)>& damaged);
 
+// Appends the puts and deletes for the chunks that have changed.
 void write_pending(const FrameSet& pending, std::vector<Put>& puts, std::vector<std::string>& deletes);
 
 }  // namespace relmap::storage

@@ -28,7 +28,7 @@ struct WorkingChunk {
   WorkingPart<FrameWarm> warm;
   WorkingPart<FrameCold> cold;
   bool touched = false;  // since the last publish
-  bool removed = false;  // what was written of it before is not in the map any more
+  bool removed = false;  // the committed chunk is not in the map any more
 
   template <typename Frame>
   const WorkingPart<Frame>& part() const {

@@ -39,7 +39,7 @@ std::string_view share_name(Share share) {
 
 Budget::Budget(std::size_t limit_bytes) : limit_(limit_bytes) {}
 
-// Each counter is read once: while others count, no share is taken off that was not added.
+// Reads each counter once, and only adds. Subtracting a share from a total could go wrong while other threads count.
 std::size_t Budget::sum(bool with_cache, bool with_routes) const {
   std::size_t sum = 0;
   for (std::size_t i = 0; i < kShares; ++i) {
@@ -89,7 +89,7 @@ bool Budget::try_charge(Share share, std::size_t bytes) {
     if (mine + bytes > allowance(share)) return false;
     if (counter.compare_exchange_weak(mine, mine + bytes)) break;
   }
-  // Without the cache and the routes: they give way.
+  // Without the cache and the routes, since they give way.
   if (share != Share::kPictures && !gives_way(share) && sum(false, false) > limit_) {
     counter.fetch_sub(bytes);
     return false;

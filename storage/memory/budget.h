@@ -1,5 +1,5 @@
-// One accountant for every byte that grows with the map, the load or the number of callers (docs/architecture.md).
-// Over the budget the order is: evict, then refuse with BUDGET_EXCEEDED; never grow.
+// Accounts for every byte that grows with the map, the load or the number of callers (docs/architecture.md). Over the
+// budget, memory is first evicted, then refused with BUDGET_EXCEEDED; it never grows.
 #pragma once
 
 #include <array>
@@ -37,28 +37,28 @@ class Budget {
   explicit Budget(std::size_t limit_bytes);
 
   std::size_t limit() const { return limit_; }
-  std::size_t used() const;               // kPictures apart
-  std::size_t used_beside_cache() const;  // and the cache
+  std::size_t used() const;               // without kPictures
+  std::size_t used_beside_cache() const;  // without kPictures and kCache
   std::size_t used(Share share) const;
 
-  // What a share may take of the whole. Fixed parts of the limit: engine and place index 1/4 each, dirty and views 1/8
-  // each, queues, reassembly, replies and sessions 1/16 each; the cache what the others leave, and routes 3/4 of what
-  // all others but the cache do; pictures their reserve.
+  // The bytes that a share may take at most. Fixed parts of the limit: engine and place index 1/4 each, dirty and views
+  // 1/8 each, queues, reassembly, replies and sessions 1/16 each. The cache may take what the others leave, routes 3/4
+  // of what all others but the cache leave, and pictures their reserve.
   std::size_t allowance(Share share) const;
 
-  // False, and nothing is charged, if that would pass the share's allowance or, once cache and routes have given way,
-  // the limit.
+  // Returns false and charges nothing if the share would exceed its allowance, or if the limit would be exceeded even
+  // after cache and routes have given way.
   bool try_charge(Share share, std::size_t bytes);
-  // Charged whatever the limit says: for memory that already exists. The caller evicts next.
+  // Charges whatever the limit says: for memory that already exists. The caller evicts next.
   void charge(Share share, std::size_t bytes);
   void release(Share share, std::size_t bytes);
-  // For shares that are measured rather than counted (engine, place index).
+  // Sets the bytes of a share that is measured rather than counted (engine, place index).
   void set(Share share, std::size_t bytes);
 
-  // `evict` is called, from any thread, when another share's growth has taken the whole over the limit: the cache makes
-  // room, and where that is not enough the routes. It may release() but not charge.
+  // `evict` is called, from any thread, when the growth of another share has taken the total over the limit: the cache
+  // makes room and, where that is not enough, the routes do. It may release() but not charge.
   void add_evictor(const void* owner, std::function<void()> evict);
-  void remove_evictor(const void* owner);  // on return no call to it is under way
+  void remove_evictor(const void* owner);  // when this returns, no call to it is under way
 
  private:
   static bool gives_way(Share share) { return share == Share::kCache || share == Share::kRoutes; }

@@ -65,7 +65,7 @@ TEST(Budget, RoutesTakeThreeQuartersOfWhatAllButTheCacheLeave) {
   EXPECT_FALSE(budget.try_charge(Share::kRoutes, 1));
   EXPECT_EQ(budget.used(Share::kRoutes), 750u);
   EXPECT_EQ(budget.used_beside_cache(), 1350u);
-  // What others need is theirs, though routes hold it still.
+  // Others get what they need even while routes still hold it.
   EXPECT_TRUE(budget.try_charge(Share::kQueues, 100));
   budget.set(Share::kEngine, 400);
   EXPECT_EQ(budget.allowance(Share::kRoutes), 375u);

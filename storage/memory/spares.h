@@ -1,5 +1,5 @@
-// Objects that have been replaced and may still be read by others: kept until nobody does, then filled anew, in the
-// memory that they have.
+// Objects that have been replaced and may still be read by others. They are kept until nobody reads them, and are then
+// filled anew in the memory that they have.
 #pragma once
 
 #include <algorithm>
@@ -12,11 +12,12 @@
 
 namespace relmap::storage {
 
-// Whether nobody else holds the object; nobody else must be able to begin to.
+// Whether nobody else holds the object. Nobody else must be able to get hold of it meanwhile.
 template <typename T>
 bool only_ours(const std::shared_ptr<T>& object) {
   if (object.use_count() != 1) return false;
-  // use_count() alone orders nothing: by changing the count, what others did before they let go has happened before.
+  // use_count() alone orders nothing. Copying the pointer changes the count, so that what others did before they let go
+  // has happened before this.
   const std::shared_ptr<T> after_them = object;
   return true;
 }
@@ -24,28 +25,30 @@ bool only_ours(const std::shared_ptr<T>& object) {
 template <typename T>
 class Spares {
  public:
-  explicit Spares(std::size_t most) : most_(most) { spares_.reserve(most); }
+  explicit Spares(std::size_t max_objects) : max_objects_(max_objects) { spares_.reserve(max_objects); }
 
-  // `of`: what it was a version of; its next version fits into it best. The oldest gives way.
+  // `of` is the frame that the object was a version of; the frame's next version fits into it best. The oldest object
+  // is dropped if there are max_objects already.
   void put(std::shared_ptr<T> object, std::size_t bytes = 0, FrameId of = {}) {
-    if (spares_.size() == most_) drop(0);
+    if (spares_.size() == max_objects_) drop(0);
     bytes_ += bytes;
     spares_.push_back({std::move(object), bytes, of});
   }
 
-  // A free one that was a version of the same; or, if there are as many as may be, the oldest that is free: its like
-  // has not been asked for for long. Null: neither is there.
+  // Takes a free object that was a version of `of`. If there is none and the store is full, takes the oldest free one,
+  // whose frame has not been asked for for long. Null if there is neither.
   std::shared_ptr<T> take(FrameId of = {}) {
     const auto free = [](const Spare& spare) { return only_ours(spare.object); };
     auto found = std::find_if(spares_.begin(), spares_.end(), [&](const Spare& s) { return s.of == of && free(s); });
-    if (found == spares_.end() && spares_.size() == most_) found = std::find_if(spares_.begin(), spares_.end(), free);
+    if (found == spares_.end() && spares_.size() == max_objects_)
+      found = std::find_if(spares_.begin(), spares_.end(), free);
     if (found == spares_.end()) return nullptr;
     std::shared_ptr<T> object = std::move(found->object);
     drop(static_cast<std::size_t>(found - spares_.begin()));
     return object;
   }
 
-  // Those that are free.
+  // Visits the objects that nobody else holds.
   template <typename Visit>
   void for_each_free(Visit visit) {
     for (const Spare& spare : spares_)
@@ -70,7 +73,7 @@ class Spares {
     spares_.erase(spares_.begin() + static_cast<std::ptrdiff_t>(k));
   }
 
-  const std::size_t most_;
+  const std::size_t max_objects_;
   std::vector<Spare> spares_;  // oldest first
   std::size_t bytes_ = 0;
 };

@@ -25,7 +25,7 @@ TEST(Spares, AreTakenOnlyWhenNobodyReadsThem) {
   EXPECT_EQ(spares.take({1, 7}), nullptr);
 }
 
-TEST(Spares, GoToTheSameFrameAndToAnotherOnlyWhereThereAreMany) {
+TEST(Spares, AreReusedForTheSameFrameAndForAnotherOnlyWhenFull) {
   Spares<int> spares(3);
   for (std::uint32_t frame : {1U, 2U}) spares.put(std::make_shared<int>(frame), 1, {1, frame});
   EXPECT_EQ(spares.take({1, 9}), nullptr);

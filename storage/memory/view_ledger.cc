@@ -33,7 +33,7 @@ bool ViewLedger::held(const Retired& part, std::uint64_t from) const {
   return it != live_.end() && *it < part.retired;
 }
 
-// Cuts off as many of the oldest views as it takes for the rest to hold no more than the allowance.
+// Cuts off the oldest views until the others hold no more than the allowance.
 void ViewLedger::expire() {
   const std::size_t allowance = budget_->allowance(Share::kViews);
   std::uint64_t below = expired_below_.load(std::memory_order_relaxed);

@@ -1,6 +1,6 @@
-// Which bytes are held only by old views. A part that was visible in versions [created, retired) is held, after that,
-// by whichever of those views are still alive; its bytes are charged to Share::kViews until the last of them is gone.
-// When the share is over its allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED.
+// Accounts for the bytes that only old views hold. A part that was visible in versions [created, retired) is held, from
+// then on, by those of these views that are still alive; its bytes are charged to Share::kViews until the last of them
+// is gone. When the share exceeds its allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED.
 #pragma once
 
 #include <atomic>
@@ -19,11 +19,11 @@ class ViewLedger {
  public:
   explicit ViewLedger(std::shared_ptr<Budget> budget) : budget_(std::move(budget)) {}
 
-  // A view of this version lives, and is gone. Versions grow.
+  // A view of this version has been made, or has ended. Versions must grow.
   void add(std::uint64_t version);
   void remove(std::uint64_t version);
 
-  // A part of this size is no longer in the views from `retired` on.
+  // A part of `bytes` that views have shown since version `created` is no longer in the views from `retired` on.
   void retire(std::uint64_t created, std::uint64_t retired, std::size_t bytes);
 
   bool expired(std::uint64_t version) const { return version < expired_below_.load(std::memory_order_relaxed); }

@@ -62,7 +62,7 @@ LandmarkItem get_landmark_item(ByteReader& r) {
   return item;
 }
 
-// The next `count` items of `from`; false if there are not so many.
+// Copies the next `count` items of `from`; false if there are fewer.
 template <typename T>
 bool take(const std::vector<T>& from, std::size_t& next, std::size_t count, std::vector<T>& to) {
   if (count > from.size() - next) return false;

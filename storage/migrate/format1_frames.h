@@ -11,7 +11,7 @@ namespace relmap::storage::format1 {
 
 inline constexpr std::uint16_t kPartVersion = 1;
 
-// nullopt: no such body.
+// nullopt if the bytes are not such a body.
 std::optional<FrameHot> decode_hot(ByteSpan body);
 std::optional<FrameWarm> decode_warm(ByteSpan body);
 std::optional<FrameCold> decode_cold(ByteSpan body);  // without the words

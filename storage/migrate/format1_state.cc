@@ -18,8 +18,8 @@ Result<SessionRecord> decode_session(ByteSpan bytes) {
   ByteReader r(sealed->body);
   SessionRecord record;
   Session& s = record.session = get_session(r);
-  const bool whole = codec::get_table(r, record.settled, [](ByteReader& in) {
-    Settled item;
+  const bool whole = codec::get_table(r, record.skipped, [](ByteReader& in) {
+    Skipped item;
     item.from = in.get<std::uint32_t>();
     item.to = in.get<std::uint32_t>();
     item.crc = in.get<std::uint32_t>();
@@ -28,7 +28,7 @@ Result<SessionRecord> decode_session(ByteSpan bytes) {
     return item;
   });
   if (sealed->kind != kSession || !whole || !r.at_end()) return Status(Reason::CORRUPT, "malformed session");
-  for (const Settled& item : record.settled)
+  for (const Skipped& item : record.skipped)
     (item.refused ? s.refused : s.given_up) += std::uint64_t{item.to} - item.from + 1;
   return record;
 }

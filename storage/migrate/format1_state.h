@@ -1,5 +1,5 @@
-// Sessions and the map's state as map format 1 (relmap 0.1.0) wrote them: what a session settled without a frame stood
-// in its record, frames that wait for relaxation in the map's state. Read only to be migrated.
+// Sessions and the map's state as map format 1 (relmap 0.1.0) wrote them: skipped sequences stood in the record of
+// their session, frames that wait for relaxation in the map's state. Read only to be migrated.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@ namespace relmap::storage::format1 {
 
 struct SessionRecord {
   Session session;  // refused and given_up counted
-  std::vector<Settled> settled;
+  std::vector<Skipped> skipped;
 };
 // CORRUPT, TRUNCATED or UNKNOWN_FORMAT_VERSION.
 Result<SessionRecord> decode_session(ByteSpan bytes);

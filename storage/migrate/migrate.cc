@@ -50,7 +50,7 @@ Frame whole(const keys::PartKey& key, std::optional<Frame> frame) {
   return std::move(*frame);
 }
 
-// A frame's record of format 1 as one of today; empty: today nothing stands for it.
+// Converts a frame's record of format 1 to one of today; empty if today's format stores nothing for it.
 Bytes converted(const keys::PartKey& key, FrameId id, ByteSpan body) {
   ByteWriter w;
   switch (key.part) {
@@ -75,7 +75,7 @@ Bytes converted(const keys::PartKey& key, FrameId id, ByteSpan body) {
   return w.take();
 }
 
-// Writes what it is given in batches; nobody reads the folder before it is whole.
+// Writes a new map in batches; nobody reads the folder before it is whole.
 class Target {
  public:
   Target(const std::string& directory, std::uint64_t applied) : applied_(applied) {
@@ -94,12 +94,12 @@ class Target {
     puts_.clear();
     bytes_ = 0;
   }
-  // Paths between frames are others than format 1's, and with them what is derived from paths.
+  // Paths between frames differ from those of format 1, and so does what is derived from paths.
   void rebuild_derived() {
     const auto map = Map::open(engine_, epoch_, std::make_shared<Budget>(kRebuildBytes)).or_throw();
     relmap::storage::rebuild_derived(*map, *engine_, kRebuildBytes, {}, {}).or_throw();
   }
-  // Numbers are never given twice, not even across a migration.
+  // Session numbers are never given twice, not even across a migration.
   void give_out_sessions(SessionNumber through) {
     while (engine_->allocate_session(epoch_).or_throw() < through) {
     }
@@ -132,8 +132,8 @@ std::uint64_t copy_format1(const Engine& source, Target& target, const Progress&
     total += record.session.frames;
     sessions = std::max(sessions, record.session.number);
     target.put(keys::session(record.session.number), encode_session(record.session));
-    for (const Settled& item : record.settled)
-      target.put(keys::settled(record.session.number, item.to), encode_settled(item));
+    for (const Skipped& item : record.skipped)
+      target.put(keys::skipped(record.session.number, item.to), encode_skipped(item));
     return true;
   }));
   expect(snapshot->scan("", [&](std::string_view key, ByteSpan value) {
@@ -170,7 +170,7 @@ std::uint64_t copy_format1(const Engine& source, Target& target, const Progress&
   return done;
 }
 
-// Records that the map does not contain yet.
+// Copies the records that the map does not contain yet.
 void copy_journal(const Engine& source, const std::string& directory) {
   RocksDbOptions options;
   options.cache_bytes = kCacheBytes;

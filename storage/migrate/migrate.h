@@ -11,17 +11,17 @@ namespace relmap::storage {
 
 struct MigrateSummary {
   int from = 0, to = 0;      // formats; equal: there was nothing to do
-  std::uint64_t frames = 0;  // brought over
+  std::uint64_t frames = 0;  // that were migrated
   std::string kept;          // folder with the map as it was; empty if there was nothing to do
 };
 
-// The new map is made in DIRECTORY.migrating and changes places with the old one when it is whole and durable; the old
-// one is kept as DIRECTORY.format-N. Interrupted at any moment, DIRECTORY is one of the two; run again, it begins anew.
-// From format 1 every frame is written anew, and estimates are rounded to the precision that is kept since
+// The new map is made in DIRECTORY.migrating, and changes places with the old one when it is whole and durable; the old
+// one is kept as DIRECTORY.format-N. If interrupted at any moment, DIRECTORY is one of the two; another run starts
+// over. From format 1 every frame is written anew, and estimates are rounded to the precision that is kept since
 // (storage/graph/precision.h). Format 2 is read as it is: the map keeps its bytes, and shares its tables with the old
 // one where the disk can.
 //
-// `progress`: frames done, of those in the map; from this thread.
+// `progress` is called by this thread, with the frames done and the number of frames in the map.
 //
 // FOLDER_LOCKED, NO_SUCH_FILE, UNKNOWN_FORMAT_VERSION (a format that no release wrote, or a newer one), DATA_LOSS
 // naming the part (repair it with the release that wrote it), IO_ERROR.

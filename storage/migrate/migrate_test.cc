@@ -65,7 +65,7 @@ class Migrate : public ::testing::Test {
       EXPECT_EQ(cold->words.size(), cold->appearance.size());
       EXPECT_GT(map->warm({1, i})->observations.size(), 20U);
     }
-    // Of its `relmap edges --json`.
+    // From its `relmap edges --json`.
     const auto edge = find_edge(*map, {{1, 1}, 0});
     ASSERT_TRUE(edge);
     EXPECT_NEAR(edge->T_ab.t.z(), 0.19244786469131184, 1e-8);
@@ -158,7 +158,7 @@ TEST_F(Migrate, TakesAMapOfFormat2OverAsItIs) {
     salted += SegmentName::parse(entry.path().filename())->salt.has_value();
   EXPECT_EQ(salted, 1U);
 
-  // The old one shares tables with it, and is what it was.
+  // The old map shares tables with the new one, and is what it was.
   RocksDbOptions options;
   options.read_only = true;
   options.format = 2;

@@ -27,7 +27,7 @@ Status failed(const std::string& what) {
 
 namespace fs = std::filesystem;
 
-// What a first start makes before FORMAT stands in the folder, and what a file system has in its topmost one.
+// What a first start makes before FORMAT is in the folder, and what a file system has in its root.
 bool may_be_in_a_new_folder(const std::string& name) {
   return name == "LOCK" || name == "FORMAT.new" || name == "lost+found";
 }
@@ -79,8 +79,7 @@ Result<std::unique_ptr<FolderLock>> FolderLock::take(const std::string& director
     if (errno != EWOULDBLOCK) return failed(path);
     return Status(Reason::FOLDER_LOCKED, directory + " is owned by " + lock_owner(directory));
   }
-  const std::string owner =
-      std::to_string(::getpid()) + "\n";  // where it cannot be written, nobody is the worse for it
+  const std::string owner = std::to_string(::getpid()) + "\n";  // for people only: it may fail
   if (::ftruncate(fd, 0) == 0) (void)!::pwrite(fd, owner.data(), owner.size(), 0);
   return lock;
 }

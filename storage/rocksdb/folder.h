@@ -10,7 +10,7 @@ namespace relmap::storage {
 
 inline constexpr int kFolderFormat = 3;
 
-// Held for as long as the object lives; the system releases it if the process ends. Its file says whose it is.
+// Held for as long as the object lives; the system releases it if the process ends. The file LOCK names the owner.
 class FolderLock {
  public:
   // FOLDER_LOCKED, with the owner's process id; IO_ERROR.
@@ -24,21 +24,21 @@ class FolderLock {
   const int fd_;
 };
 
-// "process 4711": who holds the lock, as far as its file tells.
+// The owner of the lock, as far as its file tells: "process 4711".
 std::string lock_owner(const std::string& directory);
 
-// Whether the folder is a map's, or may become one: it is not there, is empty, or holds what a first start leaves that
-// was broken off (and lost+found). Writes nothing. NOT_A_MAP: something else lies in it; UNKNOWN_FORMAT_VERSION: the
-// parts of a map do, but no FORMAT, or one that is not ours; IO_ERROR.
+// Whether the folder is a map's or may become one: it is missing, empty, or holds only what an interrupted first start
+// leaves (and lost+found). Writes nothing. NOT_A_MAP: something else lies in it; UNKNOWN_FORMAT_VERSION: it holds the
+// parts of a map but no FORMAT, or one that is not ours; IO_ERROR.
 Status check_folder(const std::string& directory);
 
-// The version in the folder; 0: there is none. UNKNOWN_FORMAT_VERSION: it is not ours.
+// The format version of the folder; 0 if it has none. UNKNOWN_FORMAT_VERSION if FORMAT is not ours.
 Result<int> read_format(const std::string& directory);
 
-// That the folder has this version. It is written into a folder that has none (check_folder()). UNKNOWN_FORMAT_VERSION,
-// NOT_A_MAP, IO_ERROR; NO_SUCH_FILE if read_only and there is none.
+// Checks that the folder has this format version, and writes it into a folder that has none (check_folder()).
+// UNKNOWN_FORMAT_VERSION, NOT_A_MAP, IO_ERROR; NO_SUCH_FILE if `read_only` and there is none.
 Status check_format(const std::string& directory, bool read_only, int format = kFolderFormat);
-// Writes it, whatever stands there.
+// Writes the format version, whatever FORMAT says now.
 Status write_format(const std::string& directory, int format);
 
 }  // namespace relmap::storage

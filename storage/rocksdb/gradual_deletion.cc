@@ -13,11 +13,12 @@ class GradualDeletion final : public rocksdb::FileSystemWrapper {
   using FileSystemWrapper::FileSystemWrapper;
   const char* Name() const override { return "GradualDeletion"; }
 
-  // RocksDB deletes what its manifest, synced before, does not name any more: a crash on the way loses nothing.
+  // RocksDB deletes only files that its manifest, which is synced, no longer names. So a crash on the way loses
+  // nothing.
   rocksdb::IOStatus DeleteFile(const std::string& name, const rocksdb::IOOptions& options,
                                rocksdb::IODebugContext* dbg) override {
     std::uint64_t links = 0, size = 0;
-    const bool ours = target()->NumFileLinks(name, options, &links, dbg).ok() && links == 1;  // else a backup's too
+    const bool ours = target()->NumFileLinks(name, options, &links, dbg).ok() && links == 1;  // no backup has it
     if (ours && target()->GetFileSize(name, options, &size, dbg).ok())
       while (size > kStep && step(name, size -= kStep, options, dbg)) {
       }
@@ -25,7 +26,7 @@ class GradualDeletion final : public rocksdb::FileSystemWrapper {
   }
 
  private:
-  // And a pause as long as it took.
+  // One cut, and a pause for as long as it took.
   bool step(const std::string& name, std::uint64_t size, const rocksdb::IOOptions& options,
             rocksdb::IODebugContext* dbg) {
     const auto start = std::chrono::steady_clock::now();

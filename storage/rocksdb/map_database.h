@@ -1,6 +1,6 @@
-// RocksDB as the map uses it: what is written once for good, cold parts and words, stands in a column family of its
-// own, so that neither compaction nor the collection of garbage among the parts that are rewritten ever reads or moves
-// it, and the index of those stays small enough to be in memory. Private to the engine.
+// RocksDB as the map uses it. What is written once for good, cold parts and words, has a column family of its own. So
+// neither compaction nor the collection of garbage among the parts that are rewritten ever reads or moves it, and the
+// index of those parts stays small enough to be in memory. Private to the engine.
 #pragma once
 
 #include <rocksdb/db.h>
@@ -14,7 +14,7 @@ namespace relmap::storage {
 
 class MapDatabase {
  public:
-  // Made if it is not there and `read_only` is not set. A map of format 1 has one family for all.
+  // Creates the database if it is missing and `read_only` is not set. A map of format 1 has one family for everything.
   static rocksdb::Status open(const rocksdb::Options& options, const std::string& path, bool read_only,
                               std::unique_ptr<MapDatabase>* database);
   MapDatabase() = default;  // for open()
@@ -24,7 +24,7 @@ class MapDatabase {
 
   rocksdb::DB& db() const { return *db_; }
   const std::vector<rocksdb::ColumnFamilyHandle*>& families() const { return families_; }
-  // In which a key stands, or all keys with this prefix (not empty).
+  // The family of a key, or of all keys with this prefix, which must not be empty.
   rocksdb::ColumnFamilyHandle* family(std::string_view key) const;
 
  private:

@@ -9,13 +9,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// As it is without links and steps back, and without a slash at its end, so that a suffix can follow.
+// The path without links, without ".." and without a slash at its end, so that a suffix can be appended.
 std::string name_of(const std::string& directory) {
   const fs::path path = fs::weakly_canonical(fs::absolute(directory));
   return (path.has_filename() ? path : path.parent_path()).string();
 }
 
-// Whether `path`, which need not exist, is `folder` or lies in it: also by another name, as a mount gives one.
+// Whether `path`, which need not exist, is `folder` or lies in it, also by another name, such as one that a mount
+// gives.
 bool is_within(fs::path path, const fs::path& folder) {
   for (;; path = path.parent_path()) {
     if (path == folder || (fs::exists(path) && fs::equivalent(path, folder))) return true;
@@ -53,7 +54,7 @@ Result<std::unique_ptr<PartialFolder>> PartialFolder::begin(const std::string& g
     if (fs::exists(directory) && !(fs::is_directory(directory) && fs::is_empty(directory)))
       return Status(Reason::INVALID_ARGUMENT, directory + " exists and is not an empty folder");
     if (fs::exists(path) && !fs::exists(path + "/LOCK") && !(fs::is_directory(path) && fs::is_empty(path)))
-      return Status(Reason::INVALID_ARGUMENT, path + " is in the way, and no leftover of ours");
+      return Status(Reason::INVALID_ARGUMENT, path + " is in the way: it is not what an interrupted attempt left");
     fs::create_directories(path);
     auto lock = FolderLock::take(path);
     if (lock.reason() == Reason::FOLDER_LOCKED)

@@ -1,5 +1,5 @@
-// A data folder in the making: written as DIR.partial, and DIR only when it is complete and durable, so that nobody
-// takes half of one for a whole.
+// A data folder in the making. It is written as DIR.partial, and becomes DIR only when it is complete and durable, so
+// that nobody takes half of one for a whole.
 #pragma once
 
 #include <memory>
@@ -11,17 +11,17 @@ namespace relmap::storage {
 
 class PartialFolder {
  public:
-  // `directory` must not exist or be empty, and neither it nor the one in the making may be `source`, the data folder
-  // that is copied, lie in it or hold it, whatever links lead there; else INVALID_ARGUMENT. What an interrupted attempt
-  // left is removed; FOLDER_LOCKED if one is under way. IO_ERROR.
+  // `directory` must be missing or empty. Neither it nor DIR.partial may be `source` (the data folder that is copied),
+  // lie in it or contain it, whatever links lead there; otherwise INVALID_ARGUMENT. What an interrupted attempt left is
+  // removed. FOLDER_LOCKED if another attempt is under way. IO_ERROR.
   static Result<std::unique_ptr<PartialFolder>> begin(const std::string& directory, const std::string& source);
-  // Removes it unless it was completed.
+  // Removes the folder unless it was completed.
   ~PartialFolder();
   PartialFolder(const PartialFolder&) = delete;
   PartialFolder& operator=(const PartialFolder&) = delete;
 
   const std::string& path() const { return path_; }
-  // The files in it are synced; this syncs their names and gives the folder its own. IO_ERROR.
+  // The caller has synced the files in the folder. Syncs their names and gives the folder its final name. IO_ERROR.
   Status complete();
 
  private:

@@ -5,9 +5,9 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::uint64_t kLook = 32;  // commits
+constexpr std::uint64_t kLook = 32;  // commits between two looks
 constexpr std::uint64_t kMinBytes = std::uint64_t{64} << 20;
-constexpr std::uint64_t kShare = 2;  // garbage is at most half of what is kept; moving that costs as much again, twice
+constexpr std::uint64_t kShare = 2;  // collected at half of what is kept: freeing a byte moves two
 
 }  // namespace
 
@@ -30,7 +30,7 @@ void Reclaimer::look() {
   if (thread_.joinable()) thread_.join();
   working_ = true;
   thread_ = std::thread([this] {
-    // A failure is one of the disk, of which commits tell; it is tried again.
+    // A failure is the disk's, which commits report too; a later look tries again.
     const std::span parts(map_.families().data(), 1);
     (void)compact_families(map_, parts, [this](std::uint64_t, std::uint64_t) {
       return stopping_ ? Status(Reason::SHUTTING_DOWN, "the map is being closed") : Status();

@@ -1,5 +1,5 @@
-// Gives back the space of replaced hot and warm parts when there is enough of it. RocksDB's own collection goes by age:
-// with every compaction it moves the values in the oldest quarter of the files, garbage or not. Private to the engine.
+// Frees the space of replaced hot and warm parts when there is enough of it. RocksDB's own collection goes by age:
+// every compaction moves the values in the oldest quarter of the files, garbage or not. Private to the engine.
 #pragma once
 
 #include <atomic>
@@ -10,15 +10,15 @@
 
 namespace relmap::storage {
 
-// One thread calls look(); the work is done by another of its own.
+// One thread calls look(); the work is done in a thread of its own.
 class Reclaimer {
  public:
   explicit Reclaimer(const MapDatabase& map) : map_(map) {}
-  ~Reclaimer();  // ends what is under way
+  ~Reclaimer();  // stops what is under way
   Reclaimer(const Reclaimer&) = delete;
   Reclaimer& operator=(const Reclaimer&) = delete;
 
-  // After a commit.
+  // To be called after each commit.
   void look();
 
  private:

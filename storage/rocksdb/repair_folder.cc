@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Stands in a folder that is complete and may take the place of a damaged one. Both RocksDB and the journal pass over
-// it. Whatever of ours is left behind without it is the damaged one, after the exchange.
+// A file in a folder that is complete and may take the place of a damaged one. RocksDB and the journal ignore it. A
+// folder that is left beside the map without this file is the damaged one, after the exchange.
 constexpr const char* kComplete = "/COMPLETE";
 
 Status failed(const std::string& what) { return Status(Reason::IO_ERROR, what + ": " + std::strerror(errno)); }
@@ -87,7 +87,7 @@ class FolderRepair {
     if (error) throw StatusError(Status(Reason::IO_ERROR, work_ + ": " + error.message()));
   }
 
-  // A FORMAT that is missing or says nothing that ever was a format: the parts themselves say their version too.
+  // Replaces a FORMAT that is missing or damaged: the parts themselves say their version too.
   void mend_format() {
     const std::string path = directory_ + "/FORMAT";
     std::string line;
@@ -114,7 +114,7 @@ class FolderRepair {
     salvaged_ = true;
     exchange(copy, "/map");
   }
-  // Whether the journal has all that ever was: then the map is made of it when the daemon starts.
+  // Whether the journal has every record that there ever was: then the daemon makes the map from it when it starts.
   bool new_journal() const {
     const auto names = files_->list(directory_ + "/journal");
     if (!names.ok() || names->empty()) return true;
@@ -149,9 +149,9 @@ class FolderRepair {
       throw_if(files_->sync_directory(work_));
       throw_if(files_->sync_directory(directory_));
       keep(other, name.substr(1));
-    } else if (errno == EINVAL ||
-               errno == ENOSYS) {  // the file system cannot: in two steps, which finish_interrupted()
-      keep(own, name.substr(1));   // and open_rocksdb() know of
+    } else if (errno == EINVAL || errno == ENOSYS) {
+      // The file system cannot exchange: finish_interrupted() and open_rocksdb() know of the two steps that this takes.
+      keep(own, name.substr(1));
       move(other, own);
     } else {
       throw StatusError(failed("exchanging " + own));

@@ -96,7 +96,7 @@ class RepairFolder : public ::testing::Test {
     return all;
   }
 
-  // Whatever was damaged: repair ends with a map that opens, takes the rest of its journal in, and is sound.
+  // Repairs. Whatever was damaged, the map then opens, takes in the rest of its journal, and is sound.
   RepairSummary repaired() {
     std::vector<std::string> told;
     auto result = repair_folder(data, {}, [&](const Finding& finding) { told.push_back(finding.what); }, {});
@@ -113,7 +113,7 @@ class RepairFolder : public ::testing::Test {
     EXPECT_FALSE(again.ok() && again->changed);
     return *std::move(result);
   }
-  // Takes the journal in as the daemon would at its start; the number of frames then.
+  // Applies the journal as the daemon would at its start, and returns the number of frames then.
   std::uint32_t replayed() {
     const auto engine = open_rocksdb(data);
     if (!engine.ok()) {
@@ -158,8 +158,8 @@ TEST_F(RepairFolder, ASoundFolderIsLeftByteForByte) {
   EXPECT_EQ(replayed(), kFrames);
 }
 
-// What a later version writes comes through the salvage of a store; what told of the map as it was does not.
-TEST_F(RepairFolder, KeysThatItDoesNotKnowAreSaved) {
+// What a later version writes survives the salvage of a store; what described the map as it was does not.
+TEST_F(RepairFolder, KeysOfALaterVersionAreSaved) {
   const std::vector<Put> later{{"x", {1}}, {"zone/1", {2}}, {"\xff\xff", {3}}};
   {
     const auto engine = open_rocksdb(data).or_throw();
@@ -217,7 +217,7 @@ TEST_P(RepairFile, WithAFlippedBit) {
   }
 }
 
-// Of a journal whose end is gone nothing tells that there was more: robots send the last keyframes again.
+// When the end of a journal is gone, nothing says that there was more: robots send the last keyframes again.
 TEST_P(RepairFile, Truncated) {
   if (GetParam().name == "Journal") next_after = kApplied;
   const auto all = files(GetParam().folder, GetParam().part);

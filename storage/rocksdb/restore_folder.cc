@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Relative to the folder; what belongs to its owner of the moment stays behind.
+// The files of a map, relative to its folder. The file of the present owner (LOCK) is left out.
 std::vector<std::string> files_of_map(const std::string& folder) {
   std::vector<std::string> files{"FORMAT"};
   if (fs::exists(folder + "/HASH")) files.push_back("HASH");
@@ -42,16 +42,16 @@ Status copy_files(const std::string& from, const std::string& to, const EnginePr
   return {};
 }
 
-// The hash is that of the map still, one commit later.
+// Moves the recorded hash on: one commit later the map still has it.
 Status move_recorded_hash(const std::string& directory, std::uint64_t from, std::uint64_t to) {
   const auto recorded = read_recorded_hash(directory);
   if (!recorded.ok() || !*recorded || (*recorded)->commit != from)
-    return {};  // of another commit, or for verify to name
+    return {};  // it is of another commit, or damaged, which verify reports
   fs::remove(directory + "/HASH");
   return write_recorded_hash(directory, {to, (*recorded)->hash});
 }
 
-// `directory`: locked.
+// `directory` must be locked.
 Result<Restored> mark(const std::string& directory, std::uint64_t now_us) {
   RocksDbOptions options;
   options.locked = true;

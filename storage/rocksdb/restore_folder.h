@@ -1,4 +1,4 @@
-// A data folder from a backup, on another disk or on the same.
+// Makes a data folder from a backup, on the same disk or another.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 namespace relmap::storage {
 
 struct Restored {
-  MapIdentity map;  // with the epoch of this restore; not known: the map had no identity yet
-  Status unmarked;  // not ok: why it passes for the map that was backed up (its state is damaged)
+  MapIdentity map;  // with the epoch of this restore; unknown if the map had no identity yet
+  Status unmarked;  // not OK: why the copy passes for the map that was backed up (its state is damaged)
 };
 
-// Copies what makes up the map in the folder `backup`, which no process may own; the copy shares nothing with it. `to`
-// must not exist or be empty, nor lie in `backup` or hold it, and appears when it is complete and durable, with its
-// epoch raised (mark_restored()) to `now_us`, microseconds UTC. The bytes are copied as they are: verify before, where
-// it matters. NO_SUCH_FILE: there is no map. FOLDER_LOCKED, INVALID_ARGUMENT, IO_ERROR, DISK_FULL.
+// Copies the map in the folder `backup`, which no process may own; the copy shares nothing with it. `to` must be
+// missing or empty, and must not lie in `backup` or contain it. It appears when it is complete and durable, with its
+// epoch raised to `now_us`, microseconds UTC (mark_restored()). The bytes are copied unchecked: verify them before,
+// where it matters. NO_SUCH_FILE: there is no map. FOLDER_LOCKED, INVALID_ARGUMENT, IO_ERROR, DISK_FULL.
 Result<Restored> restore_folder(const std::string& backup, const std::string& to, std::uint64_t now_us,
                                 const EngineProgress& progress);
 

@@ -19,7 +19,7 @@ constexpr auto kPatience = std::chrono::seconds(30);
 constexpr auto kMaxPause = std::chrono::microseconds(20'000);
 constexpr auto kStart = std::chrono::milliseconds(100);  // the other threads may all be busy
 
-// Asked again ever more rarely; false if it is not so in time.
+// Asks again at growing intervals; false if the condition does not hold in time.
 template <typename Condition>
 bool becomes_true(const Condition& condition, Clock::duration patience) {
   const auto end = Clock::now() + patience;
@@ -43,7 +43,7 @@ rocksdb::Status Resumption::go_on() {
     if (!becomes_true([&] { return property(db_, Properties::kNumRunningFlushes) == 0; }, kPatience))
       return rocksdb::Status::TimedOut("a flush that was running when another failed has not ended");
     resuming_ = std::async(std::launch::async, [this] { return db_.Resume(); });
-    background_errors_ = errors;  // one that comes after this is looked at again
+    background_errors_ = errors;  // the next call handles one that comes after this
     failed_ = true;
   }
   if (resuming_.wait_for(kPatience) != std::future_status::ready)

@@ -9,7 +9,7 @@ using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 using rocksdb::Slice;
 
-// Without the subcode for a full disk, which would have RocksDB wait for room in a thread of its own.
+// Leaves out the subcode for a full disk, which would make RocksDB wait for room in a thread of its own.
 IOStatus marked(const IOStatus& status) {
   if (!status.IsIOError()) return status;
   IOStatus again = IOStatus::IOError(status.getState() ? status.getState() : "");

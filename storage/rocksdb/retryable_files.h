@@ -1,6 +1,6 @@
-// RocksDB's files, whose failed reads, writes and syncs are marked as such that may succeed another time. RocksDB takes
-// any other for fatal and writes no more until the database is opened anew; after a marked one, DB::Resume() starts
-// afresh in new files. Private to the engine.
+// RocksDB's files, with failed reads, writes and syncs marked as retryable. RocksDB takes any other failure for fatal
+// and writes no more until the database is opened anew; after a marked one, DB::Resume() starts afresh in new files.
+// Private to the engine.
 #pragma once
 
 #include <rocksdb/file_system.h>

@@ -21,7 +21,7 @@ struct Syncs {
   bool journal = true, map = true;
 };
 
-// What is wrong after `crashes` failures of the power; empty: nothing.
+// Says what is wrong after `crashes` power failures; empty if nothing is.
 std::string run(std::uint64_t seed, Syncs sync, int crashes) {
   const TemporaryFolder folder;
   std::mt19937_64 rng(seed);

@@ -29,7 +29,7 @@ namespace {
 
 constexpr char kFirstMapByte = '\1';
 
-// The database and what must outlive it; kept by snapshots too.
+// The database and what must outlive it. Snapshots hold it too.
 struct Database {
   RocksDbSettings settings;
   std::unique_ptr<FolderLock> lock;  // released after db is closed; null: the caller has it
@@ -98,7 +98,8 @@ Result<Root> read_root(rocksdb::DB& db) {
   return Root::decode(bytes);
 }
 
-// Of the map in a folder that is being made, as it can be read there. A damaged one is copied all the same, without.
+// Records the hash of the map in a folder that is being made, as it can be read there. A damaged map is copied all the
+// same, without a hash.
 Status record_hash(const std::string& directory, const std::function<Status()>& going) {
   RocksDbOptions options;
   options.cache_bytes = std::size_t{8} << 20;
@@ -203,7 +204,7 @@ class RocksDbEngine final : public Engine {
     return root_.session;
   }
 
-  // The journal first: what is applied and trimmed before the map is looked at is then in the map.
+  // The journal's files are opened first: what is applied and trimmed before the map is looked at is then in the map.
   Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
     const auto journal = journal_->keep();
     if (!journal.ok()) return journal.status();
@@ -245,7 +246,7 @@ class RocksDbEngine final : public Engine {
 
   std::size_t memory_bytes() const override {
     const std::uint64_t pinned = property(database_->db(), rocksdb::DB::Properties::kEstimateTableReadersMem);
-    return database_->settings.cache->GetUsage() + pinned;  // what is pinned no cache knows of
+    return database_->settings.cache->GetUsage() + pinned;  // the cache does not count what is pinned
   }
 
  private:
@@ -269,8 +270,8 @@ class RocksDbEngine final : public Engine {
     return {};
   }
 
-  // RocksDB takes it badly if a flush finds no room (Debian's build asserts). So nothing is given to it that could not
-  // be flushed with all that waits for that.
+  // RocksDB does not survive a flush that finds no room (Debian's build asserts). So it is given nothing that could not
+  // be flushed together with all that waits to be.
   Status write_if_room(rocksdb::WriteBatch& batch) {
     constexpr std::uint64_t kBeside = std::uint64_t{1} << 20;  // tables and lists of files
     const std::uint64_t waiting = property(database_->db(), rocksdb::DB::Properties::kCurSizeAllMemTables);
@@ -278,9 +279,9 @@ class RocksDbEngine final : public Engine {
     return write(batch);
   }
 
-  // Goes on after a failure as soon as the disk does. The log that failed must not be written to again, for its syncs
-  // cannot be believed; but Resume() leaves it only if something has to be flushed. Therefore the root stands in memory
-  // beside the log before anything is written to that.
+  // Goes on after a failure as soon as the disk does. The log that failed must not be written to again, since its syncs
+  // cannot be trusted; but Resume() leaves that log only if something has to be flushed. Therefore the root is put into
+  // memory, beside the log, before anything is written to the log.
   Status write(rocksdb::WriteBatch& batch) {
     rocksdb::WriteOptions logged, beside_the_log;
     logged.sync = options_.sync;
@@ -301,7 +302,7 @@ class RocksDbEngine final : public Engine {
   const std::shared_ptr<Database> database_;
   const std::unique_ptr<JournalLog> journal_;
 
-  // In this order. Neither a slow sync of the journal nor one of the map holds up anything else.
+  // Locked in this order. Neither a slow sync of the journal nor one of the map holds up anything else.
   std::mutex append_mutex_;
   std::mutex write_mutex_;    // changes of the root
   mutable std::mutex mutex_;  // root_, snapshot_: read under either of these, written under both
@@ -311,7 +312,8 @@ class RocksDbEngine final : public Engine {
   Reclaimer reclaimer_;
 };
 
-// RocksDB would begin a new database in the place of one that has lost its CURRENT, and delete what it does not know.
+// RocksDB would begin a new database in place of one that has lost its CURRENT, and delete the files that it does not
+// know.
 Status check_current(const std::string& directory) {
   const std::string map = directory + "/map";
   std::error_code error;
@@ -321,7 +323,7 @@ Status check_current(const std::string& directory) {
   const auto journal = posix_file_system()->list(directory + "/journal");
   const auto first = journal.ok() && !journal->empty() ? SegmentName::parse(journal->front()) : std::nullopt;
   if (first && first->first > 1)
-    return Status(Reason::DATA_LOSS, map + " is missing beside the journal of what was done after it");
+    return Status(Reason::DATA_LOSS, map + " is missing, and the journal holds only what came after it");
   for (const auto& entry : std::filesystem::directory_iterator(map, error)) {
     const auto kind = entry.path().extension();
     if (kind == ".sst" || kind == ".blob" || kind == ".log")
@@ -330,8 +332,9 @@ Status check_current(const std::string& directory) {
   return {};
 }
 
-// Whether the journal goes on from where RocksDB's log can be read to. A commit that was being written when the power
-// failed may be there in any part, which looks like damage; but nobody was told of it, and the journal has it.
+// Whether the journal goes on from where RocksDB's log can be read to. Of a commit that was being written when the
+// power failed any part may be there, which looks like damage; but nobody was told of it, and the journal has its
+// records.
 bool journal_goes_on(const rocksdb::Options& options, const std::string& directory,
                      const std::shared_ptr<FileSystem>& files) {
   std::unique_ptr<MapDatabase> map;
@@ -342,8 +345,8 @@ bool journal_goes_on(const rocksdb::Options& options, const std::string& directo
   return journal.ok() && (*journal)->loss().ok();
 }
 
-// The folder of a map and those above it that are missing, with durable names: else a power failure could take away
-// all that was acknowledged.
+// Creates the folder of a map, and those above it that are missing, with durable names; otherwise a power failure could
+// take away all that was acknowledged.
 Status create_folder(const std::string& directory, FileSystem& files) {
   std::error_code error;
   std::vector<std::string> missing;
@@ -351,8 +354,8 @@ Status create_folder(const std::string& directory, FileSystem& files) {
     missing.push_back(path);
   for (auto path = missing.rbegin(); path != missing.rend(); ++path)
     if (Status made = create_durable_directory(files, *path); !made.ok()) return made;
-  // Whoever made it may have been killed before its name was durable. If it is somebody else's folder in one that we
-  // may not read, its name is no matter of ours.
+  // Whoever made the folder may have been killed before its name was durable. An error is ignored: if the folder above
+  // is somebody else's and we may not read it, the name is not ours to sync.
   if (missing.empty() && !std::filesystem::exists(directory + "/FORMAT", error))
     (void)files.sync_directory(folder_of(directory));
   return {};

@@ -27,28 +27,29 @@ struct RocksDbOptions {
   // One cache for blocks, index and filter blocks, table readers, blobs and memtables.
   std::size_t cache_bytes = std::size_t{64} << 20;
   bool read_only = false;  // nothing of the map is written; the folder is locked all the same
-  // If it cannot be opened otherwise, then as if read_only: acquire() answers why (DATA_LOSS, IO_ERROR, DISK_FULL,
-  // READ_ONLY).
+  // If the folder cannot be opened otherwise, opens it as if `read_only`; acquire() then says why (DATA_LOSS, IO_ERROR,
+  // DISK_FULL, READ_ONLY).
   bool or_read_only = false;
   bool locked = false;  // the caller holds the folder's lock, for as long as the engine is open
   DiskSpaceOptions space;
-  int format = 0;  // of the folder; 0: the one of this build. An older one read only, to be migrated
-  // Both off only in the test which shows that durability is tested: syncs of journal and commits do nothing.
+  int format = 0;  // of the folder; 0: that of this build. An older one is opened only to be read and migrated
+  // False only in the test which shows that durability is tested: then syncs of journal and commits do nothing.
   bool sync = true;
   // Direct I/O for reads and compactions, where the file system has it.
   bool direct_io = true;
-  // Under the journal and RocksDB: null: the machine's own. For tests that forget what was not synced.
+  // The file systems under the journal and RocksDB; null: the machine's own. For tests that forget what was not synced.
   std::shared_ptr<FileSystem> journal_files;
   std::shared_ptr<rocksdb::FileSystem> map_files;
 };
 
-// Whether a folder can be opened as a map, or made one, as far as the names in it tell. Writes nothing. NOT_A_MAP: it
-// is neither empty nor a map's; UNKNOWN_FORMAT_VERSION, IO_ERROR.
+// Whether a folder can be opened as a map or become one, judging by the names in it. Writes nothing. NOT_A_MAP: it is
+// neither empty nor a map's; UNKNOWN_FORMAT_VERSION, IO_ERROR.
 Status check_data_folder(const std::string& directory);
 
-// NOT_A_MAP, FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR, DISK_FULL, READ_ONLY (the file system is), DATA_LOSS
-// (RocksDB's own files); NO_SUCH_FILE if read_only and there is no map. If journal records are lost, it opens:
-// read_journal() and append() then answer DATA_LOSS, naming the range.
+// Opens the map in `directory`, or makes a new one. NOT_A_MAP, FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR,
+// DISK_FULL, READ_ONLY (a read-only file system), DATA_LOSS (RocksDB's own files); NO_SUCH_FILE if `read_only` and
+// there is no map. A map whose journal has lost records opens: read_journal() and append() then answer DATA_LOSS,
+// naming the range.
 Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options = {});
 
 }  // namespace relmap::storage

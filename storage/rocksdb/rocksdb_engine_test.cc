@@ -104,7 +104,7 @@ TEST(RocksDbEngine, ACheckpointOpensAsTheMapItWasTakenFrom) {
   EXPECT_EQ(copy->snapshot()->get("k").value(), Bytes(50000, 5));
 }
 
-// By whatever name: neither the map's own folder, nor one in it, nor one that it lies in.
+// By whatever name: neither in the map's own folder, nor in one inside it, nor in one that contains it.
 TEST(RocksDbEngine, ACheckpointIsNotMadeInTheFolderOfTheMap) {
   const TemporaryFolder folder;
   const std::string data = folder / "maps/data";
@@ -133,11 +133,11 @@ TEST(RocksDbEngine, ACheckpointIsNotMadeInTheFolderOfTheMap) {
   EXPECT_THAT(engine->checkpoint(folder / "maps", patient).message(),
               testing::HasSubstr("lies in " + (folder / "maps")));
 
-  // Under way it would have the name that the map has.
+  // While it is made, the copy would have the name that the map has.
   const auto odd = open_rocksdb(folder / "odd.partial").value();
   EXPECT_EQ(odd->checkpoint(folder / "odd", patient).reason(), Reason::INVALID_ARGUMENT);
 
-  // Beside it, and by a way through it, it is made.
+  // A folder beside the map is accepted, even if its path leads through the map's folder.
   EXPECT_TRUE(engine->checkpoint(data + "/../backup", patient).ok());
   EXPECT_TRUE(fs::exists(folder / "maps/backup/FORMAT"));
   EXPECT_TRUE(engine->checkpoint(data + "-monday", patient).ok()) << "though its name begins as that of the map";
@@ -193,7 +193,8 @@ TEST(RocksDbEngine, WhatIsRestoredIsTheMapWithAHigherEpoch) {
     hash = hash_map(*map);
     ASSERT_TRUE(engine->checkpoint(folder / "copy", patient).ok());
   }
-  // Two of one backup are told apart, and one of what was restored is later than it whatever the clock says.
+  // Two restores of one backup have different epochs, and a restore of a restored map has a later one whatever the
+  // clock says.
   for (const auto& [name, now, epoch] : {std::tuple{"early", 5000, 5000}, {"late", 6000, 6000}, {"slow", 10, 1001}}) {
     const auto restored = restore_folder(folder / "copy", folder / name, static_cast<std::uint64_t>(now), patient);
     ASSERT_TRUE(restored.ok()) << restored.status().to_string();
@@ -210,7 +211,7 @@ TEST(RocksDbEngine, WhatIsRestoredIsTheMapWithAHigherEpoch) {
 }
 
 // Keyframes go on coming, and the journal is trimmed all the time.
-TEST(RocksDbEngine, ACheckpointHasAllThatWasDurableBeforeItThoughWorkGoesOn) {
+TEST(RocksDbEngine, ACheckpointHasAllThatWasDurableBeforeItWhileWorkGoesOn) {
   const TemporaryFolder folder;
   const auto engine = open_rocksdb(folder / "data").value();
   const auto epoch = engine->acquire().value();
@@ -261,7 +262,7 @@ TEST(RocksDbEngine, AnUnfinishedCheckpointIsNeverTakenForAWholeOne) {
   EXPECT_FALSE(fs::exists(folder / "copy"));
   EXPECT_FALSE(fs::exists(folder / "copy.partial"));
 
-  // What a process that died on the way left is taken away by the next attempt; what is not ours is not touched.
+  // The next attempt removes what a process that died on the way left; what is not ours is not touched.
   fs::create_directories(folder / "copy.partial/map");
   std::ofstream(folder / "copy.partial/map/000001.sst") << "half a table";
   EXPECT_EQ(engine->checkpoint(folder / "copy", patient).reason(), Reason::INVALID_ARGUMENT);

@@ -1,5 +1,5 @@
-// A disk that is full, read-only or broken for a while: what is affected is named, the rest answers, nothing that was
-// acknowledged is lost, and the engine goes on by itself.
+// A disk that is full, read-only or broken for a while: what is affected gets an error that names it, the rest answers,
+// nothing that was acknowledged is lost, and the engine goes on by itself.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

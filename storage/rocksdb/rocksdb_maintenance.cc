@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 using Sizes = std::map<std::string, std::uint64_t>;
 
-// Files come and go meanwhile.
+// Files may come and go meanwhile.
 Sizes file_sizes(const std::string& directory) {
   Sizes sizes;
   std::error_code error;

@@ -1,4 +1,4 @@
-// What is done to RocksDB's files as a whole while it goes on working. Private to the engine.
+// Operations on RocksDB's files as a whole, while it goes on working. Private to the engine.
 #pragma once
 
 #include <rocksdb/db.h>
@@ -15,7 +15,7 @@
 
 namespace relmap::storage {
 
-// The files that make up the database now; while this lives none of them is deleted. Commits go on.
+// The files that make up the database now. None of them is deleted while the object lives; commits go on.
 class LiveFiles {
  public:
   static Result<std::unique_ptr<LiveFiles>> hold(rocksdb::DB& db);
@@ -24,7 +24,8 @@ class LiveFiles {
   LiveFiles& operator=(const LiveFiles&) = delete;
 
   std::uint64_t bytes() const;
-  // Links of those that never change, copies of the others and where links cannot be; durable but for the names.
+  // Links the files that never change, and copies the others and where links are impossible. All is durable but the
+  // names.
   Status copy_to(const std::string& directory, const std::function<Status(std::uint64_t bytes)>& copied) const;
 
  private:
@@ -37,7 +38,7 @@ class LiveFiles {
 Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyHandle* const> families,
                         const EngineProgress& progress);
 
-// But for the journal's.
+// Without the figures of the journal.
 EngineStats map_stats(const MapDatabase& map);
 
 }  // namespace relmap::storage

@@ -1,4 +1,4 @@
-// A number that RocksDB knows of itself, summed over the column families. Private to the engine.
+// A number that RocksDB knows about itself, summed over the column families. Private to the engine.
 #pragma once
 
 #include <rocksdb/db.h>

@@ -33,7 +33,7 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   settings.cache = rocksdb::NewLRUCache(std::max(wanted.cache_bytes, kMiB), /*num_shard_bits=*/2);
   rocksdb::Options& o = settings.options;
   o.create_if_missing = true;
-  o.paranoid_checks = !wanted.read_only;  // a reader serves what files there are
+  o.paranoid_checks = !wanted.read_only;  // a reader serves the files that there are
 
   // Small memtables, their memory charged to the cache. The log of a commit is short-lived: flushed parts are in files.
   o.write_buffer_size = std::clamp(wanted.cache_bytes / 8, kMiB, 16 * kMiB);
@@ -76,7 +76,7 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
       retryable_files(wanted.map_files ? wanted.map_files : gradual_deletion(rocksdb::FileSystem::Default())));
   o.env = settings.env.get();
   o.max_bgerror_resume_count = 0;        // the engine's commits resume
-  o.avoid_flush_during_shutdown = true;  // what stands beside the log is in it too
+  o.avoid_flush_during_shutdown = true;  // what was put beside the log is in the log too
   return settings;
 }
 

@@ -11,7 +11,7 @@
 namespace relmap::storage {
 
 struct RocksDbSettings {
-  std::shared_ptr<rocksdb::Env> env;  // outlives what the options hold
+  std::shared_ptr<rocksdb::Env> env;  // must outlive what the options hold
   std::shared_ptr<rocksdb::Cache> cache;
   rocksdb::Options options;
 };

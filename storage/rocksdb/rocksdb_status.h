@@ -1,4 +1,4 @@
-// RocksDB's errors as ours. Private to the engine.
+// Converts RocksDB's errors to ours. Private to the engine.
 #pragma once
 
 #include <rocksdb/status.h>
@@ -7,8 +7,8 @@
 
 namespace relmap::storage {
 
-// DATA_LOSS for damage, DISK_FULL, READ_ONLY (the file system is), IO_ERROR otherwise; `what` was done is named, and so
-// is the file.
+// DATA_LOSS for damage, DISK_FULL, READ_ONLY (a read-only file system), otherwise IO_ERROR. The message says `what` was
+// being done, and names the file.
 Status converted(const rocksdb::Status& status, const char* what);
 
 }  // namespace relmap::storage

@@ -1,4 +1,4 @@
-// What the engine knows beside the journal: written with every commit. Private to storage/rocksdb.
+// What the engine stores besides the journal, with every commit. Private to storage/rocksdb.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace relmap::storage {
 
-// The engine's own entries stand before all of the map's, which never begin with a zero byte.
+// The engine's own keys sort before those of the map, which never begin with a zero byte.
 inline constexpr std::string_view kRootKey("\0root", 5);
 
 struct Root {

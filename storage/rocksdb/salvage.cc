@@ -25,22 +25,23 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBatchBytes = std::size_t{8} << 20;
-constexpr std::uint32_t kLaterChunks = 64;  // that may have come since an older record of their session
+constexpr std::uint32_t kLaterChunks = 64;  // added at most since an older record of a session
 
 Status converted(const rocksdb::Status& status) {
   if (status.ok()) return {};
   return Status(status.IsCorruption() ? Reason::DATA_LOSS : Reason::IO_ERROR, status.ToString());
 }
 
-// A store opened for reading, as a snapshot: what is damaged in it is a status for the keys concerned.
+// A store opened for reading, as a snapshot. Where it is damaged, the keys concerned get an error.
 class OpenStore final : public EngineSnapshot {
  public:
   explicit OpenStore(std::unique_ptr<MapDatabase> map) : map_(std::move(map)) {}
 
   std::uint64_t commit_number() const override { return 0; }
   Result<std::optional<Bytes>> get(std::string_view key) const override { return get(key, true); }
-  // With `verify` false a blob is given even where RocksDB's checksum says that it is damaged: our own then say which
-  // frames of a chunk are. Never for a table's block: RocksDB would take its bytes as they are for lengths.
+  // With `verify` false a blob is returned even where RocksDB's checksum says that it is damaged: our own checksums
+  // then say which frames of a chunk are. This does not hold for a table's block: RocksDB would take its damaged bytes
+  // for lengths.
   Result<std::optional<Bytes>> get(std::string_view key, bool verify) const {
     rocksdb::ReadOptions read;
     read.verify_checksums = verify;
@@ -70,7 +71,7 @@ class OpenStore final : public EngineSnapshot {
   const std::unique_ptr<MapDatabase> map_;
 };
 
-// Null, and `why` not, if it cannot be opened.
+// Null if it cannot be opened; `why` then says why.
 std::unique_ptr<OpenStore> open_store(const rocksdb::Options& options, const std::string& path,
                                       std::string* why = nullptr) {
   std::unique_ptr<MapDatabase> map;
@@ -159,8 +160,8 @@ Bytes blob_addition(const fs::path& path) {
   return edit;
 }
 
-// RocksDB's own repair makes the list of tables anew, and knows nothing of blob files: they are put in front of the
-// tables that refer to them.
+// RocksDB's own repair makes the list of tables anew, and knows nothing of blob files. Here they are put in front of
+// the tables that refer to them.
 Status list_blob_files(const std::string& directory) {
   std::string manifest;
   std::ifstream(directory + "/CURRENT") >> manifest;
@@ -168,7 +169,7 @@ Status list_blob_files(const std::string& directory) {
   std::ifstream in(path, std::ios::binary);
   const std::string old{std::istreambuf_iterator<char>(in), {}};
   const std::vector<Bytes> records = read_log(as_bytes(old));
-  // Behind the last record that adds a family: its tag, 201, and its name.
+  // They go behind the last record that adds a family: tag 201 and the family's name.
   static constexpr std::string_view kFamilyAdded =
       "\xc9\x01\x04"
       "cold";
@@ -230,7 +231,7 @@ class Salvage {
       if (++keys % 64 == 0) progress("reading the store", keys);
       return true;
     });
-    // Without a root it is new; then it holds nothing else either.
+    // A store without a root is new, and then holds nothing else either.
     return read.ok() && (root || keys == 0) && files_of(map_, ".sst").size() >= live_tables(*store);
   }
   static std::size_t live_tables(const OpenStore& store) {
@@ -239,7 +240,7 @@ class Salvage {
     return files.size();
   }
 
-  // Tables and blobs by another name, the rest copied: whatever happens to these, the store stays as it is.
+  // Links tables and blobs, and copies the rest: whatever happens to these, the store stays as it is.
   Status link_files() {
     std::error_code error;
     fs::remove_all(work_, error);
@@ -261,7 +262,8 @@ class Salvage {
     forgiving.wal_recovery_mode = rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords;
     return forgiving;
   }
-  // With the list of files that it has, forgiving what is missing: if that list is of the tables that are there.
+  // Opens the store with a list of files that it has, tolerating missing files, if the list is of the tables that are
+  // there.
   std::unique_ptr<OpenStore> open_as_it_is() {
     const rocksdb::Options forgiving = forgiving_options();
     std::vector<std::string> manifests;
@@ -278,7 +280,7 @@ class Salvage {
     }
     return nullptr;
   }
-  // Tables that are missing from the list, and others missing from the disk: it is an older list.
+  // False if some tables are missing from the list and others from the disk: then the list is an older one.
   bool lists_what_is_there(const OpenStore& store) {
     std::vector<rocksdb::LiveFileMetaData> files;
     store.db().GetLiveFilesMetaData(&files);
@@ -313,11 +315,11 @@ class Salvage {
     }
     // What the index of labels lost is made anew from the frames.
     (void)copy_keys(keys::labels_beginning(""));
-    // What is settled and does not come through is settled as lost; what waits for relaxation, and does not, waits no
-    // more.
+    // Skipped sequences that cannot be copied are recorded as lost later. Frames that wait for relaxation and cannot be
+    // copied wait no more.
     for (const SessionNumber number : numbers_)
-      if (Status copied = copy_keys(keys::settled_in(number)); !copied.ok())
-        lose("what session " + std::to_string(number) + " settled without a frame: " + copied.to_string());
+      if (Status copied = copy_keys(keys::skipped_in(number)); !copied.ok())
+        lose("skipped sequences of session " + std::to_string(number) + ": " + copied.to_string());
     (void)copy_keys(keys::all_pending());
     for (int first = 0; first < 256; ++first)
       if (const char byte = static_cast<char>(first); !keys::is_known(byte))
@@ -353,7 +355,8 @@ class Salvage {
     tell(what);
   }
 
-  // Values of a small key in tables of any age: where the newest is damaged, an older one is better than none.
+  // Visits the values of a small key in tables of any age: where the newest is damaged, an older one is better than
+  // none.
   template <typename Visit>
   void for_each_older(const std::string& key, Visit visit) {
     for (const fs::path& path : files_of(map_, ".sst")) {
@@ -376,7 +379,7 @@ class Salvage {
     numbers_.insert(stored.unknown.begin(), stored.unknown.end());
     for (const SessionDamage& damage : stored.damage)
       if (damage.number != 0) numbers_.insert(damage.number);
-    // Beyond these, whatever number was ever given may have left an older record.
+    // Any other number that was ever given to a session may have left an older record.
     const std::set<SessionNumber> known = numbers_;
     const std::optional<Root> root = find_root();
     for (SessionNumber number = 1; root && number <= root->session; ++number) numbers_.insert(number);
@@ -419,7 +422,7 @@ class Salvage {
     const auto first = keys::frame_of(std::string(key) + '\0');
     return "chunk " + (first ? chunk_id(*first).to_string() : std::string("?"));
   }
-  // Only if it is what the key says: its header is whole, and each frame has a checksum of its own.
+  // Copies a part if it is what the key says: its header must be whole; each frame has a checksum of its own.
   bool copy_part(Part part, std::string_view key, ByteSpan value) {
     const auto frame = keys::frame_of(key.size() == 9 ? std::string(key) + '\0' : std::string(key));
     if (!frame) return false;
@@ -430,7 +433,7 @@ class Salvage {
     return true;
   }
 
-  // As far as they can be read.
+  // Copies keys as far as they can be read.
   Status copy_keys(std::string_view prefix) {
     return source_->scan(prefix, [&](std::string_view key, ByteSpan value) {
       put(key, value);
@@ -463,7 +466,7 @@ class Salvage {
     const std::optional<Root> root = find_root();
     if (!root) tell("the map's root is lost, and made anew");
     Root mended = root.value_or(Root{});
-    // What the parts know of must have happened.
+    // The commits that the parts know of must have happened.
     mended.commits = std::max(mended.commits, newest_commit_);
     if (state) mended.applied = std::max(mended.applied, state->applied_sequence);
     if (!numbers_.empty()) mended.session = std::max(mended.session, *numbers_.rbegin());
@@ -475,7 +478,7 @@ class Salvage {
   const OnProgress& on_progress_;
   RocksDbSettings settings_;
   rocksdb::Options options_;
-  std::string why_;  // nothing could be opened
+  std::string why_;  // why nothing could be opened
   std::unique_ptr<OpenStore> source_;
   std::unique_ptr<MapDatabase> target_;
   rocksdb::WriteBatch batch_;

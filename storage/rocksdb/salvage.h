@@ -17,13 +17,13 @@ struct SalvageResult {
   std::uint64_t lost = 0;    // keys that are known to have been there
 };
 
-// Reads all of the store in `map`, which no process has open. Unless all of it can be read, makes the new store `copy`
-// (which must not exist; `work` is scratch beside it) with everything that can; it is complete and durable on return.
-// Nothing in `map` is changed. DATA_LOSS if nothing can be saved, IO_ERROR.
+// Reads all of the store in `map`, which no process may have open. Unless all of it can be read, makes a new store
+// `copy` with everything that can; it is complete and durable on return. `copy` must not exist; `work` is a scratch
+// folder beside it. Nothing in `map` is changed. DATA_LOSS if nothing can be saved, IO_ERROR.
 Result<SalvageResult> salvage_store(const std::string& map, const std::string& work, const std::string& copy,
                                     const OnFinding& on_finding, const OnProgress& on_progress);
 
-// What the journal has to know of a store that can be read: how far it goes.
+// What the repair of the journal has to know of a readable store: how far it goes.
 struct StoreHead {
   std::uint64_t applied = 0;
   std::vector<Session> sessions;

@@ -1,4 +1,5 @@
-// Power failures at random moments: what append() or commit() has returned for is there afterwards, once, and in order.
+// Power failures at random moments: everything for which append() or commit() has returned is there afterwards, once
+// and in order.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -16,7 +17,7 @@ Bytes payload(std::uint64_t sequence) {
   return w.take();
 }
 
-// What is wrong after `crashes` failures of the power; empty: nothing.
+// Says what is wrong after `crashes` power failures; empty if nothing is.
 std::string run(std::uint64_t seed, bool sync, int crashes) {
   std::mt19937_64 rng(seed);
   const auto below = [&](std::uint64_t n) { return std::uniform_int_distribution<std::uint64_t>(0, n - 1)(rng); };

@@ -1,4 +1,4 @@
-// A drive straight on, one metre a frame, of any length, that stands in no memory: each frame is made when it is asked
+// A drive straight ahead of any length, one metre per frame, that takes no memory: each frame is made when it is asked
 // for. For searches over large maps.
 #pragma once
 

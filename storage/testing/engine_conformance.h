@@ -13,7 +13,7 @@
 
 namespace relmap::storage {
 
-// A store that can be opened again and again. An engine that keeps nothing beyond its own life has reopen == false.
+// A store that can be opened again and again. An engine that keeps nothing beyond its own life has reopens == false.
 struct EngineStore {
   std::function<std::shared_ptr<Engine>()> open;
   bool reopens = true;

@@ -37,7 +37,7 @@ class FaultSnapshot final : public EngineSnapshot {
   const std::shared_ptr<Faults> faults_;
 };
 
-// What the engine knows beside the journal, and the record of each change to it.
+// What the engine stores besides the journal, and the record of each change to it.
 struct Root {
   std::uint64_t epoch = 0;
   std::uint64_t applied = 0;
@@ -47,7 +47,7 @@ struct Root {
 };
 
 struct Change {
-  Root root;  // but the table
+  Root root;  // all of it but the table
   std::vector<Put> puts;
   std::vector<std::string> deletes;
 };
@@ -153,7 +153,7 @@ class FaultEngine final : public Engine {
   Status checkpoint(const std::string&, const EngineProgress&) override {
     return Status(Reason::UNSUPPORTED, "the fault-injecting engine keeps nothing that could be copied to a folder");
   }
-  Status compact(const EngineProgress&) override { return {}; }  // a table holds nothing but what is in it
+  Status compact(const EngineProgress&) override { return {}; }  // a table holds no replaced values
 
   Result<EngineStats> stats() const override {
     EngineStats stats;
@@ -167,7 +167,7 @@ class FaultEngine final : public Engine {
     return stats;
   }
 
-  std::size_t memory_bytes() const override { return 0; }  // it stands for a disk
+  std::size_t memory_bytes() const override { return 0; }  // it stands in for a disk
 
  private:
   Status check_owner(std::uint64_t epoch) const {

@@ -1,4 +1,4 @@
-// A disk that fails as it is told: full, read-only, or with errors on writing, syncing or reading. Only for tests.
+// A disk that fails on demand: full, read-only, or with errors on writing, syncing or reading. Only for tests.
 #pragma once
 
 #include <atomic>
@@ -9,13 +9,14 @@
 
 namespace relmap::storage {
 
-// What goes wrong now; OK: nothing. Thread-safe.
+// What fails now, and with which reason; OK: nothing fails. Thread-safe.
 struct DiskFaults {
-  std::atomic<Reason> write{Reason::OK};   // DISK_FULL: half of what is written is; READ_ONLY: names stay as well
-  std::atomic<bool> removal_helps{false};  // DISK_FULL passes when a file is removed
+  std::atomic<Reason> write{
+      Reason::OK};  // DISK_FULL: half of the bytes are written; READ_ONLY: names do not change either
+  std::atomic<bool> removal_helps{false};  // DISK_FULL ends when a file is removed
   std::atomic<Reason> sync{Reason::OK};
   std::atomic<Reason> read{Reason::OK};
-  std::atomic<bool> hang{false};  // writes of the map's files wait, and are then struck or not
+  std::atomic<bool> hang{false};  // writes of the map's files wait while this is set
   std::atomic<std::uint64_t> free{std::uint64_t{1} << 40}, size{std::uint64_t{1} << 40};  // what room() says
 };
 

@@ -68,7 +68,7 @@ bool ForgetfulFiles::spend() {
   return true;
 }
 
-// A folder whose name was not durable may be gone, and what was in it with it.
+// A folder whose name was not durable may be gone, with all that was in it.
 void ForgetfulFiles::forget_directories() {
   for (const std::string& directory : directories_) {
     if (durable_directories_.contains(directory)) continue;
@@ -119,7 +119,7 @@ void ForgetfulFiles::begin_life() {
   ++life_;
 }
 
-// Length and sectors reach the disk each for themselves.
+// The length and each sector reach the disk independently of each other.
 Bytes ForgetfulFiles::after_power_failure(const Node& node) {
   const auto [shorter, longer] = std::minmax({node.durable.size(), node.bytes.size()});
   std::size_t size = chance() ? node.durable.size() : node.bytes.size();
@@ -140,7 +140,7 @@ std::shared_ptr<ForgetfulFiles> ForgetfulFiles::certain(const std::string& direc
   const auto other = create(0);
   const std::lock_guard lock(mutex_);
   for (const auto& [path, node] : durable_) {
-    if (!in_directory(path, directory) || !names_.contains(path)) continue;  // nobody may need what is removed
+    if (!in_directory(path, directory) || !names_.contains(path)) continue;  // what is removed must not be needed
     other->names_[path] = std::make_shared<Node>(Node{node->durable, node->durable, {}});
   }
   other->durable_ = other->names_;
@@ -195,7 +195,7 @@ Status ForgetfulFiles::append(const std::shared_ptr<Node>& node, std::uint64_t l
   const std::lock_guard lock(mutex_);
   if (life != life_ || !power_) return no_power();
   const std::size_t first = node->bytes.size() / kSector;
-  node->bytes.insert(node->bytes.end(), bytes.begin(), bytes.end());  // how much of it, restart() decides
+  node->bytes.insert(node->bytes.end(), bytes.begin(), bytes.end());  // restart() decides how much of it stays
   node->given_up.erase(node->given_up.lower_bound(first), node->given_up.end());
   return spend() ? Status() : no_power();
 }

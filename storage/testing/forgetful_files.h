@@ -1,8 +1,8 @@
-// Files in memory that behave as a machine's do when its power fails. What was not synced is forgotten in any part: a
-// sector may be written though one before it is not, a file may have its new length and zeros in it, a name made or
-// removed, also that of a folder with all that is in it, may stand or not until the folder that holds it is synced. And
-// as on Linux, a sync that failed has given its bytes up: the next one succeeds without them. Also fails operations on
-// demand.
+// Files in memory that behave as those of a machine do whose power fails. Any part of what was not synced may be
+// forgotten: a sector may be written although an earlier one is not; a file may have its new length and zeros in it; a
+// name that was made or removed, even that of a folder with all that is in it, may or may not stand until the folder
+// that holds it is synced. And as on Linux, a sync that failed has dropped its bytes: the next one succeeds without
+// them. Operations can also be made to fail on demand.
 #pragma once
 
 #include <map>
@@ -25,11 +25,11 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
   // in part or not at all, and all later ones fail, until restart().
   void fail_power_after(std::uint64_t operations);
   bool has_power() const;
-  // The power comes back; what was not durable is forgotten, as chance has it. Open files are dead.
+  // The power comes back. What was not durable is forgotten by chance. Files that were open can no longer be used.
   void restart();
-  // The machine goes on with all its memory, the process that wrote does not: as restart(), but nothing is forgotten.
+  // The process that wrote is killed, and the machine keeps its memory: like restart(), but nothing is forgotten.
   void kill();
-  // Another disk, with nothing of this folder but what is certain to survive a failure of the power now.
+  // Another disk, which has of this folder only what is certain to survive a power failure now.
   std::shared_ptr<ForgetfulFiles> certain(const std::string& directory) const;
   // Each of the next `count` syncs of a file fails with IO_ERROR.
   void fail_syncs(int count);
@@ -69,7 +69,8 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
   std::mt19937_64 rng_;
   std::map<std::string, std::shared_ptr<Node>> names_;    // as the running machine sees them
   std::map<std::string, std::shared_ptr<Node>> durable_;  // as the disk has them
-  // Folders that were created here, likewise. What was never created has always been there.
+  // Folders that were created here, as the machine sees them and as the disk has them. Folders that were not created
+  // here have always existed.
   std::set<std::string> directories_, durable_directories_;
   std::optional<std::uint64_t> operations_left_;
   bool power_ = true;

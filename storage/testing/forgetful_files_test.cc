@@ -23,7 +23,7 @@ std::shared_ptr<ForgetfulFiles> disk_with_a_file(std::uint64_t seed) {
   return disk;
 }
 
-// In how many of `runs` restarts, each of another seed, something holds.
+// Counts for how many of `runs` seeds something holds.
 int count(int runs, const std::function<bool(std::uint64_t seed)>& holds) {
   int n = 0;
   for (int seed = 1; seed <= runs; ++seed) n += holds(static_cast<std::uint64_t>(seed));

@@ -1,4 +1,4 @@
-// A graph for tests and benchmarks that has only what they ask it for: what is not overridden is not there.
+// A graph for tests and benchmarks, which override only what they ask for. Everything else is empty.
 #pragma once
 
 #include "storage/graph/graph.h"
@@ -11,7 +11,7 @@ class PartialGraph : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override { return {}; }
   std::optional<Session> session(SessionNumber) const override { return std::nullopt; }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
+  void visit_skipped(SessionNumber, std::uint32_t, const SkippedVisit&) const override {}
   std::vector<FrameId> labelled(const std::string&) const override { return {}; }
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 };

@@ -47,18 +47,18 @@ Matrix6 RandomFrames::matrix() {
   return m;
 }
 
-std::string RandomFrames::text(std::uint32_t longest) {
-  std::string text(below(longest + 1), ' ');
+std::string RandomFrames::text(std::uint32_t max_size) {
+  std::string text(below(max_size + 1), ' ');
   for (char& c : text) c = static_cast<char>(below(256));
   return text;
 }
 
-Bytes RandomFrames::bytes(std::uint32_t longest) {
-  const std::string t = text(longest);
+Bytes RandomFrames::bytes(std::uint32_t max_size) {
+  const std::string t = text(max_size);
   return {t.begin(), t.end()};
 }
 
-// Half of the time none.
+// No extensions half of the time.
 Extensions RandomFrames::extensions() {
   Extensions all;
   if (below(2) == 0) return all;
@@ -140,7 +140,7 @@ FrameHot RandomFrames::hot(FrameId id) {
   f.T_odom_frame = transform();
   f.mean_error = static_cast<float>(real());
   f.error_terms = below(1000);
-  f.appearance_count = 0;  // that of the cold part it is stored with
+  f.appearance_count = 0;  // as in the cold part that it is stored with
   f.next_loop_ordinal = static_cast<std::uint16_t>(below(65536));
   const std::uint32_t edges = below(4);
   for (std::uint32_t i = 0; i < edges; ++i) f.edges.push_back(edge(id, i));
@@ -197,7 +197,7 @@ SessionHeader RandomFrames::header() {
   return h;
 }
 
-Settled RandomFrames::settled() { return {below(100), below(100), below(100), below(2) == 1, some_reason(*this)}; }
+Skipped RandomFrames::skipped() { return {below(100), below(100), below(100), below(2) == 1, some_reason(*this)}; }
 
 Session RandomFrames::session(SessionNumber number) {
   Session s;

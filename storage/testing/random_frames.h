@@ -25,17 +25,17 @@ class RandomFrames {
   FrameWarm warm();
   FrameCold cold();
   Session session(SessionNumber number);
-  Settled settled();
+  Skipped skipped();
   JournalRecord record();
 
  private:
   EdgeId edge_id();
   LandmarkId landmark_id();
-  std::string text(std::uint32_t longest);
+  std::string text(std::uint32_t max_size);
   Extensions extensions();
   Uniqueness uniqueness();
   SessionHeader header();
-  Bytes bytes(std::uint32_t longest);
+  Bytes bytes(std::uint32_t max_size);
   std::vector<ProposedBinding> bindings();
 
   std::mt19937_64 rng_;

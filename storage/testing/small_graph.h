@@ -1,4 +1,4 @@
-// A small graph in memory, to be built edge by edge.
+// A small graph in memory that is built edge by edge.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ class SmallGraph final : public PartialGraph {
     if (!frame) frame = std::make_shared<FrameHot>(), frame->present = true;
     return *frame;
   }
-  // From the older frame a to the newer b, where it is stored.
+  // Adds an edge from the older frame a to the newer frame b, with which it is stored.
   Edge& join(FrameId a, FrameId b, std::uint32_t ordinal = 0, const SE3& T_ab = {}) {
     auto& incoming = frame(a).incoming;
     incoming.insert(std::upper_bound(incoming.begin(), incoming.end(), EdgeId{b, ordinal}), {b, ordinal});

@@ -28,8 +28,8 @@ std::vector<std::string> settled_once_differences(const storage::Graph& graph, c
   if (sessions.size() != 1) return {std::to_string(sessions.size()) + " sessions"};
   const storage::Session& session = sessions.front();
   if (session.frames != keyframes.size()) wrong.push_back(std::to_string(session.frames) + " frames counted");
-  graph.visit_settled(session.number, 0, [&](const storage::Settled& settled) {
-    wrong.push_back(std::to_string(settled.from) + ".." + std::to_string(settled.to) + " settled without a frame");
+  graph.visit_skipped(session.number, 0, [&](const storage::Skipped& skipped) {
+    wrong.push_back(std::to_string(skipped.from) + ".." + std::to_string(skipped.to) + " skipped");
     return true;
   });
   std::set<std::uint64_t> records;

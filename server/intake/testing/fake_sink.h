@@ -32,14 +32,14 @@ class FakeGraph final : public storage::PartialGraph {
     const auto it = by_number.find(number);
     return it == by_number.end() ? std::nullopt : std::optional(it->second);
   }
-  void visit_settled(SessionNumber number, std::uint32_t sequence, const SettledVisit& visit) const override {
+  void visit_skipped(SessionNumber number, std::uint32_t sequence, const SkippedVisit& visit) const override {
     for (auto it = settled.lower_bound({number, sequence}); it != settled.end() && it->first.first == number; ++it)
       if (!visit(it->second)) return;
   }
 
   std::map<FrameId, std::shared_ptr<const storage::FrameHot>> frames;
   std::map<SessionNumber, storage::Session> by_number;
-  storage::SettledTable settled;
+  storage::SkippedTable settled;
 };
 
 // Thread-safe except for the public members.

@@ -60,7 +60,7 @@ class HandMadeGraph final : public storage::Graph {
     const auto found = sessions_.find(number);
     return found == sessions_.end() ? std::nullopt : std::optional(found->second);
   }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
+  void visit_skipped(SessionNumber, std::uint32_t, const SkippedVisit&) const override {}
   std::vector<FrameId> labelled(const std::string&) const override { return {}; }
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 

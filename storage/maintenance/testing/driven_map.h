@@ -1,5 +1,5 @@
 // A map as the daemon makes it, in any engine: two laps of a circle, with closures, appearance and a label, committed
-// now and then so that closed and open chunks are among it. And what verify and repair say of it.
+// now and then so that it has closed and open chunks. Also what verify says of a map.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// RocksDB's files on a disk that fails as it is told (storage/testing/faulty_files.h), for as long as it is told. Only
+// RocksDB's files on a disk that fails on demand (storage/testing/faulty_files.h), for as long as it is told to. Only
 // for tests; a header, so that no program carries it.
 #pragma once
 
@@ -113,7 +113,7 @@ class FaultyMapFiles final : public rocksdb::FileSystemWrapper {
 
   bool strikes(const std::string& name) const { return name.find(only_) != std::string::npos; }
 
-  // In the words of the machine's own file system.
+  // Words errors as the machine's own file system does.
   IOStatus told(const std::atomic<Reason>& reason, const std::string& name) const {
     if (reason == Reason::OK || !strikes(name)) return IOStatus::OK();
     if (reason == Reason::DISK_FULL) return IOStatus::NoSpace(name, std::strerror(ENOSPC));

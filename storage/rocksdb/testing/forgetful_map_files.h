@@ -29,7 +29,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
       : FileSystemWrapper(rocksdb::FileSystem::Default()), sync_(sync), rng_(seed) {}
   const char* Name() const override { return "ForgetfulMapFiles"; }
 
-  // At the n-th write or sync from now.
+  // The power fails at the n-th write or sync from now.
   void fail_power_after(std::uint64_t operations) {
     const std::lock_guard lock(mutex_);
     operations_left_ = operations;
@@ -38,7 +38,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
     const std::lock_guard lock(mutex_);
     return power_;
   }
-  // Once the database is closed.
+  // Forgets what was not durable, and restores the power. The database must be closed.
   void restart() {
     const std::lock_guard lock(mutex_);
     for (const auto& [path, file] : files_) {
@@ -113,7 +113,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   struct State {
     std::uint64_t size = 0, durable = 0;
     bool name_durable = false;
-    std::optional<std::string> replaced;  // what the name stood for before
+    std::optional<std::string> replaced;  // the file that had this name before
   };
   struct Removed {
     std::string path, kept_as;
@@ -162,7 +162,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   }
 
   bool chance() { return std::uniform_int_distribution<int>(0, 1)(rng_) == 1; }
-  // Length and sectors behind what is durable reach the disk each for themselves.
+  // The length and each sector behind what is durable reach the disk independently of each other.
   void forget(const std::string& path, const State& file) {
     std::uint64_t size = chance() ? file.durable : file.size;
     if (chance()) size = std::uniform_int_distribution<std::uint64_t>(file.durable, file.size)(rng_);
@@ -213,7 +213,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   mutable std::mutex mutex_;
   std::mt19937_64 rng_;
   std::map<std::string, State> files_;  // written since the last restart
-  std::vector<Removed> removed_;        // names removed for good or not
+  std::vector<Removed> removed_;        // removed names that may come back
   std::uint64_t removals_ = 0;
   std::optional<std::uint64_t> operations_left_;
   bool power_ = true;

@@ -1,5 +1,5 @@
-// What a session settled without a frame, in order, past what is damaged: read a page at a time, so that a walk beside
-// it holds little.
+// Reads the skipped sequences of a session, in order and past what is damaged. It reads a page at a time, so that a
+// walk over the frames beside it holds little memory.
 #pragma once
 
 #include <deque>
@@ -11,14 +11,15 @@
 
 namespace relmap::storage {
 
-class SettledCursor {
+class SkippedCursor {
  public:
-  // `damaged` is told the key of a record that cannot be read (empty: the rest of them) and what is wrong.
+  // `damaged` is called with the key of a record that cannot be read, and with what is wrong. An empty key stands for
+  // all the records that follow.
   using Damaged = std::function<void(const std::string& key, const std::string& what)>;
-  SettledCursor(const EngineSnapshot& snapshot, SessionNumber session, Damaged damaged);
+  SkippedCursor(const EngineSnapshot& snapshot, SessionNumber session, Damaged damaged);
 
   // Null at the end.
-  const Settled* get() const { return page_.empty() ? nullptr : &page_.front(); }
+  const Skipped* get() const { return page_.empty() ? nullptr : &page_.front(); }
   void next();
 
  private:
@@ -28,7 +29,7 @@ class SettledCursor {
   const SessionNumber session_;
   const Damaged damaged_;
   std::string from_;  // the key that the next page begins with; empty: there is none
-  std::deque<Settled> page_;
+  std::deque<Skipped> page_;
 };
 
 }  // namespace relmap::storage
