@@ -1,4 +1,4 @@
-// How figures are put, in every report and summary alike.
+// How numbers are presented in all reports and summaries.
 #pragma once
 
 #include <cstdint>
@@ -6,9 +6,9 @@
 
 namespace relmap::frontend {
 
-inline constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
+inline constexpr double kDegrees = 180 / std::numbers::pi;  // per radian
 
-// Of nothing: all.
+// part / whole; 1 if `whole` is 0.
 inline double share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
 }

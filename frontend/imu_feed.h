@@ -1,4 +1,4 @@
-// A recording of an inertial unit, given out as pairs come.
+// Feeds the recording of an inertial unit in step with the pairs.
 #pragma once
 
 #include <cstddef>
@@ -15,14 +15,15 @@ namespace relmap::frontend {
 class ImuFeed {
  public:
   explicit ImuFeed(ImuRecording recording) : recording_(std::move(recording)) {}
-  // `wanted`: a file or folder; "none"; "auto": what the source's data set has. Nothing where there is none, or where
-  // auto finds one that cannot be read: then it says so on standard error. read_imu()'s errors.
+  // `wanted` is a file or folder, "none", or "auto" for the data set's recording. Nothing if there is none, or if the
+  // recording found by "auto" cannot be read, which is reported on standard error unless `quiet`. The reasons of
+  // read_imu().
   static Result<std::optional<ImuFeed>> open(const std::string& wanted, const capture::StereoSource& source,
                                              bool quiet);
 
   const ImuCalibration& calibration() const { return recording_.calibration; }
-  // Samples not given out yet up to the first at or after `time_us`: a turn ends between two samples. By the clock that
-  // StampFilter keeps going: a camera's that is set back does not take the pairs away from their samples.
+  // Returns the next samples up to the first one at or after `time_us`, since a rotation ends between two samples.
+  // Times are those of StampFilter, so pairs and samples stay together if the camera's clock is set back.
   std::span<const ImuSample> until(std::int64_t time_us);
 
  private:

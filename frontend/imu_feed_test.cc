@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kBegin = 1'600'000'000'000'000, kSample = 5'000, kPair = 100'000;
 
-// The angle about z, and its rate, `s` seconds after the beginning: no two steps turn alike.
+// The angle about z and its rate, `s` seconds after the beginning; each step has a different rotation.
 double angle(double s) { return 0.2 * s * s; }
 Vector3 rate(double s) { return {0, 0, 0.4 * s}; }
 
@@ -32,7 +32,7 @@ TEST(ImuFeed, GivesSamplesUpToTheFirstThatIsNotEarlier) {
   EXPECT_EQ(feed.until(kBegin + 4'000'000).size(), 0u);
 }
 
-// The camera's clock is set back by five seconds, the gyro's is not: the turns are those of the pairs' own moments.
+// The camera's clock is set back by five seconds, the gyro's is not. Rotations must still be those between the pairs.
 TEST(ImuFeed, FollowsThePairsWhenTheirClockIsSetBack) {
   const ImuRecording recorded = recording(4);
   ImuFeed feed(recorded);

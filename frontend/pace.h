@@ -1,4 +1,4 @@
-// Lets items leave at a steady rate.
+// Releases items at a steady rate.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,10 @@ namespace relmap::frontend {
 
 class Pace {
  public:
-  // A rate of 0: as fast as they come.
+  // A rate of 0 means no limit.
   explicit Pace(double hz) : hz_(hz), begin_(Clock::now()) {}
 
-  // Until the next item is due, or `stop` is set.
+  // Waits until the next item is due, or `stop` is set.
   void wait(const std::atomic<bool>& stop) {
     if (hz_ <= 0) return;
     const auto due = begin_ + std::chrono::duration_cast<Clock::duration>(

@@ -1,4 +1,4 @@
-// The figures of every picture of a mono session, as a file of tab-separated lines.
+// Writes the figures of each picture of a mono session to a file of tab-separated lines.
 #pragma once
 
 #include <fstream>
@@ -8,15 +8,15 @@
 
 namespace relmap::frontend {
 
-// A line of names comes first, then one for each picture that became a keyframe, on disk at once; behind "# " at the
-// end how many there were. Not thread-safe.
+// The first line has the names of the columns. Then there is a line for each picture that became a keyframe, written to
+// disk at once, and at the end, after "# ", their number. Not thread-safe.
 class PictureReport {
  public:
-  // As ReportFile::open().
+  // Like ReportFile::open().
   static Result<PictureReport> open(const std::string& path, bool goes_on);
 
   void add(const tracking::MonoPicture& picture);
-  Status close();  // IO_ERROR: something did not reach the disk
+  Status close();  // IO_ERROR if something did not reach the disk
 
  private:
   PictureReport(std::string path, std::ofstream out) : path_(std::move(path)), out_(std::move(out)) {}

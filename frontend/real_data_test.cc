@@ -1,4 +1,4 @@
-// The front-end on real input.
+// Tests of the front-end on real recordings.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -88,8 +88,9 @@ double mean_drift(const std::vector<tracking::PosePair>& poses, std::size_t min_
   return sum / 2;
 }
 
-// The truth of this one is wrong itself, by a metre over its first 40 pairs: independent odometries agree there with
-// each other, to 0.2 m, and not with it. Where it is right the bar is strict; over all of it only what it leaves.
+// The ground truth of this recording is wrong by a metre over its first 40 pairs, where independent odometries agree
+// with each other to 0.2 m, but not with it. The bound is strict where the ground truth is right, and looser over all
+// of it.
 TEST_F(RealData, DriftOnAStreetWithMovingCarsIsBelowOnePercentWhereItsTruthIsRight) {
   const Drive result = drive("kitti_raw_0926_1405");
   EXPECT_EQ(result.pairs, 160u);
@@ -105,7 +106,8 @@ TEST_F(RealData, DriftOnAStraightRoadIsBelowPointNinePercent) {
   EXPECT_LE(mean_drift(result.poses, 5), 0.009);
 }
 
-// Row of the left one less row of the right one, of SIFT features that are each other's best by far, wherever they are.
+// Left row minus right row of SIFT features that are clearly each other's best match, without constraint on their
+// position.
 std::vector<double> row_differences(const capture::StereoFrame& frame) {
   const auto left = vision::detect_appearance(frame.left, 600), right = vision::detect_appearance(frame.right, 600);
   const auto distance = [](const AppearanceFeature& a, const AppearanceFeature& b) {
@@ -153,7 +155,7 @@ class RealEuroc : public RealData {
   std::unique_ptr<capture::StereoSource> source_;
 };
 
-// Its pictures are not rectified: rectification must bring what both eyes see to the same row.
+// The pictures are not rectified. Rectification must move what both eyes see to the same row.
 TEST_F(RealEuroc, RectificationBringsBothEyesToTheSameRows) {
   EXPECT_EQ(source_->count(), 100u);
   EXPECT_EQ(source_->skipped(), 0u);
@@ -195,8 +197,8 @@ TEST_F(RealEuroc, CornersMatchAlongTheRows) {
   EXPECT_GT(static_cast<double>(matched), 0.7 * static_cast<double>(corners));
 }
 
-// What the check of the eyes says of good cameras: nothing, and by how much. Its thresholds are 1 px of row error, 5 %
-// of negative disparities, 0.5 degrees of yaw by motion and, where motion does not tell, 0.75 by rows.
+// The check of the eyes must find nothing on good cameras, with a margin. Its thresholds are 1 px of row error, 5 % of
+// negative disparities, 0.5 degrees of yaw by motion and, if motion does not determine it, 0.75 degrees by rows.
 TEST_F(RealData, TheEyesOfEveryStereoRecordingPassTheCheck) {
   for (const char* set : {"kitti_raw_0926_1405", "kitti_odom_06_first51", "kitti_odom_00_first201",
                           "karlsruhe_20100309_0019", "boofcv_backyard", "euroc_v101_keyframes100"}) {
@@ -214,7 +216,7 @@ TEST_F(RealData, TheEyesOfEveryStereoRecordingPassTheCheck) {
     EXPECT_TRUE(rig.findings.empty()) << set << ": " << rig.findings[0].to_string();
     EXPECT_GE(rig.pairs, 10) << set;
     EXPECT_LE(rig.pairs, 20) << set << ": it costs little";
-    // Half of what would be refused, so that what is a little worse is not; rows alone tell a yaw less exactly.
+    // The bounds are half of the thresholds, so that slightly worse cameras pass, too; a yaw by rows is less exact.
     EXPECT_LT(rig.row_error, 0.5) << set;
     EXPECT_LT(rig.negative_disparity, 0.025) << set;
     ASSERT_TRUE(rig.yaw_by_motion || std::string(set).starts_with("euroc")) << set << ": it drives from the beginning";

@@ -1,4 +1,4 @@
-// relmap-frontend: stereo pictures in, keyframes out.
+// relmap-frontend: turns stereo pictures into keyframes and publishes them.
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
@@ -39,52 +39,51 @@ constexpr const char* kFooter =
     "keyframes.bin), log (keyframes that lcm-logger recorded), raw (what relmap-camera recorded), iidc (a live stereo\n"
     "camera: relmap-camera list; always --live, until Ctrl-C), auto (the one of the others that the folder or file "
     "looks\n"
-    "like). A camera of one eye is refused: it measures no metres. With --mono its pictures are places all the same: "
-    "a\n"
-    "mono session, whose frames are recognised (relmap match) and have no edges; a calibration is not needed.\n"
-    "Keyframes that relmapd has not settled stay in the spool; the same command goes on where it stopped. With\n"
-    "--spool none and a --uuid of its own a run that was broken off begins its recording anew: it gives the same\n"
-    "keyframes, and what relmapd has already is not sent again.\n"
-    "--progress json: {\"pairs\", \"of\", \"keyframes\", \"settled\", \"path_m\", \"trouble\"} a line, four a second.\n"
-    "--report: a line for every pair (or picture), tab-separated, and a summary in comment lines. --show: the tracks "
-    "drawn on the\n"
-    "left pictures.\n"
+    "like). A camera of one eye is refused, since it cannot measure metres. With --mono its pictures make a mono\n"
+    "session, whose frames can be recognised (relmap match) but have no edges; it needs no calibration.\n"
+    "Keyframes that relmapd has not settled stay in the spool; the same command continues where it stopped. With\n"
+    "--spool none and a --uuid, repeating the command after an interruption starts the recording over: it gives the\n"
+    "same keyframes, and those that relmapd has are not sent again.\n"
+    "--progress json prints {\"pairs\", \"of\", \"keyframes\", \"settled\", \"path_m\", \"trouble\"} four times a "
+    "second.\n"
+    "--report writes a tab-separated line for each pair (or picture), and a summary in comment lines. --show draws\n"
+    "the tracks on the left pictures.\n"
     "\n"
-    "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (a session\n"
-    "that is another recording's too), 3 keyframes left unsettled, refused, or given up (gaps in\n"
-    "the map), 4 interrupted, 5 done, but not to be trusted: fewer than 80 % of the pairs that there\n"
-    "should be were measured, or the eyes are not as the calibration says (the summary begins with\n"
-    "it). 1, 2 and 4 go before 3, and 3 before 5. Eyes that are plainly wrong (NOT_STEREO,\n"
-    "ROWS_APART, EYE_DEAD in the first pairs) end a recording with 1 before anything is begun; a\n"
-    "live camera goes on, and says so.";
+    "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (also a\n"
+    "session that belongs to another recording), 3 keyframes left unsettled, refused, or given up\n"
+    "(gaps in the map), 4 interrupted, 5 done, but not to be trusted: fewer than 80 % of the expected\n"
+    "pairs were measured, or the eyes are not as the calibration says (the summary begins with it).\n"
+    "1, 2 and 4 take precedence over 3, and 3 over 5. If the eyes are plainly wrong in the first\n"
+    "pairs (NOT_STEREO, ROWS_APART, EYE_DEAD), a recording ends with 1 before a session begins; a\n"
+    "live camera continues with a warning.";
 
 int main_function(int argc, char** argv) {
   RunOptions a;
   std::string rate = "max", picture_kind = "whole", progress = "text";
   bool json = false;
-  CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
+  CLI::App app("Turns stereo pictures into keyframes of a relative map and publishes them.", "relmap-frontend");
   app.footer(kFooter);
   terminal::add_version(app);
   app.add_option("--source", a.source, "where pairs come from")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "raw", "log", "iidc", "auto"}))
       ->capture_default_str();
   app.add_option("path", a.path,
-                 "the source's folder or file; with iidc the camera's serial number, which may be left out where there "
-                 "is one");
-  app.add_option("--robot", a.robot, "name of the robot; needed but for keyframes, whose robot is recorded");
+                 "the source's folder or file; with iidc the camera's serial number, which is optional if there is "
+                 "only one");
+  app.add_option("--robot", a.robot, "name of the robot; required, except for recorded keyframes");
   app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
   auto* const recorded =
       app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   bool list = false;
   app.add_flag("--list", list,
-               "what a recording is, an object a line, and no more: what tells it from others, the sessions that a log "
-               "holds,\nwith --mono the cameras of a folder of pictures")
+               "only print what a recording is, one JSON object a line: what identifies it, the sessions of a log,\n"
+               "with --mono the cameras of a folder of pictures")
       ->excludes(recorded);
   auto* const uuid =
       app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")
           ->check([](const std::string& text) { return SessionUuid::parse(text) ? "" : "not a uuid: " + text; });
   app.add_flag("--as-recorded", a.as_recorded,
-               "a log's session as itself, not as a new one: what the map has of it already is not taken in again")
+               "keep the identity of a log's session: keyframes that the map already has are not added again")
       ->excludes(uuid);
   app.add_option("--calibration", a.calibration, "KITTI, OpenCV, EuRoC, kalibr or ROS file, or a folder with one");
   app.add_option("--cameras", a.camera_folder,
@@ -94,7 +93,7 @@ int main_function(int argc, char** argv) {
       ->check(CLI::IsMember({"auto", "usb", "1394"}))
       ->capture_default_str();
   auto* const imu =
-      app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
+      app.add_option("--imu", a.imu, "recording of an inertial unit: a file or folder, auto (the data set's), or none")
           ->capture_default_str();
   auto* const to =
       app.add_option("--to", a.to,
@@ -107,24 +106,25 @@ int main_function(int argc, char** argv) {
           ->excludes(lcm);
   auto* const spool = app.add_option("--spool", a.publisher.spool,
                                      "folder that keeps keyframes until they are settled (default:\n"
-                                     "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it); none: they "
-                                     "are\nkept in memory, for sources that can be read again");
-  auto* const spool_bytes = app.add_option("--spool-bytes", a.publisher.spool_bytes,
-                                           "of keyframes that are not settled, at most; at least 1MB")
-                                ->transform(CLI::AsSizeValue(false))
-                                ->capture_default_str();
+                                     "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it); none "
+                                     "keeps\nthem in memory, for sources that can be read again");
+  auto* const spool_bytes =
+      app.add_option("--spool-bytes", a.publisher.spool_bytes, "maximum size of the unsettled keyframes; at least 1MB")
+          ->transform(CLI::AsSizeValue(false))
+          ->capture_default_str();
   app.add_option("--out", a.out, "the file to write instead of sending: FILE.part until it is complete")
       ->excludes(lcm, server, spool, spool_bytes);
-  app.add_flag("--wait", a.wait, "for a camera that is not there yet, or not to be had");
-  app.add_option("--rate", rate, "pairs a second, or max (of a camera: as its settings say, else the fastest)")
+  app.add_flag("--wait", a.wait, "wait for a camera that is not there yet or not available");
+  app.add_option("--rate", rate, "pairs a second, or max (for a camera, the rate in its settings or else its maximum)")
       ->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
   auto* const all_keyframes =
-      app.add_flag("--all-keyframes", a.all_keyframes, "every pair becomes one: for recordings of keyframes");
+      app.add_flag("--all-keyframes", a.all_keyframes, "make each pair a keyframe, for recordings of keyframes");
   auto* const picture =
-      app.add_option("--picture", picture_kind,
-                     "of the left eye, that each keyframe carries: whole (up to 32 kB; the map finds what it knows in\n"
-                     "it), small (to be looked at) or none")
+      app.add_option(
+             "--picture", picture_kind,
+             "picture of the left eye in each keyframe: whole (up to 32 kB; the map finds its landmarks in it),\n"
+             "small (a thumbnail) or none")
           ->check(CLI::IsMember({"whole", "small", "none"}))
           ->capture_default_str();
   app.add_option("--patience", a.patience_s, "seconds without progress before giving up on a silent daemon")
@@ -133,21 +133,23 @@ int main_function(int argc, char** argv) {
   app.add_option("--report", a.report, "file for the figures of every pair");
   auto* const show = app.add_option("--show", a.show, "folder for PNG pictures of the tracks, or an .mp4");
   auto* const live =
-      app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
+      app.add_flag("--live", a.live, "treat the source as a camera, which cannot wait: excess pairs are dropped");
   auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
   auto* const despite_check =
       app.add_flag("--despite-check", a.despite_check,
-                   "track a recording though its first pairs show that the eyes are wrong; ends with 5");
-  auto* const mono = app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres");
+                   "track a recording although its first pairs show that the eyes are wrong; ends with 5");
+  auto* const mono =
+      app.add_flag("--mono", a.mono, "make a mono session of a camera's pictures (source images), without metres");
   app.add_option("--camera", a.camera,
-                 "with --mono: of which camera the pictures are taken, where a folder has those of several (--list)")
+                 "with --mono: whose pictures to use, if a folder has those of several cameras (--list)")
       ->needs(mono);
   mono->excludes(despite_check, imu, recorded, show, live, oneway, all_keyframes, picture);
-  app.add_flag("--json", json, "the summary as JSON on standard output");
-  app.add_option("--progress", progress, "text on standard error, or json on standard output with --json's at the end")
+  app.add_flag("--json", json, "print the summary as JSON on standard output");
+  app.add_option("--progress", progress,
+                 "text on standard error, or json on standard output, with the summary as JSON at the end")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  app.add_flag("--quiet", a.quiet, "no progress as text");
+  app.add_flag("--quiet", a.quiet, "print no progress as text");
   try {
     app.parse(argc, argv);
     if (rate != "max") {

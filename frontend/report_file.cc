@@ -55,7 +55,7 @@ void ReportFile::add(const tracking::TrackedPair& pair) {
        {r.rms_px, r.speed, turn_deg(r), r.rotation_correlation, r.offset_px, pair.left_ms, pair.right_ms, r.features_ms,
         r.rotation_ms, r.match_ms, r.motion_ms, pair.tracking_ms, pair.description_ms})
     out_ << '\t' << value + 0.0;  // -0 + 0 is 0
-  out_ << std::endl;              // whoever follows the file, or reads what a kill left, finds whole lines
+  out_ << std::endl;              // flushed, so that readers find whole lines also after a crash
 
   ++pairs_;
   if (pair.keyframe) count_tracks(*pair.keyframe);

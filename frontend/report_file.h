@@ -1,4 +1,4 @@
-// The figures of every pair as a file of tab-separated lines, and what they come to in all.
+// Writes the figures of each pair to a file of tab-separated lines, with a summary.
 #pragma once
 
 #include <array>
@@ -13,18 +13,18 @@
 
 namespace relmap::frontend {
 
-// A line of names comes first, then one for each pair, on disk at once; at the end, behind "# ", the summary: mean,
-// median, least and most of the figures over the pairs tracked, as Sibley et al. 2010 print them in their Table 2.
-// Keeps some 60 bytes of memory a pair for the medians. Not thread-safe.
+// The first line has the names of the columns. Then there is a line for each pair, written to disk at once, and at the
+// end, after "# ", the summary: mean, median, minimum and maximum of the figures over the tracked pairs, as in Table 2
+// of Sibley et al. 2010. It uses about 60 bytes of memory for each pair for the medians. Not thread-safe.
 class ReportFile {
  public:
-  // An existing file is replaced; that of an interrupted run that `goes_on` is added to, its summary stays. IO_ERROR;
-  // INVALID_ARGUMENT: what is there has not the columns of a report.
+  // Replaces an existing file; if an interrupted run `goes_on`, appends to it after the old summary. IO_ERROR;
+  // INVALID_ARGUMENT if the existing file does not have the columns of a report.
   static Result<ReportFile> open(const std::string& path, bool goes_on);
 
-  // In order. Of a pair with a keyframe: before anything is taken out of it.
+  // Takes pairs in order. The keyframe of a pair must be complete.
   void add(const tracking::TrackedPair& pair);
-  Status close();  // IO_ERROR: something did not reach the disk
+  Status close();  // IO_ERROR if something did not reach the disk
 
  private:
   struct Series {
@@ -57,7 +57,7 @@ class ReportFile {
   std::string path_;
   std::ofstream out_;
   std::array<Series, kFigures> series_;
-  std::map<TrackId, int> lengths_;  // of the tracks that go on: keyframes that measured them
+  std::map<TrackId, int> lengths_;  // number of keyframes that measured each current track
   std::uint64_t pairs_ = 0, tracked_ = 0, keyframes_ = 0, steps_ = 0, metric_steps_ = 0;
   std::optional<Vector3> position_;
   double distance_ = 0;

@@ -25,7 +25,7 @@ void RigWatch::work(const std::stop_token& stop) {
     capture::StereoFrame frame = std::move(*frame_);
     frame_.reset();
     lock.unlock();
-    first_.take(std::move(frame));  // offer() leaves it alone while it is busy
+    first_.take(std::move(frame));  // offer() does not use first_ while busy_ is set
     const bool enough = first_.enough();
     if (enough) tell_(first_.report());
     lock.lock();

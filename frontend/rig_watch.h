@@ -1,4 +1,4 @@
-// Checks the eyes of a live camera on the first pairs that come, beside everything else.
+// Checks the eyes of a live camera on its first pairs, on a thread of its own.
 #pragma once
 
 #include <condition_variable>
@@ -13,12 +13,13 @@ namespace relmap::frontend {
 
 class RigWatch {
  public:
-  // `tell` is called once, by a thread of its own or by finish(). The rectifier must outlive it.
+  // `tell` is called once with the report, on the thread of the watch or by finish(). The rectifier must outlive the
+  // watch.
   RigWatch(const vision::Rectifier& rectifier, std::function<void(const vision::RigReport&)> tell);
 
-  // By one thread. Copies those pairs that are wanted, while it has time for them, and never waits.
+  // Offers a pair; to be called by one thread. Copies the pair if it is wanted and the thread is idle. Does not block.
   void offer(const capture::StereoFrame& raw);
-  // No more come: tells of those that came, if it has not yet. Once.
+  // Ends the watch: reports on the pairs so far if that has not been done. To be called once.
   void finish();
 
  private:
@@ -28,7 +29,7 @@ class RigWatch {
   std::function<void(const vision::RigReport&)> tell_;
   std::mutex mutex_;
   std::condition_variable_any came_;
-  std::optional<capture::StereoFrame> frame_;  // to be looked at
+  std::optional<capture::StereoFrame> frame_;  // the next one to check
   bool busy_ = false, told_ = false;
   std::jthread thread_;
 };

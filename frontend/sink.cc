@@ -81,7 +81,7 @@ class FileSink : public KeyframeSink {
   publishing::PublishSummary summary_;
 };
 
-// A name as part of a path.
+// Makes a name usable as a part of a path.
 std::string as_folder(const std::string& name) {
   std::string folder;
   for (const char c : name) {

@@ -1,4 +1,4 @@
-// Where keyframes go: over LCM or gRPC to relmapd, or into a file.
+// Sinks of keyframes: relmapd over LCM or gRPC, or a file.
 #pragma once
 
 #include <functional>
@@ -15,30 +15,30 @@ class KeyframeSink {
  public:
   virtual ~KeyframeSink() = default;
   virtual const SessionHeader& session() const = 0;
-  // Where a session that is continued goes on.
+  // The keyframe after which a continued session goes on.
   virtual std::optional<Keyframe> last_keyframe() const = 0;
-  // As Publisher's; a file is in no map.
+  // Like Publisher::await_map(); ok for a file.
   virtual Status await_map(double patience_s) = 0;
   virtual Status push(const Keyframe& keyframe) = 0;
-  // As Publisher::hear(); a file has no news.
+  // Like Publisher::hear(); a file has no news.
   virtual void hear(std::function<void(const PoseNews&)> listener) = 0;
   virtual publishing::PublishSummary progress() const = 0;
-  // Waits until everything is settled, or nothing more has been for `patience_s` seconds. A file gets its name only if
-  // what was pushed is `complete`; else it stays FILE.part.
+  // Waits until everything is settled, or nothing has been settled for `patience_s` seconds. A file is renamed from
+  // FILE.part to FILE only if it is `complete`.
   virtual Result<publishing::PublishSummary> finish(double patience_s, bool complete) = 0;
-  // As Publisher's, whose session has no more keyframes for now; best effort.
+  // Like Publisher::end_session(); best effort.
   virtual void end_session(double patience_s) = 0;
   virtual Status trouble() const = 0;
-  virtual void interrupt() = 0;  // from any thread
+  virtual void interrupt() = 0;  // thread-safe
 };
 
 Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(publishing::PublisherOptions options, const SessionHeader& session);
-// `server`: a data folder or HOST:PORT.
+// `server` is a data folder or HOST:PORT.
 Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, publishing::PublisherOptions options,
                                                      const SessionHeader& session);
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session);
 
-// Where the spool of a session stands unless it is said: below $XDG_STATE_HOME or ~/.local/state.
+// The default folder of a session's spool, below $XDG_STATE_HOME or ~/.local/state.
 std::string default_spool(const SessionHeader& session);
 
 }  // namespace relmap::frontend

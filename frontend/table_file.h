@@ -1,4 +1,4 @@
-// Files of tab-separated lines that a run writes, and an interrupted one goes on with.
+// Opens files of tab-separated lines, to which an interrupted run can append.
 #pragma once
 
 #include <fstream>
@@ -8,8 +8,9 @@
 
 namespace relmap::frontend {
 
-// For writing lines under `names`, which is the first. An existing file is replaced; that of an interrupted run that
-// `goes_on` is added to. IO_ERROR; INVALID_ARGUMENT: what is there has other columns, and is not a report of this kind.
+// Opens a file for writing, whose first line is `names`. Replaces an existing file; if an interrupted run `goes_on`,
+// appends to it. IO_ERROR; INVALID_ARGUMENT if the existing file has other columns, so that it is no report of this
+// kind.
 Result<std::ofstream> open_table(const std::string& path, const std::string& names, bool goes_on);
 
 }  // namespace relmap::frontend

@@ -15,7 +15,7 @@ namespace {
 constexpr int kMinWidth = 720;   // narrower pictures are enlarged by a whole number
 constexpr int kBar = 46;         // height below the picture
 constexpr int kOldest = 16;      // keyframes
-constexpr double kFullTurn = 5;  // degrees that the ring stands for
+constexpr double kFullTurn = 5;  // degrees at which the arrow reaches the ring
 constexpr double kTiltFactor = 10;
 
 const cv::Scalar kBarColour(38, 32, 30), kText(235, 235, 235), kDim(150, 145, 140), kShadow(20, 20, 20);
@@ -29,7 +29,7 @@ cv::Scalar colour_of_age(int age) {
     cv::applyColorMap(grey, colours, cv::COLORMAP_TURBO);
     return colours;
   }();
-  // The first keyframes tell most; the ends of the ramp are too dark to be seen.
+  // Differences between the first keyframes matter most; the ends of the ramp are too dark to be seen.
   const double old = std::min(1.0, std::log2(1.0 + age) / std::log2(1.0 + kOldest));
   const auto colour = ramp.at<cv::Vec3b>(0, 30 + static_cast<int>(195 * old));
   return {static_cast<double>(colour[0]), static_cast<double>(colour[1]), static_cast<double>(colour[2])};
@@ -44,7 +44,7 @@ int width_of(const std::string& words, double size = 0.55) {
   return cv::getTextSize(words, cv::FONT_HERSHEY_SIMPLEX, size, 1, &baseline).width;
 }
 
-// What is written there can be read on any picture.
+// Writes text that is legible on any picture.
 void darken(cv::Mat& canvas, const cv::Rect& box) {
   cv::Mat behind = canvas(box & cv::Rect(0, 0, canvas.cols, canvas.rows));
   behind.convertTo(behind, -1, 0.35);
@@ -154,13 +154,13 @@ ColourPicture draw_tracks(const tracking::TrackedPair& pair) {
   drawn.bgr.resize(static_cast<std::size_t>(drawn.width) * static_cast<std::size_t>(drawn.height) * 3);
   cv::Mat canvas(drawn.height, drawn.width, CV_8UC3, drawn.bgr.data());
 
-  // OpenCV has no view of what may not be written to.
+  // OpenCV has no read-only views.
   const cv::Mat grey(picture.height(), picture.width(), CV_8U, const_cast<std::uint8_t*>(picture.row(0)));
   cv::Mat large, coloured;
   cv::resize(grey, large, {}, scale, scale, cv::INTER_LINEAR);
   cv::cvtColor(large, coloured, cv::COLOR_GRAY2BGR);
   cv::Mat view = canvas(cv::Rect(0, 0, large.cols, large.rows));
-  coloured.convertTo(view, -1, 0.8);  // a little darker: the colours stand out
+  coloured.convertTo(view, -1, 0.8);  // a little darker, so that the colours stand out
 
   if (!pair.report.repeated) draw_landmarks(view, pair.report, scale);
   draw_identity(view, pair);

@@ -1,4 +1,4 @@
-// A pair as the tracker saw it, drawn for people.
+// Draws a pair with its tracks, for people to look at.
 #pragma once
 
 #include <cstddef>
@@ -9,21 +9,21 @@
 
 namespace relmap::frontend {
 
-// Row by row; blue, green, red.
+// Pixels row by row, in the order blue, green, red.
 struct ColourPicture {
-  int width = 0, height = 0;  // even: video asks for it
+  int width = 0, height = 0;  // even, as video requires
   std::vector<std::uint8_t> bgr;
 };
 
-// The left picture, small ones enlarged; on it
-// - which pair it is: its index in the source, the left picture's file name, its time in seconds;
-// - the landmarks found: discs those that agree with the motion, from blue (young) to red (16 keyframes and more),
-// small
-//   crosses those that do not;
-// - where the camera turned since the pair before: an arrow that reaches the ring at 5 degrees, and a horizon that
-// tilts
-//   ten times as much as the camera;
-// below it the pair's figures, and what is special about it. A frame round it says: a keyframe, or lost.
+// Draws the left picture (small ones are enlarged) with
+// - the pair's index in the source, the left picture's file name, and its time in seconds;
+// - the landmarks that were found: discs for those that agree with the motion, from blue (young) to red (16 keyframes
+// and
+//   more), and small crosses for those that do not;
+// - the rotation since the pair before: an arrow that reaches the ring at 5 degrees, and a horizon that tilts ten times
+// as
+//   much as the camera.
+// Below it are the pair's figures. A coloured frame marks a keyframe or a lost pair.
 ColourPicture draw_tracks(const tracking::TrackedPair& pair);
 
 }  // namespace relmap::frontend

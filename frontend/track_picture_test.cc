@@ -90,7 +90,7 @@ class ShownTracks : public ::testing::Test {
     EXPECT_NE(refused.status().message().find(remedy), std::string::npos) << refused.status().to_string();
   }
 
-  // Its own: tests run beside each other.
+  // A folder for each test, since tests run in parallel.
   const std::string folder_ =
       ::testing::TempDir() + "relmap_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
 };
@@ -123,7 +123,7 @@ TEST_F(ShownTracks, SaysWhereItCannotBeWritten) {
   expect_refused("/nowhere/out.mp4", false, Reason::IO_ERROR, "No such file");
   std::filesystem::create_directories(path("folder.mp4"));
   expect_refused(path("folder.mp4"), false, Reason::IO_ERROR, "Is a directory");
-  // Nothing is left where no picture came.
+  // Nothing is left if no picture was shown.
   ASSERT_TRUE(open_track_show(path("empty.mp4"), 10, false).or_throw()->close().ok());
   EXPECT_FALSE(std::filesystem::exists(path("empty.mp4")));
 }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// OpenCV has no view of what may not be written to; it writes nothing.
+// OpenCV has no read-only views; nothing is written to this one.
 cv::Mat view_of(const ColourPicture& picture) {
   return {picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.bgr.data())};
 }
@@ -32,7 +32,7 @@ class PictureFolder : public TrackShow {
     char name[32];
     std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(index));
     const std::string path = folder_ / name;
-    // Fast rather than small.
+    // Encoding must be fast rather than small.
     if (!cv::imwrite(path, view_of(picture), {cv::IMWRITE_PNG_COMPRESSION, 1}))
       return {Reason::IO_ERROR, path + " cannot be written"};
     return {};
@@ -54,7 +54,7 @@ class Film : public TrackShow {
     return {};
   }
 
-  // The writer keeps silent about a disk that is full.
+  // The writer does not report a full disk.
   Status close() override {
     const bool any = writer_.isOpened();
     writer_.release();
@@ -64,7 +64,7 @@ class Film : public TrackShow {
   }
 
  private:
-  // By FFmpeg alone, and in silence: what fails is ours to name.
+  // Only FFmpeg, and without its messages: errors are reported here.
   bool open(cv::Size size) {
     namespace log = cv::utils::logging;
     const auto level = log::setLogLevel(log::LOG_LEVEL_SILENT);
@@ -85,7 +85,7 @@ std::string ending_of(const fs::path& path) {
   return ending;
 }
 
-// Leaves what is there as it is.
+// Leaves an existing file unchanged.
 Status check_writable(const std::string& path) {
   const bool existed = fs::exists(path);
   if (!std::ofstream(path, std::ios::app))

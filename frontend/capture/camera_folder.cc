@@ -85,7 +85,7 @@ std::vector<std::pair<std::string, std::string>> read_features(const YAML::Node&
     const std::string name = scalar(entry.first, "features", "names with values, as {shutter: auto, gain: 12}");
     const auto same = [&](const auto& feature) { return feature.first == name; };
     if (std::any_of(features.begin(), features.end(), same)) refuse("features." + name, "twice", "once");
-    // Of these two the camera's driver knows the form (iidc/features.h).
+    // The form of these two is checked by the camera's driver (iidc/features.h).
     if (name == "trigger" || name == "strobe")
       features.emplace_back(name, scalar(entry.second, "features." + name,
                                          "off, MODE,SOURCE (trigger); PIN,off, PIN,high,DELAY,DURATION (strobe)"));

@@ -9,7 +9,7 @@ namespace relmap::capture {
 
 void ContentsChecksum::add(ByteSpan bytes) { crc_ = crc32c(bytes, crc_); }
 
-// With its length: "ab" and "c" are not "a" and "bc".
+// Text is added with its length, so that "ab" and "c" differ from "a" and "bc".
 void ContentsChecksum::add(std::string_view text) {
   add(static_cast<std::int64_t>(text.size()));
   add(as_bytes(text));

@@ -1,4 +1,4 @@
-// A checksum over what there is to know of a recording's files without reading them.
+// A checksum over what is known about a recording's files without reading them.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace relmap::capture {
 
-// In the order in which they are added.
+// It depends on the order in which things are added.
 class ContentsChecksum {
  public:
   void add(ByteSpan bytes);
   void add(std::string_view text);
   void add(std::int64_t number);
   void add(double number);
-  // Its name without its folders, and its size; one that is not there counts as such.
+  // Adds the name of a file (without its folders) and its size. A missing file is also part of the checksum.
   void add_file(const std::filesystem::path& file);
   std::uint32_t value() const { return crc_; }
 

@@ -10,9 +10,10 @@ namespace {
 
 constexpr int kPlenty = 10, kMotions = 4;
 constexpr int kMaxLooked = 40, kMaxForMotion = 20;
-constexpr int kMinCorners = 20;                                   // of a pair that both eyes share
-constexpr std::int64_t kApartUs = 500'000;                        // between pairs that are looked at
-constexpr std::int64_t kSoonestUs = 80'000, kLatestUs = 350'000;  // of the picture that shows the motion
+constexpr int kMinCorners = 20;             // shared by both eyes, for a pair to count
+constexpr std::int64_t kApartUs = 500'000;  // between pairs
+// The picture that shows the motion is taken within this time after a pair.
+constexpr std::int64_t kSoonestUs = 80'000, kLatestUs = 350'000;
 
 }  // namespace
 
@@ -24,7 +25,7 @@ bool FirstPairs::enough() const {
 
 bool FirstPairs::wants(std::int64_t time_us) const {
   if (enough()) return false;
-  // A clock that was set back is not waited for.
+  // If the clock was set back, any pair is wanted.
   return !next_us_ || time_us >= *next_us_ || time_us < *next_us_ - kApartUs;
 }
 
@@ -54,7 +55,7 @@ void FirstPairs::look(vision::ImageView later) {
   ++looked_;
   const bool left_blind = vision::measure_exposure(pair.left).blind(),
              right_blind = vision::measure_exposure(pair.right).blind();
-  if (left_blind && right_blind) return;  // a covered camera, or the night, is no dead eye
+  if (left_blind && right_blind) return;  // if both are blind, the camera is covered or it is dark
   if (left_blind || right_blind) {
     (void)one_eyed_.add(pair.left, pair.right);
     return;

@@ -1,4 +1,4 @@
-// The pairs at the beginning of a recording, or of a camera's stream, on which its eyes are checked (rig_check.h).
+// Selects the first pairs of a recording, or of a camera's stream, on which the eyes are checked (rig_check.h).
 #pragma once
 
 #include <cstdint>
@@ -9,25 +9,24 @@
 
 namespace relmap::capture {
 
-// Which pairs are looked at follows from what they show. Half a second apart, since neighbours show the same; ten that
-// share corners, and four motions, are plenty: some 5 s and half a second of work. A robot may stand, or see nothing,
-// at first: without corners 40 are looked at, 20 s; without motion 20. What has not shown by then is not waited for.
-// Not thread-safe.
+// Pairs are taken half a second apart, since neighbours show the same. Ten pairs with shared corners and four motions
+// are enough: about 5 s of recording and half a second of computing. A robot may at first stand still or see nothing:
+// without motion 20 pairs are taken, and without corners 40 (20 s), but no more. Not thread-safe.
 class FirstPairs {
  public:
-  // Of that rectifier, which must outlive it: the pictures that are tracked.
+  // Pictures are rectified by `rectifier`, the one that tracking uses. It must outlive this object.
   explicit FirstPairs(const vision::Rectifier& rectifier)
       : rectifier_(rectifier), check_(rectifier.camera()), one_eyed_(rectifier.camera()) {}
 
   bool enough() const;
-  // Whether a pair of that time is to be given to take(); raw pairs are copied for it only then.
+  // Whether a pair of that time should be given to take(). Callers copy raw pairs only then.
   bool wants(std::int64_t time_us) const;
-  // The time of the first pair after those taken that it wants, for skip_before(); none: any.
+  // The earliest time of the next pair that is wanted, for skip_before(); none if any pair is.
   std::optional<std::int64_t> next_us() const { return next_us_; }
-  // A pair without one of its eyes tells nothing, nor one of another size, nor one in the dark.
+  // Takes a pair. A pair that lacks an eye, is of another size, or is dark in both eyes is ignored.
   void take(StereoFrame raw);
 
-  // Of those taken so far.
+  // The report on the pairs taken so far.
   vision::RigReport report();
 
  private:
@@ -35,21 +34,21 @@ class FirstPairs {
 
   const vision::Rectifier& rectifier_;
   vision::RigCheck check_;
-  // Of pairs with a blind eye: they count if there are no others, for a dead eye is dead at all times.
+  // Pairs with a blind eye. They count only if there are no others, since a dead eye is always dead.
   vision::RigCheck one_eyed_;
-  bool both_see_ = false;            // of some pair
-  std::optional<StereoFrame> held_;  // rectified; waits for what its left eye sees a moment later
+  bool both_see_ = false;            // both eyes saw something in some pair
+  std::optional<StereoFrame> held_;  // rectified; waits for the left picture of a moment later
   std::optional<std::int64_t> next_us_;
   int looked_ = 0, with_corners_ = 0;
 };
 
-// Takes what it wants from a source that is at its beginning, until there is enough or `stop` says so.
+// Checks the first pairs of a source that is at its beginning. Ends early if `stop` returns true.
 template <typename Stop>
 vision::RigReport check_first_pairs(StereoSource& source, const Stop& stop) {
   FirstPairs first(source.rectifier());
   while (!stop() && !first.enough()) {
     auto frame = source.next();
-    if (!frame.ok()) continue;  // whoever tracks will say so
+    if (!frame.ok()) continue;  // tracking will report it
     if (!frame->has_value()) break;
     if (!first.wants((*frame)->time_us)) continue;
     first.take(std::move(**frame));

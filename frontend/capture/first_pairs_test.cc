@@ -58,7 +58,7 @@ TEST_F(FirstPairsTest, AreSpreadInTimeEachWithWhatIsSeenAMomentLater) {
   EXPECT_EQ(first_.report().pairs, 3);
 }
 
-TEST_F(FirstPairsTest, AreEnoughSoonAndAskForNoMore) {
+TEST_F(FirstPairsTest, AreSoonEnoughAndThenNoMoreAreWanted) {
   const auto wanted = feed(1000, [](int, std::int64_t time_us) { return pair_at(time_us); });
   EXPECT_TRUE(first_.enough());
   EXPECT_LE(wanted.size(), 40u) << "20 pairs where no motion shows, each with what comes after it";
@@ -79,7 +79,7 @@ TEST_F(FirstPairsTest, WhatIsDarkAtFirstIsWaitedFor) {
   EXPECT_GE(report.pairs, 10);
 }
 
-TEST_F(FirstPairsTest, TheNightIsNoDeadEye) {
+TEST_F(FirstPairsTest, DarknessIsNoDeadEye) {
   feed(1000, [](int, std::int64_t time_us) {
     StereoFrame frame;
     frame.time_us = time_us;
@@ -111,7 +111,7 @@ TEST_F(FirstPairsTest, AnEyeThatIsDarkForAWhileIsNotDead) {
   EXPECT_EQ(first_.report().pairs, 4);
 }
 
-TEST_F(FirstPairsTest, PairsWithoutAnEyeOrOfAnotherSizeTellNothing) {
+TEST_F(FirstPairsTest, PairsWithoutAnEyeOrOfAnotherSizeAreIgnored) {
   feed(60, [](int i, std::int64_t time_us) {
     StereoFrame frame = pair_at(time_us);
     if (i < 20) frame.right = {};

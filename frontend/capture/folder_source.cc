@@ -119,13 +119,13 @@ class FolderSource : public StereoSource {
   StereoCalibration calibration_;
   vision::Rectifier rectifier_;
   std::string note_;  // for describe()
-  // Looked for when it is asked for: each picture is asked of the disk, and who reads the first pairs only does not
-  // ask.
+  // Determined on demand, since it queries the disk for each picture, and callers that read only the first pairs do not
+  // need it.
   mutable std::optional<MissingPictures> missing_;
   std::size_t next_ = 0;
 };
 
-// The first left picture that says its size: a bad one at the beginning is next()'s to name.
+// The size of the first left picture that can be read; next() reports bad ones before it.
 Result<std::pair<fs::path, vision::PictureSize>> first_size(const std::vector<PicturePair>& pairs) {
   Status first;
   for (const PicturePair& pair : pairs) {
@@ -152,11 +152,11 @@ StereoCalibration undistorted_camera(int width, int height, double focal_length)
 
 struct FirstPicture {
   fs::path path;
-  vision::PictureSize whole;  // as its file has it
-  int width = 0, height = 0;  // reduced
+  vision::PictureSize whole;  // size in the file
+  int width = 0, height = 0;  // size after reduction
 };
 
-// That can be decoded: the others are to be of its size.
+// The first picture that can be decoded; the others must have its size.
 Result<FirstPicture> first_picture(const PictureSet& set) {
   Status first;
   for (const PicturePair& pair : set.pairs) {

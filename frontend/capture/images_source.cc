@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Nothing where the folder has no list.
+// Nothing if the folder has no list.
 Result<std::optional<TimedPairs>> pairs_of_lists(const fs::path& folder) {
   std::error_code error;
   for (const auto& [left_name, right_name] :
@@ -33,7 +33,7 @@ Result<std::optional<TimedPairs>> pairs_of_lists(const fs::path& folder) {
   return std::optional<TimedPairs>();
 }
 
-// Why a folder is none of photographs: its own pictures, and not those of two eyes, are what is looked for.
+// The error for a folder without photographs. It speaks of pictures in the folder itself and not of two eyes.
 Status no_photographs(const fs::path& folder, const Status& status) {
   std::error_code error;
   if (fs::is_regular_file(folder, error))
@@ -48,7 +48,7 @@ Status find_pairs_of_folders(PictureSet& set, double rate_hz, bool photographs) 
                                            {"cam0", "cam1"},
                                            {"mav0/cam0/data", "mav0/cam1/data"}});
   auto pairs = eyes.ok() ? pair_up(eyes->first, eyes->second) : pair_up(set.folder, {});
-  // A folder without pictures of a kind that is read is told what would have been looked at.
+  // The error for a folder without readable pictures says where they are looked for.
   if (!pairs.ok()) {
     if (photographs && !eyes.ok()) return no_photographs(set.folder, pairs.status());
     const bool none = pairs.reason() == Reason::NO_SUCH_FILE || pairs.reason() == Reason::UNSUPPORTED;
@@ -87,12 +87,12 @@ void leave_those_of(PictureSet& set, const PicturesOfCamera& camera) {
   const std::set<fs::path> taken(camera.pictures.begin(), camera.pictures.end());
   std::erase_if(set.pairs, [&](const PicturePair& pair) { return !taken.contains(pair.left); });
   set.focal_length = camera.camera.focal_length();
-  // Times that no file tells do not depend on what other cameras took.
+  // Times that come from the rate must not depend on the pictures of other cameras.
   if (set.rate_hz > 0)
     if (const auto times = set_times(set.pairs, {}, true, set.rate_hz); times.ok()) set.rate_hz = times->rate_hz;
 }
 
-// Leaves the pictures of one camera: of the one of that name, or of the only one.
+// Keeps the pictures of one camera: the one of that name, or the only one.
 Status choose_camera(PictureSet& set, const std::string& name) {
   const std::vector<PicturesOfCamera> cameras = by_camera(left_pictures(set));
   std::string all;

@@ -235,7 +235,7 @@ TEST(MonoImages, TheirCameraIsFoundBehindLongHeaders) {
   EXPECT_EQ(listed->cameras[0].name, "360x240-24mm");
 }
 
-TEST(MonoImages, OfOneCameraAreTheSameWhateverOthersTook) {
+TEST(MonoImages, OfOneCameraDoNotDependOnPicturesOfOthers) {
   TemporaryFolder folder;
   for (const char* name : {"b.jpg", "c.jpg"}) write_picture(folder.path() / name, noise(160, 120, CV_8UC1, name[0]));
   const auto of_camera = [&](const std::string& name) {
@@ -276,7 +276,7 @@ TEST(MonoImages, WhatLiesBesideThemIsNamed) {
       << said;
 }
 
-TEST(MonoImages, WhereThereAreNoneItIsSaidOfPicturesAndNotOfEyes) {
+TEST(MonoImages, TheErrorForAFolderWithoutPicturesDoesNotMentionEyes) {
   TemporaryFolder folder;
   write_text(folder.path() / "1.BMP", "no picture");
   const auto bitmaps = open_mono_images(folder.path().string());

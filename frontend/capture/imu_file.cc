@@ -40,7 +40,7 @@ Result<ImuSample> parse_sample(std::string_view line) {
   return sample;
 }
 
-// The first of the names that is a file or folder there; empty: none.
+// The first of the names that exists there; empty if none does.
 fs::path first_of(const fs::path& folder, std::initializer_list<const char*> names) {
   std::error_code error;
   for (const char* name : names)

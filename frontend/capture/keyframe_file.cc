@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// What is not complete yet.
+// The name of a file that is not complete yet.
 std::string part_of(const std::string& path) { return path + ".part"; }
 
 }  // namespace
@@ -57,11 +57,11 @@ Result<std::optional<Keyframe>> KeyframeFileReader::next() {
   return std::optional<Keyframe>(std::move(*keyframe));
 }
 
-Result<std::optional<Bytes>> KeyframeFileReader::skip(std::size_t most) {
+Result<std::optional<Bytes>> KeyframeFileReader::skip(std::size_t max_bytes) {
   if (position_ == bytes_) return std::optional<Bytes>();
   const auto length = next_length();
   if (!length.ok()) return length.status();
-  Bytes beginning(std::min<std::size_t>(*length, most));
+  Bytes beginning(std::min<std::size_t>(*length, max_bytes));
   position_ += sizeof *length + *length;
   if (!in_.read(reinterpret_cast<char*>(beginning.data()), static_cast<std::streamsize>(beginning.size())) ||
       !in_.seekg(static_cast<std::streamoff>(position_)))

@@ -1,4 +1,4 @@
-// The few calls on files that a log makes, with errors that say what and where.
+// File operations of a log, with errors that name the operation and the path.
 #pragma once
 
 #include <span>
@@ -12,10 +12,10 @@ namespace relmap::capture {
 
 class LogFile {
  public:
-  // For appending. INVALID_ARGUMENT: there is something in a file of that name, or another process has it; IO_ERROR,
-  // DISK_FULL.
+  // Creates a file for appending. INVALID_ARGUMENT if a file of that name is not empty, or another process uses it;
+  // IO_ERROR, DISK_FULL.
   static Result<LogFile> create(const std::string& path);
-  // For reading. NO_SUCH_FILE: it cannot be opened.
+  // Opens a file for reading. NO_SUCH_FILE if it cannot be opened.
   static Result<LogFile> open(const std::string& path);
   LogFile(LogFile&& other) noexcept : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)) {}
   LogFile& operator=(LogFile&& other) noexcept {
@@ -27,13 +27,13 @@ class LogFile {
 
   const std::string& path() const { return path_; }
   Result<std::uint64_t> size() const;  // IO_ERROR
-  // All of it. IO_ERROR, DISK_FULL: some of it may stand there.
+  // Appends all bytes. IO_ERROR, DISK_FULL; some of the bytes may then have been written.
   Status append(ByteSpan bytes);
-  // On disk, but for the time of its last change. IO_ERROR, DISK_FULL.
+  // Writes the data to disk (but not the time of the last change). IO_ERROR, DISK_FULL.
   Status sync();
-  // What stands behind is gone; nothing where that fails.
+  // Truncates the file to a size; does nothing if that fails.
   void cut(std::uint64_t bytes);
-  // All that is asked for. IO_ERROR; TRUNCATED: the file ends before.
+  // Fills `bytes`. IO_ERROR; TRUNCATED if the file ends before that.
   Status read(std::uint64_t offset, std::span<std::uint8_t> bytes) const;
 
  private:
@@ -42,7 +42,7 @@ class LogFile {
   int file_ = -1;  // descriptor
 };
 
-// So that a file that was made in the folder of `path` stays there. IO_ERROR.
+// Makes the creation of a file in the folder of `path` durable. IO_ERROR.
 Status sync_folder_of(const std::string& path);
 
 }  // namespace relmap::capture

@@ -1,4 +1,4 @@
-// A folder of photographs, whatever cameras took them: what open_mono_images() takes, camera by camera.
+// A folder of photographs of any cameras: the sources of open_mono_images(), one for each camera.
 #pragma once
 
 #include <cstddef>
@@ -14,14 +14,14 @@ namespace relmap::capture {
 struct PhotographFolder {
   struct Camera {
     std::string name;          // picture_camera.h
-    std::size_t pictures = 0;  // that are its, or cannot be read
+    std::size_t pictures = 0;  // number of its pictures, with those that cannot be read
     Result<std::unique_ptr<StereoSource>> source;
   };
-  std::vector<Camera> cameras;  // that with most pictures first
+  std::vector<Camera> cameras;  // the one with the most pictures first
   PassedOver passed_over;
 };
 
-// options.camera chooses nothing here. Reasons: open_mono_images()'s.
+// options.camera is ignored. The reasons of open_mono_images().
 Result<PhotographFolder> open_photographs(const std::string& folder, const FolderOptions& options = {});
 
 }  // namespace relmap::capture

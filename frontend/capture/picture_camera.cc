@@ -15,8 +15,8 @@ namespace relmap::capture {
 namespace {
 
 constexpr double kFilmWidth = 36;          // mm
-constexpr std::size_t kHead = 256 * 1024;  // bytes; nearly all pictures say their size, and EXIF's lens, in these
-constexpr int kMaxFocal35mm = 10000;       // mm; more is no lens
+constexpr std::size_t kHead = 256 * 1024;  // bytes; nearly all pictures have their size and EXIF in these
+constexpr int kMaxFocal35mm = 10000;       // mm; no lens has more
 
 int focal_35mm(ByteSpan file) {
   const std::unique_ptr<ExifData, void (*)(ExifData*)> exif(

@@ -1,4 +1,4 @@
-// Which camera took a picture, as far as its file says: photographs of several cameras lie in one folder.
+// Determines which camera took a picture, as far as its file says. A folder may have photographs of several cameras.
 #pragma once
 
 #include <compare>
@@ -10,29 +10,29 @@
 
 namespace relmap::capture {
 
-// Pictures of one size and one focal length are one camera's.
+// Pictures of the same size and focal length are taken to be of the same camera.
 struct PictureCamera {
-  int width = 0, height = 0;  // pixels, as the file has them
-  // Millimetres before a sensor of 36 mm width, to the nearest whole: EXIF's FocalLengthIn35mmFilm. 0: not said.
+  int width = 0, height = 0;  // pixels in the file
+  // EXIF's FocalLengthIn35mmFilm: the focal length in whole millimetres for a sensor 36 mm wide. 0 if not known.
   int focal_35mm = 0;
 
   auto operator<=>(const PictureCamera&) const = default;
-  // "4000x3000-26mm", or "640x480" where the focal length is not said.
+  // "4000x3000-26mm", or "640x480" if the focal length is not known.
   std::string name() const;
-  // Pixels of the picture; 0: not said.
+  // In pixels; 0 if not known.
   double focal_length() const;
 };
 
-// NO_SUCH_FILE, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE: as read_picture_size(). EXIF that is damaged says
-// nothing.
+// The reasons of read_picture_size(): NO_SUCH_FILE, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE. Damaged EXIF is
+// ignored.
 Result<PictureCamera> read_picture_camera(const std::filesystem::path& path);
 
 struct PicturesOfCamera {
   PictureCamera camera;
   std::vector<std::filesystem::path> pictures;
 };
-// The cameras of these pictures, that with most pictures first; a picture that cannot be read is that one's, so that it
-// is named where it is taken in. Not empty unless `pictures` is.
+// Groups pictures by camera, the one with the most pictures first. Pictures that cannot be read go to that camera, so
+// that its source reports them. Empty only if `pictures` is.
 std::vector<PicturesOfCamera> by_camera(const std::vector<std::filesystem::path>& pictures);
 
 }  // namespace relmap::capture

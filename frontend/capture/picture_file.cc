@@ -24,13 +24,13 @@ bool is_small_pgm(ByteSpan file) { return file.size() <= vision::kMaxPictureByte
 
 }  // namespace
 
-// One byte more than a picture may have is enough to refuse it.
-Result<Bytes> read_picture_bytes(const fs::path& path, std::size_t most) {
+// One byte more than the limit is enough to refuse a picture.
+Result<Bytes> read_picture_bytes(const fs::path& path, std::size_t max_bytes) {
   std::error_code error;
   const auto size = fs::file_size(path, error);
   std::ifstream in(path, std::ios::binary);
   if (error || !in) return {Reason::NO_SUCH_FILE, path.string() + " cannot be opened"};
-  Bytes bytes(std::min<std::size_t>(size, most));
+  Bytes bytes(std::min<std::size_t>(size, max_bytes));
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (in.bad()) return {Reason::IO_ERROR, path.string() + " cannot be read"};
   bytes.resize(static_cast<std::size_t>(in.gcount()));

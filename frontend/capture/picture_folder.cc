@@ -20,7 +20,7 @@ namespace {
 
 std::optional<std::int64_t> time_from_name(const fs::path& path) { return time_from_stamp(path.stem().string()); }
 
-// Of a name that counts, 000017.png.
+// The number in a name such as 000017.png.
 std::optional<std::size_t> number_of(const fs::path& path) {
   const std::string stem = path.stem().string();
   std::size_t number = 0;
@@ -41,11 +41,11 @@ Result<std::vector<std::int64_t>> read_times(const fs::path& file) {
   return times;
 }
 
-// Whether as much time passes for each number where numbers are left out as elsewhere, if pair i has the time lines[i].
+// Whether, with lines[i] as the time of pair i, the time per number is the same across left-out numbers as elsewhere.
 bool is_even_over_gaps(const std::vector<std::size_t>& numbers, const std::vector<std::size_t>& lines,
                        const std::vector<std::int64_t>& times) {
   constexpr double kEven = 0.25;
-  std::vector<double> steps, gaps;  // microseconds a number
+  std::vector<double> steps, gaps;  // microseconds per number
   for (std::size_t i = 1; i < numbers.size(); ++i) {
     const std::size_t passed = numbers[i] - numbers[i - 1];
     const double step = static_cast<double>(times[lines[i]] - times[lines[i - 1]]) / static_cast<double>(passed);
@@ -57,9 +57,9 @@ bool is_even_over_gaps(const std::vector<std::size_t>& numbers, const std::vecto
   return std::all_of(gaps.begin(), gaps.end(), [&](double gap) { return std::abs(gap - usual) <= kEven * usual; });
 }
 
-// The line of each pair. Numbers stand for lines where the file was written for all frames: one of which neither eye
-// was kept leaves a gap in the numbers, but not in the file. It may have been written for those that were kept, and
-// then more of them were lost: time passes with the numbers only if the lines are taken in order.
+// The line of each pair. If the file was written for all frames, numbers select lines: a frame of which neither eye was
+// kept leaves a gap in the numbers, but not in the file. If the file was written only for frames that were kept, time
+// passes with the numbers only if lines are taken in order.
 std::vector<std::size_t> lines_of(const std::vector<PicturePair>& pairs, const std::vector<std::int64_t>& times) {
   std::vector<std::size_t> in_order(pairs.size()), by_number;
   std::iota(in_order.begin(), in_order.end(), std::size_t{0});
@@ -99,7 +99,7 @@ std::string first_of(const std::vector<std::string>& names) {
   return names.size() > kNamed ? text + " and " + count_text(names.size() - kNamed) + " more" : text;
 }
 
-// "; there are pictures in its folder images", where one holds pictures: it may be what is meant.
+// "; there are pictures in its folder images" if a subfolder has pictures, since the user may have meant that one.
 std::string folders_with_pictures(const fs::path& folder) {
   std::vector<std::string> names;
   std::error_code error;

@@ -1,4 +1,4 @@
-// Finding pairs of pictures in folders, and their times. No pixels here.
+// Finds pairs of pictures in folders, and their times, without reading the pictures.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 namespace relmap::capture {
 
 struct PicturePair {
-  std::filesystem::path left, right;  // right: empty where there is one eye
+  std::filesystem::path left, right;  // right is empty if there is one eye
   std::int64_t time_us = 0;
 };
 
-// Pictures (by their endings) of the folder, by name. NO_SUCH_FILE: no folder, or none in it; UNSUPPORTED: only such as
-// are not read (.tiff, .bmp, .heic and the like).
+// Lists the pictures of a folder (by their endings), sorted by name. NO_SUCH_FILE if there is no folder, or no picture
+// in it; UNSUPPORTED if it has only pictures of other formats (.tiff, .bmp, .heic and the like).
 Result<std::vector<std::filesystem::path>> list_pictures(const std::filesystem::path& folder);
 
-// What lies beside the pictures of a folder and is read by nobody, by name: folders, and files of other formats. What
-// is hidden (.name) does not count, nor do calibrations and times.
+// Names of what a folder has besides pictures and is not read: folders, and files of other formats. Hidden ones
+// (.name), calibrations and times do not count.
 struct PassedOver {
   std::vector<std::string> folders, files;
 
@@ -30,18 +30,19 @@ struct PassedOver {
 };
 PassedOver passed_over(const std::filesystem::path& folder);
 
-// Pairs of the same names, also where one of the two is missing (whoever reads it will say so); where no name is on
-// both sides, as many on each side in order. `right` empty: the pictures of one eye. NO_SUCH_FILE: no name in common
-// and not as many.
+// Pairs pictures of the same names, even if one of the two is missing (reading it will report that). If no name occurs
+// on both sides, pairs as many pictures on each side in order. An empty `right` gives the pictures of one eye.
+// NO_SUCH_FILE if there is no common name and the numbers differ.
 Result<std::vector<PicturePair>> pair_up(const std::filesystem::path& left, const std::filesystem::path& right);
 
-// Sets the times: from `times_file` (seconds, one a line) if it exists, else from names if `times_from_names` and all
-// are stamps, else from the rate. Names that count (000017.png) stand for lines of the file, if it has a line for each
-// number since the first, unless time passes evenly with the numbers only where lines are taken in order (the file
-// leaves out what the numbers leave out). BAD_SIZE: fewer lines than pairs; CORRUPT: not a number.
+// Sets the times of pairs: from `times_file` (seconds, one a line) if it exists, otherwise from the names if
+// `times_from_names` and all names are time stamps, otherwise from the rate. If names are numbers (000017.png) and the
+// file has a line for each number from the first on, the number selects the line; but if time then passes unevenly, and
+// evenly when lines are taken in order, the file leaves out the same frames as the numbers, and lines are taken in
+// order. BAD_SIZE if there are fewer lines than pairs; CORRUPT if a line is no number.
 struct TimesTaken {
-  double rate_hz = 0;               // if that was taken, else 0
-  std::vector<std::string> unseen;  // times of the file that are no pair's: "times.txt, line 12"
+  double rate_hz = 0;               // the rate, if times come from it; otherwise 0
+  std::vector<std::string> unseen;  // times of the file that belong to no pair: "times.txt, line 12"
 };
 Result<TimesTaken> set_times(std::vector<PicturePair>& pairs, const std::filesystem::path& times_file,
                              bool times_from_names, double rate_hz);

@@ -57,7 +57,7 @@ Result<std::vector<TimedPicture>> list_timed_pictures(const fs::path& folder) {
     if (!time) return {Reason::CORRUPT, file.string() + ": its name is no time in nanoseconds"};
     pictures.push_back({file, *time});
   }
-  // Names of fewer digits than others are not in order.
+  // Names with different numbers of digits do not sort by time.
   std::sort(pictures.begin(), pictures.end(),
             [](const TimedPicture& a, const TimedPicture& b) { return a.time_us < b.time_us; });
   for (std::size_t i = 1; i < pictures.size(); ++i)

@@ -1,4 +1,5 @@
-// Pictures whose times stand in a list (EuRoC's data.csv, TUM's rgb.txt) or in their names, and pairs by time.
+// Reads the times of pictures from a list (EuRoC's data.csv, TUM's rgb.txt) or from their names, and pairs them by
+// time.
 #pragma once
 
 #include <cstdint>
@@ -19,29 +20,30 @@ struct TimedPicture {
 
 enum class TimeUnit { kSeconds, kNanoseconds };
 
-// Lines of a time stamp and a file name relative to `folder`, between them white space or a comma; # begins a comment.
-// Stamps of 13, 16 or 19 digits are what they are in names (capture_time.h), all others in `unit`. The message says
-// which line. CORRUPT; TIME_BACKWARDS: not later than the line before; BAD_SIZE: no picture at all.
+// Parses lines of a time stamp and a file name relative to `folder`, separated by white space or a comma; # begins a
+// comment. The unit of stamps with 13, 16 or 19 digits is as in names (capture_time.h); others are in `unit`. CORRUPT;
+// TIME_BACKWARDS if a line is not later than the one before; BAD_SIZE if there is no picture. The message has the line.
 Result<std::vector<TimedPicture>> parse_picture_list(std::string_view text, TimeUnit unit,
                                                      const std::filesystem::path& folder);
 
-// The same of a file; the message names it. NO_SUCH_FILE, and as above.
+// The same for a file, which the message names. NO_SUCH_FILE, and the reasons above.
 Result<std::vector<TimedPicture>> read_picture_list(const std::filesystem::path& file, TimeUnit unit,
                                                     const std::filesystem::path& folder);
 
-// Pictures of a folder whose names are nanoseconds. list_pictures()'s reasons; CORRUPT: another name; TIME_BACKWARDS.
+// Lists pictures of a folder whose names are nanoseconds. The reasons of list_pictures(); CORRUPT if a name is no time;
+// TIME_BACKWARDS.
 Result<std::vector<TimedPicture>> list_timed_pictures(const std::filesystem::path& folder);
 
 inline constexpr std::int64_t kSameMomentUs = 1000;
 
-// Pairs of pictures at most kSameMomentUs apart, at the left one's time; the others are passed over.
+// Pairs pictures that are at most kSameMomentUs apart; a pair has the time of its left picture.
 struct TimedPairs {
   std::vector<PicturePair> pairs;
-  std::vector<std::filesystem::path> alone;
+  std::vector<std::filesystem::path> alone;  // pictures without a counterpart
 };
 TimedPairs pair_by_time(const std::vector<TimedPicture>& left, const std::vector<TimedPicture>& right);
 
-// Of one eye.
+// The pictures of one eye, without right ones.
 TimedPairs one_eyed(const std::vector<TimedPicture>& pictures);
 
 }  // namespace relmap::capture

@@ -19,7 +19,7 @@ constexpr std::string_view kMagic = "RELMAPRI";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kBlock = std::size_t{256} << 10;
 
-// Of a record that ends before the log does.
+// The head of a record that ends before the log does.
 std::optional<Head> whole(std::optional<Head> head, std::uint64_t offset, std::uint64_t size) {
   if (head && head->bytes > size - offset - kHeadBytes) head.reset();
   return head;
@@ -32,7 +32,7 @@ Result<std::optional<Head>> head_at(const LogFile& log, std::uint64_t offset, st
   return whole(raw_log::decode_head(bytes), offset, size);
 }
 
-// The first whole record that begins at `offset` or behind; `size` if there is none.
+// The first whole record that begins at `offset` or after it; `size` if there is none.
 Result<std::uint64_t> find_record(const LogFile& log, std::uint64_t offset, std::uint64_t size) {
   Bytes block;
   while (offset < size && size - offset >= kHeadBytes) {
@@ -47,7 +47,7 @@ Result<std::uint64_t> find_record(const LogFile& log, std::uint64_t offset, std:
   return size;
 }
 
-// Whether the log has what the index says: at its first record, which tells one log from another, and at its last.
+// Whether the index belongs to the log: compares its first record, which differs between logs, and its last.
 Result<bool> holds(const RawLogIndex& index, const LogFile& log, std::uint64_t size) {
   const auto is_record = [](const RawLogEntry& entry) { return entry.kind != RawLogEntry::kDamage; };
   const auto first = std::find_if(index.begin(), index.end(), is_record);
@@ -61,7 +61,7 @@ Result<bool> holds(const RawLogIndex& index, const LogFile& log, std::uint64_t s
   return true;
 }
 
-// What is longer than the log is none of its.
+// An index that is longer than the log does not belong to it.
 RawLogIndex read_index(const std::string& path, std::uint64_t log_size) {
   const auto file = LogFile::open(path);
   if (!file.ok()) return {};

@@ -29,7 +29,7 @@ std::string what_is(const RawLogEntry& entry) {
   return "a record";
 }
 
-// Into `record`, head and body; what it gives is the head. IO_ERROR, CORRUPT.
+// Reads head and body into `record`, and returns the head. IO_ERROR, CORRUPT.
 Result<Head> read_record(const LogFile& log, const RawLogEntry& entry, Bytes& record) {
   record.resize(kHeadBytes + entry.bytes);
   if (Status status = log.read(entry.offset, record); !status.ok()) return status;
@@ -40,7 +40,7 @@ Result<Head> read_record(const LogFile& log, const RawLogEntry& entry, Bytes& re
   return *head;
 }
 
-// The first that is sound; what is wrong with the first, if none is.
+// Returns the first undamaged header, or the error of the first one if both are damaged.
 Result<RawLogHeader> read_header(const LogFile& log, const RawLogIndex& index) {
   Status wrong(Reason::CORRUPT, "its header is damaged");
   for (const RawLogEntry& entry : index) {

@@ -1,4 +1,4 @@
-// Reads a raw log (raw_log.h), whatever has become of it.
+// Reads a raw log (raw_log.h), also a damaged one.
 #pragma once
 
 #include <cstdint>
@@ -13,36 +13,37 @@
 
 namespace relmap::capture {
 
-// Not thread-safe. It sees the log as long as it was when it was opened.
+// Sees what was in the log when it was opened. Not thread-safe.
 class RawLogReader {
  public:
-  // NO_SUCH_FILE, IO_ERROR; CORRUPT: no raw log, or both its headers are damaged; BAD_SIZE: of frames that nobody
-  // sends; UNKNOWN_FORMAT_VERSION.
+  // NO_SUCH_FILE, IO_ERROR; CORRUPT if it is no raw log or both its headers are damaged; BAD_SIZE if its header states
+  // an impossible frame size; UNKNOWN_FORMAT_VERSION.
   static Result<RawLogReader> open(const std::string& path);
 
   const std::string& path() const { return log_.path(); }
   const RawLogHeader& header() const { return header_; }
   const RawLogIndex& index() const { return index_; }
   std::size_t frames() const { return frames_.size(); }
-  // Of the n-th frame, by its head.
+  // The time of the n-th frame, from its head.
   std::int64_t time_us(std::size_t frame) const { return index_[frames_[frame]].time_us; }
-  // At the end, behind the last whole record: what was being written when its process or machine died.
+  // Bytes after the last whole record, of a record that was being written when the process or machine died.
   std::uint64_t torn_bytes() const { return torn_bytes_; }
 
   struct Frame {
     RawLogFrame frame;
-    std::size_t number = 0;  // among those of the log
-    ByteSpan raw;            // good until the next call
+    std::size_t number = 0;  // among the frames of the log
+    ByteSpan raw;            // valid until the next call
   };
   using Record = std::variant<Frame, RawLogEvent>;
 
-  // The next; nothing at the end. IO_ERROR; CORRUPT: a record is damaged, or a stretch in which no record can be found;
-  // the message says at which byte, and the call after it gives what comes after it.
+  // Returns the next record; nothing at the end. IO_ERROR; CORRUPT if a record is damaged or no record can be found in
+  // a stretch. The message has the byte, and the next call continues after it.
   Result<std::optional<Record>> next();
 
-  // What comes next is the n-th frame, or the end; or, of those that come, the first one that is not earlier.
+  // Makes the n-th frame the next record, or the end if there are fewer.
   void seek(std::size_t frame);
   void rewind() { position_ = 0; }
+  // Skips to the first of the following frames that is not earlier than that.
   void skip_before(std::int64_t time_us);
 
  private:
@@ -52,7 +53,7 @@ class RawLogReader {
   LogFile log_;
   RawLogHeader header_;
   RawLogIndex index_;
-  std::vector<std::size_t> frames_;  // where in the index
+  std::vector<std::size_t> frames_;  // their positions in the index
   std::uint64_t torn_bytes_ = 0;
   std::size_t position_ = 0;  // in the index
   Bytes record_;

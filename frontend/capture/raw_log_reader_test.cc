@@ -85,7 +85,7 @@ TEST_F(RawLog, IsKnownByItsFirstBytes) {
   EXPECT_EQ(open_as(later).reason(), Reason::UNKNOWN_FORMAT_VERSION);
 }
 
-TEST_F(RawLog, IsSoughtByNumberAndTime) {
+TEST_F(RawLog, SeeksByNumberAndTime) {
   auto log = RawLogReader::open(path_);
   ASSERT_TRUE(log.ok());
   const auto next_frame = [&] { return std::get<RawLogReader::Frame>(**log->next()).frame.index; };
@@ -107,7 +107,7 @@ TEST_F(RawLog, IsSoughtByNumberAndTime) {
   EXPECT_FALSE(*log->next());
 }
 
-TEST_F(RawLog, CutAnywhereGivesAllThatIsWholeBefore) {
+TEST_F(RawLog, TruncatedAnywhereReturnsAllCompleteRecords) {
   for (const bool with_index : {false, true})
     for (std::size_t size = 0; size < bytes_.size(); size += with_index ? 5 : 1) {
       SCOPED_TRACE("cut at " + std::to_string(size));
@@ -130,7 +130,7 @@ TEST_F(RawLog, CutAnywhereGivesAllThatIsWholeBefore) {
     }
 }
 
-TEST_F(RawLog, FlippedAnywhereLosesOneRecordAtMostAndSaysWhich) {
+TEST_F(RawLog, AFlippedByteLosesAtMostOneRecordAndIsReported) {
   for (const bool with_index : {false, true})
     for (std::size_t at = raw_log::kBeginBytes; at < bytes_.size(); at += with_index ? 5 : 1) {
       SCOPED_TRACE("byte " + std::to_string(at));
@@ -156,7 +156,7 @@ TEST_F(RawLog, FlippedAnywhereLosesOneRecordAtMostAndSaysWhich) {
     }
 }
 
-TEST_F(RawLog, GoesOnBehindAStretchThatIsGone) {
+TEST_F(RawLog, ContinuesAfterADamagedStretch) {
   Bytes damaged = bytes_;
   const std::size_t from = entries_[3].offset + 10, to = entries_[5].offset + 3;  // two frames, and a head's sync word
   std::fill(damaged.begin() + static_cast<std::ptrdiff_t>(from), damaged.begin() + static_cast<std::ptrdiff_t>(to), 0);
@@ -246,7 +246,7 @@ TEST_F(RawLog, IndexThatIsDamagedCutOrOfAnotherLogIsMadeAgain) {
   expect_mended(Bytes(1 << 20, 7));
 }
 
-TEST_F(RawLog, IndexIsGoneOnWithWhereTheLogHasGrown) {
+TEST_F(RawLog, IndexIsExtendedWhenTheLogHasGrown) {
   const auto half = static_cast<std::size_t>(entries_[5].end());
   ASSERT_TRUE(open_as(ByteSpan(bytes_).first(half)).ok());
   const Bytes index_of_half = read_bytes(index_path_);
@@ -257,7 +257,7 @@ TEST_F(RawLog, IndexIsGoneOnWithWhereTheLogHasGrown) {
   EXPECT_EQ(read_bytes(index_path_), index_);
 }
 
-TEST_F(RawLog, NeedsNoPlaceForAnIndex) {
+TEST_F(RawLog, WorksWithoutAWritableIndex) {
   std::filesystem::remove(index_path_);
   std::filesystem::create_directories(index_path_ + "/not empty");
   auto log = RawLogReader::open(path_);

@@ -23,7 +23,7 @@ std::string camera_text(const RawLogHeader& header) {
   return text;
 }
 
-// What is not as one would expect, for describe().
+// Anything unusual about the log, for describe().
 std::string troubles_of(const RawLogReader& log) {
   std::uint64_t faults = 0, lost = 0, damages = 0, first_damage = 0;
   for (const RawLogEntry& entry : log.index()) {
@@ -42,8 +42,8 @@ std::string troubles_of(const RawLogReader& log) {
   return text;
 }
 
-// Frames that the camera sent and that are not in the log: by their numbers, of which gaps tell, or by what the faults
-// say. A camera that was begun anew counts from the beginning.
+// The number of frames that the camera sent and the log lacks, from gaps in their numbers or from the faults. A camera
+// that was restarted counts from the beginning.
 std::uint64_t lost_frames(const RawLogReader& log) {
   std::uint64_t told = 0, gaps = 0;
   std::optional<std::uint64_t> last;
@@ -134,7 +134,7 @@ class RawLogSource : public StereoSource {
   std::uint64_t lost_;  // frames
 };
 
-// Of the first frame that can be read; the log is at its beginning again.
+// Made from the first frame that can be read. Rewinds the log.
 Result<std::string> fingerprint_of(RawLogReader& log) {
   Status first(Reason::NO_SUCH_FILE, log.path() + " holds no frame");
   for (std::size_t i = 0; i < log.frames(); ++i) {

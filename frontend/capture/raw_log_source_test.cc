@@ -65,7 +65,7 @@ TEST_F(RawLogSource, ReplaysWhatTheCameraSent) {
   EXPECT_FALSE(*source.next());
 }
 
-TEST_F(RawLogSource, IsGoneOnWith) {
+TEST_F(RawLogSource, SkipsToWhereARunContinues) {
   const auto opened = open_raw_log(write(raw_header()));
   ASSERT_TRUE(opened.ok());
   (*opened)->skip_before(raw_frame(4).time_us);

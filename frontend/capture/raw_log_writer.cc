@@ -13,7 +13,7 @@ using raw_log::Kind;
 
 namespace {
 
-constexpr std::size_t kRoomForWord = 512;  // bytes kept free to say what was dropped
+constexpr std::size_t kRoomForEvent = 512;  // bytes kept free for the event that states what was dropped
 
 std::string plural(std::uint64_t count, const std::string& of) {
   return std::to_string(count) + ' ' + of + (count == 1 ? "" : "s");
@@ -49,7 +49,7 @@ Status RawLogWriter::begin(const RawLogHeader& header) {
   return status;
 }
 
-// The header stands twice: a log without one says nothing.
+// The header is written twice, since a log without one is useless.
 Status RawLogWriter::write_beginning(const RawLogHeader& header) {
   const Bytes magic = raw_log::encode_begin();
   if (Status status = file_.append(magic); !status.ok()) return status;
@@ -94,7 +94,7 @@ Status RawLogWriter::add(const Head& head, ByteSpan body) {
     counts_.dropped_frames += head.kind == Kind::kFrame;
     return failure_;
   }
-  if (counts_.waiting + sizeof(Item) + body.size() + kRoomForWord > options_.max_waiting) {
+  if (counts_.waiting + sizeof(Item) + body.size() + kRoomForEvent > options_.max_waiting) {
     count_dropped(head);
     return {Reason::DROPPED_BY_ROBOT, file_.path() + ": " + std::to_string(counts_.waiting) +
                                           " bytes wait for the disk; there is no memory for more"};
@@ -115,7 +115,7 @@ void RawLogWriter::count_dropped(const Head& head) {
   }
 }
 
-// Before anything that came later.
+// The event must come before anything that was added later.
 void RawLogWriter::tell_of_dropped() {
   if (dropped_frames_ + dropped_events_ == 0) return;
   std::string message = plural(dropped_frames_, "frame") + " dropped";
@@ -136,7 +136,7 @@ void RawLogWriter::run() {
   auto synced = std::chrono::steady_clock::now();
   bool unsynced = false;
   std::unique_lock lock(mutex_);
-  // Without the lock; a failure is the last thing that is tried.
+  // Runs without the lock. Nothing is tried after a failure.
   const auto unlocked = [&](auto work) {
     lock.unlock();
     const Status status = work();

@@ -1,4 +1,4 @@
-// Writes a raw log (raw_log.h) beside the thread that captures, which never waits for the disk.
+// Writes a raw log (raw_log.h) on a thread of its own, so that the capturing thread never waits for the disk.
 #pragma once
 
 #include <chrono>
@@ -17,34 +17,34 @@
 namespace relmap::capture {
 
 struct RawLogOptions {
-  std::size_t max_waiting = std::size_t{64} << 20;  // bytes of memory for what waits for the disk
-  std::chrono::milliseconds sync_every{1000};       // at most so much is lost with the machine
+  std::size_t max_waiting = std::size_t{64} << 20;  // maximum bytes of memory that wait for the disk
+  std::chrono::milliseconds sync_every{1000};       // at most this much is lost if the machine crashes
 };
 
 struct RawLogCounts {
   std::uint64_t frames = 0, events = 0;  // written
   std::uint64_t bytes = 0;               // of the file
-  std::uint64_t dropped_frames = 0;      // there was no memory left, or the disk had failed
-  std::size_t waiting = 0;               // bytes of memory now
+  std::uint64_t dropped_frames = 0;      // because the memory was full, or the disk had failed
+  std::size_t waiting = 0;               // bytes that wait for the disk now
 };
 
-// Thread-safe. What was written survives the death of its process, and but for the last second that of the machine.
+// What was written survives a crash of the process and, except for the last second, of the machine. Thread-safe.
 class RawLogWriter {
  public:
-  // Begins a log. INVALID_ARGUMENT: something of that name is there, and is not written over; BAD_SIZE: a layout of no
-  // size, or of frames larger than kMaxFrameBytes; IMPLAUSIBLE_CALIBRATION; IO_ERROR, DISK_FULL.
+  // Begins a log. INVALID_ARGUMENT if a file of that name exists, which is not overwritten; BAD_SIZE if the layout has
+  // no size, or its frames are larger than kMaxFrameBytes; IMPLAUSIBLE_CALIBRATION; IO_ERROR, DISK_FULL.
   static Result<std::unique_ptr<RawLogWriter>> open(const std::string& path, RawLogHeader header,
                                                     const RawLogOptions& options = {});
-  ~RawLogWriter();  // as close()
+  ~RawLogWriter();  // like close()
 
-  // Both copy what they are given, and return at once. DROPPED_BY_ROBOT: too much waits for the disk; the log will say
-  // how many frames and events were dropped, in an event of that reason. IO_ERROR, DISK_FULL: the disk has failed, and
-  // nothing is written any more; the log is whole up to there. WRONG_STATE: closed. BAD_SIZE, of frames: other sizes
-  // than the layout's with up to kMaxFrameBytes in all. INVALID_ARGUMENT, of events: a reason that is none.
+  // Both copy their arguments and do not block. DROPPED_BY_ROBOT if too much waits for the disk; an event of that
+  // reason in the log will state how many frames and events were dropped. IO_ERROR or DISK_FULL if the disk has failed;
+  // nothing more is written then, and the log is intact up to there. WRONG_STATE after close(). BAD_SIZE if a frame is
+  // smaller than the layout or larger than kMaxFrameBytes. INVALID_ARGUMENT if an event has no valid reason.
   Status add_frame(const RawLogFrame& frame, ByteSpan raw);
   Status add_event(const RawLogEvent& event);
 
-  // Returns when all is on disk. IO_ERROR, DISK_FULL, whenever it was.
+  // Returns when everything is on disk. IO_ERROR, DISK_FULL if any write failed.
   Status close();
 
   RawLogCounts counts() const;
@@ -68,16 +68,16 @@ class RawLogWriter {
   void fail(const Status& status);
 
   const RawLogOptions options_;
-  const std::size_t frame_bytes_;  // of a frame at least
+  const std::size_t frame_bytes_;  // minimum size of a frame
   LogFile file_;
-  RawLogIndexWriter index_;  // these two are the thread's, once it runs
+  RawLogIndexWriter index_;  // file_ and index_ belong to the thread once it runs
 
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // guards the members below
   std::condition_variable changed_;
   std::deque<Item> queue_;
   RawLogCounts counts_;
-  std::uint64_t dropped_frames_ = 0, dropped_events_ = 0;  // that the log has not been told of
-  std::int64_t dropped_us_ = 0;                            // the first of them
+  std::uint64_t dropped_frames_ = 0, dropped_events_ = 0;  // that no event in the log states yet
+  std::int64_t dropped_us_ = 0;                            // time of the first of them
   Status failure_;
   bool closing_ = false;
   std::thread thread_;

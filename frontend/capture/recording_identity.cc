@@ -17,9 +17,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Calibrations of inertial units, which may be corrected without getting longer; their measurements are larger.
+// Files up to this size are read: calibrations of inertial units may be corrected without changing their size.
 constexpr std::uintmax_t kReadWhole = 64 * 1024;
-// Of a keyframe: the session, sequence, time and pose, and some of the tracks.
+// Bytes of a keyframe that are read: session, sequence, time, pose and some of the tracks.
 constexpr std::size_t kKeyframeBeginning = 1024;
 
 void add_file(ContentsChecksum& checksum, const fs::path& file) {
@@ -98,7 +98,7 @@ Result<KeyframeFileIdentity> identity_of_keyframes(const std::string& path) {
   std::uint64_t count = 0;
   for (;; ++count) {
     const auto beginning = file->skip(kKeyframeBeginning);
-    if (!beginning.ok() || !*beginning) break;  // what is not whole is named by whoever reads it
+    if (!beginning.ok() || !*beginning) break;  // reading the keyframes will report it
     checksum.add(static_cast<std::int64_t>(file->position()));
     checksum.add(**beginning);
   }

@@ -1,4 +1,4 @@
-// What tells a recording from others, and from itself before it was changed.
+// Identifies a recording, and detects that it was changed.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +10,29 @@
 
 namespace relmap::capture {
 
-// The same for a copy elsewhere: neither where the files lie nor when they were written is in it. No picture is read
-// but the first.
+// It is the same for a copy elsewhere, since it contains neither paths nor times of files. Only the first picture is
+// read.
 struct RecordingIdentity {
-  std::string fingerprint;     // StereoSource::fingerprint(): of its beginning, so that it outlasts what is added later
-  std::uint64_t count = 0;     // pairs, of one eye pictures, or keyframes
-  std::uint32_t contents = 0;  // StereoSource::contents(), and what an inertial unit said meanwhile
-  std::string calibration;     // a line that no other calibration has; empty: keyframes, which hold their camera
+  std::string fingerprint;     // StereoSource::fingerprint(), of the beginning; appending to the recording keeps it
+  std::uint64_t count = 0;     // number of pairs, of pictures (one eye), or of keyframes
+  std::uint32_t contents = 0;  // StereoSource::contents() and the recording of the inertial unit
+  std::string calibration;  // one line that differs between calibrations; empty for keyframes, which have their camera
 
   bool operator==(const RecordingIdentity&) const = default;
 };
 
 RecordingIdentity identity_of(const StereoSource& source);
 
-// Of a file of keyframes: what is whole of it. Reads the first of them, and of the others their beginnings.
+// The identity of a file of keyframes, up to where it is intact. Reads the first keyframe, and the beginnings of the
+// others.
 struct KeyframeFileIdentity {
   RecordingIdentity recording;
   SessionHeader session;  // of the first keyframe
 };
-// NO_SUCH_FILE; BAD_SIZE: no keyframe in it; those of KeyframeFileReader::next() for the first.
+// NO_SUCH_FILE; BAD_SIZE if the file has no keyframe; the reasons of KeyframeFileReader::next() for the first one.
 Result<KeyframeFileIdentity> identity_of_keyframes(const std::string& path);
 
-// The fingerprint of the keyframes of a session, whatever holds them.
+// The fingerprint of a session's keyframes, independent of where they are stored.
 std::string fingerprint_of_keyframes(const SessionHeader& session);
 
 }  // namespace relmap::capture

@@ -11,7 +11,7 @@ namespace relmap::capture {
 
 namespace {
 
-// What is done to a row of words; `first` and `second` are the eyes by their bytes.
+// Operations on a row of words; `first` and `second` are the eyes in the order of their bytes.
 struct PlainRows {
   static void split(const std::uint8_t* words, int width, std::uint8_t* first, std::uint8_t* second) {
     for (int x = 0; x < width; ++x) {

@@ -1,4 +1,4 @@
-// Where stereo pairs come from.
+// Sources of stereo pairs.
 #pragma once
 
 #include <chrono>
@@ -19,116 +19,122 @@
 namespace relmap::capture {
 
 struct StereoFrame {
-  vision::Image left, right;  // grey, 8 bit, as decoded; right is empty where the source has one eye
+  vision::Image left, right;  // grey, 8 bit, not rectified; right is empty if the source has one eye
   std::int64_t time_us = 0;   // UTC
-  Status eye_missing = {};    // why one of the two is empty though the source has both
-  std::uint64_t index = 0;    // among all pairs of the source, wherever reading began
-  std::string picture = {};   // the left one's file name
-  std::optional<std::chrono::steady_clock::time_point> arrived = {};  // of a camera: when its last byte had come
+  Status eye_missing = {};    // why one of the two is empty although the source has both
+  std::uint64_t index = 0;    // among all pairs of the source, also if reading did not start at the first
+  std::string picture = {};   // file name of the left picture
+  std::optional<std::chrono::steady_clock::time_point> arrived = {};  // live cameras: when the last byte had arrived
 };
 
-// Pictures of pairs, and whole pairs, that a recording tells of and does not have.
+// Pictures and whole pairs that a recording should have and lacks.
 struct MissingPictures {
   static constexpr std::size_t kNamed = 3;
   std::uint64_t count = 0;
-  std::vector<std::string> first;  // at most kNamed, by their files or by where they should be
+  std::vector<std::string> first;  // at most kNamed of them: their files, or where these should be
 
   void add(const std::string& name) {
     if (count++ < kNamed) first.push_back(name);
   }
 };
 
-// Not thread-safe; its rectifier() is.
+// Not thread-safe, except for its rectifier().
 class StereoSource {
  public:
   virtual ~StereoSource() = default;
 
-  // Of the raw pictures as they were taken; of one camera where the source has one eye.
+  // The calibration of the raw pictures; of a single camera if the source has one eye.
   virtual const StereoCalibration& calibration() const = 0;
   virtual const vision::Rectifier& rectifier() const = 0;
-  // Of the rectified pictures; baseline 0: one eye.
+  // The camera of the rectified pictures; its baseline is 0 if the source has one eye.
   const StereoCamera& camera() const { return rectifier().camera(); }
-  // The same for a session's header: nothing where the pictures come rectified, or a camera is taken for granted.
+  // The calibration for a session's header; nothing if the pictures are rectified already, or the camera is assumed.
   std::optional<StereoCalibration> raw_calibration() const;
-  // What an inertial unit said meanwhile, for read_imu() (imu_file.h); empty: the data set has none.
+  // Path of the inertial recording, for read_imu() (imu_file.h); empty if there is none.
   virtual std::string imu() const = 0;
 
-  // Pairs in all, those given out among them; 0: unknown.
+  // Total number of pairs, with those already returned; 0 if unknown.
   virtual std::size_t count() const = 0;
-  // Pairs that there should be, by all that the recording tells: count(), pictures without their other eye, times
-  // without pictures, frames that were lost. 0: unknown.
+  // Number of pairs that the recording should have: count(), pictures without a counterpart, times without pictures,
+  // and lost frames. 0 if unknown.
   virtual std::size_t expected() const { return count(); }
-  // What is missing of these, as far as it is known without reading them. Of one eye: nothing.
+  // What is missing of these, as far as is known without reading them. Nothing for a source of one eye.
   virtual MissingPictures missing() const { return {}; }
-  // Pictures that belong to no pair, since the other eye has none of that time; describe() names the first.
+  // Number of pictures that belong to no pair, since the other eye has none of that time; describe() names the first.
   virtual std::size_t skipped() const = 0;
-  // Pairs a second that are supposed, since nothing tells their times: speeds and travel times are of that. 0: told.
+  // The rate that was assumed because the recording has no times; speeds and travel times depend on it. 0 if it has
+  // them.
   virtual double supposed_rate_hz() const { return 0; }
-  // "KITTI data set /data/06: 51 pairs of 1226 x 370", and what is not as one would expect.
+  // "KITTI data set /data/06: 51 pairs of 1226 x 370", and anything unusual.
   virtual std::string describe() const = 0;
-  // One line that tells this recording from others of the same camera: of its first pair.
+  // One line that distinguishes this recording from others of the same camera, made from its first pair.
   virtual std::string fingerprint() const = 0;
-  // A checksum of what there is to know of all its pairs without reading them (names, sizes and times of their
-  // pictures), in order: another one where any was added, taken out or exchanged. The same for a copy elsewhere. 0: a
+  // A checksum over what is known of all pairs without reading them (names, sizes and times of their pictures), in
+  // order. It changes if a pair is added, removed or replaced, and is the same for a copy elsewhere. 0 for a live
   // camera.
   virtual std::uint32_t contents() const = 0;
-  // No pair is stamped earlier than the one before it, as far as is known: the clock was not set back.
+  // Whether time stamps never decrease, as far as is known, because the clock was not set back.
   virtual bool stamps_rise() const { return true; }
-  // Pairs stamped earlier than that are passed over unread (an interrupted run goes on).
+  // Skips pairs with an earlier time stamp without reading them, to continue an interrupted run.
   virtual void skip_before(std::int64_t time_us) = 0;
-  // The next pair; nothing at the end. Where only one eye's picture can be had, the pair comes with that one; where
-  // none can, its error (NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE, BAD_SIZE: not of
-  // the calibration's size; the message names the file), and the call after it gives the pair after it.
+  // Returns the next pair; nothing at the end. If only one eye's picture is usable, the pair comes with that one. If
+  // neither is, returns the error, whose message names the file, and the next call continues with the next pair:
+  // NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE, BAD_SIZE (not of the calibration's
+  // size).
   virtual Result<std::optional<StereoFrame>> next() = 0;
 };
 
-// The pictures that the frame has, rectified, for who needs no stage of its own for it. BAD_SIZE, NOT_STEREO.
+// Rectifies the pictures that the frame has. BAD_SIZE, NOT_STEREO.
 Result<StereoFrame> rectify(const vision::Rectifier& rectifier, StereoFrame raw);
 
 struct FolderOptions {
-  std::string calibration;  // a file or folder for load_calibration(); empty: what the data set's folder holds
-  double rate_hz = 10;      // of pairs without times of their own
-  std::string camera = {};  // of mono pictures: which camera's, by its name (picture_camera.h); empty: the only one's
+  std::string calibration;  // a file or folder for load_calibration(); empty for the data set's folder
+  double rate_hz = 10;      // for pairs without times
+  std::string camera =
+      {};  // for mono pictures, the name of their camera (picture_camera.h); empty if there is only one
 };
 
-// What all of the following refuse: NO_SUCH_FILE, UNSUPPORTED (other formats of pictures), NOT_STEREO (pairs with the
-// calibration of one camera), BAD_SIZE, CORRUPT and TIME_BACKWARDS of times, and load_calibration()'s. Pictures:
-// picture_file.h. Where only one eye is there, it is a source of one eye.
+// All of the following functions refuse with: NO_SUCH_FILE, UNSUPPORTED (pictures of other formats), NOT_STEREO (pairs
+// with the calibration of one camera), BAD_SIZE, CORRUPT and TIME_BACKWARDS (times), and the reasons of
+// load_calibration(). For formats of pictures see picture_file.h. If only one eye exists, they return a source of one
+// eye.
 
 // A KITTI sequence: image_0/ and image_1/ (or image_00/data and image_01/data) with pictures of the same names,
-// calib.txt, and times.txt (seconds; one a line) if there is one.
+// calib.txt, and optionally times.txt (seconds, one a line).
 Result<std::unique_ptr<StereoSource>> open_kitti(const std::string& folder, const FolderOptions& options = {});
 
 // A EuRoC sequence, mav0/ or the folder that holds it: cam0/ and cam1/, each with sensor.yaml, data.csv and data/; or
-// without data.csv, with pictures named by nanoseconds in data/ or right there (cam0_sensor.yaml may stand beside).
-// Pictures at most 1 ms apart are a pair.
+// without data.csv, with pictures named by nanoseconds in data/ or directly in cam0/ and cam1/ (cam0_sensor.yaml may be
+// beside them). Pictures at most 1 ms apart are a pair.
 Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& folder, const FolderOptions& options = {});
 
-// A folder of pairs, the first of
+// A folder of pairs. It uses the first of these that exists:
 // - lists of times and file names: left.txt and right.txt, cam0.txt and cam1.txt, or rgb.txt (TUM; its depth is not
-//   read); seconds, or stamps as below; pictures at most 1 ms apart are a pair;
-// - left/ and right/, image_0/ and image_1/, cam0/ and cam1/ (or their data/), or mav0/ with the last: of the same
-//   names, or as many on each side, in the order of their names;
-// - the left one of these alone, or pictures right in the folder.
-// Times of folders: times.txt as above, else names that are stamps (19 digits: nanoseconds, 16: microseconds, 13:
-// milliseconds, UTC), else the rate.
+//   read). Times are seconds, or stamps as below; pictures at most 1 ms apart are a pair;
+// - left/ and right/, image_0/ and image_1/, cam0/ and cam1/ (or their data/), or mav0/ with cam0/ and cam1/: pairs
+// have
+//   the same names, or both sides have the same number of pictures, which are paired in the order of their names;
+// - the left one of these alone, or pictures directly in the folder.
+// Times of folders come from times.txt as above, otherwise from names that are time stamps (19 digits for nanoseconds,
+// 16 for microseconds, 13 for milliseconds, UTC), otherwise from the rate.
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& folder, const FolderOptions& options = {});
 
-// Pictures of one camera, for a mono session: what open_images() takes, of two eyes the left one. They are reduced to
-// half a megapixel, as the server reduces the pictures that it is asked about. Without a calibration (none is named,
-// and the folder has none) they are taken as they are, with the focal length that they say themselves, or else 1.2
-// times the longer side, and describe() says so. INVALID_ARGUMENT: they are of several cameras, and none of them is
-// named.
+// Pictures of one camera for a mono session: a folder as for open_images(), of two eyes only the left one. Pictures are
+// reduced to half a megapixel, as the server reduces the pictures of localisation queries. Without a calibration
+// (neither given nor in the folder) they are not rectified, and the focal length comes from their EXIF or is assumed to
+// be 1.2 times the longer side; describe() says so. INVALID_ARGUMENT if they are of several cameras and options.camera
+// names none.
 Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& folder, const FolderOptions& options = {});
 
-// Frames as a camera sent them (raw_log.h), by the log's own calibration where options name none. What the camera or
-// the log lost comes from next() as an error of its own: an event's reason and words, or CORRUPT and IO_ERROR with the
-// byte. NO_SUCH_FILE, too: no frame in it; CORRUPT, UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_CALIBRATION: neither has one.
+// A raw log (raw_log.h). The calibration is that of the options, or otherwise the log's own. What the camera or the log
+// lost comes from next() as an error: an event's reason and message, or CORRUPT and IO_ERROR with the byte.
+// NO_SUCH_FILE, also if the log has no frame; CORRUPT, UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_CALIBRATION if there is no
+// calibration.
 Result<std::unique_ptr<StereoSource>> open_raw_log(const std::string& path, const FolderOptions& options = {});
 
-// By the name of the kind: "kitti", "euroc", "images", "sim" (what relmap-sim pictures wrote), "raw", or "auto": the
-// one that the folder or file looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: keyframes
-// that are ready made (keyframe_file.h), or a file that is nothing known.
+// Opens a source by the name of its kind: "kitti", "euroc", "images", "sim" (written by relmap-sim pictures), "raw", or
+// "auto" for the kind that the folder or file looks like; describe() says which. INVALID_ARGUMENT for another name;
+// UNSUPPORTED for a file of keyframes (keyframe_file.h) or a file of an unknown kind.
 Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
                                                   const FolderOptions& options = {});
 

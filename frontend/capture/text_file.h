@@ -1,4 +1,4 @@
-// Text files of data sets: whole, and line by line.
+// Reads text files of data sets, as a whole and line by line.
 #pragma once
 
 #include <cstddef>
@@ -12,21 +12,21 @@ namespace relmap::capture {
 
 inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 30;
 
-// NO_SUCH_FILE, IO_ERROR; BAD_SIZE: longer than kMaxTextBytes. The message names the file.
+// NO_SUCH_FILE, IO_ERROR; BAD_SIZE if it is longer than kMaxTextBytes. The message names the file.
 Result<std::string> read_text_file(const std::filesystem::path& path);
 
-// Without white space at its ends.
+// The text without white space at its ends.
 std::string_view trimmed(std::string_view text);
 
-// Goes through the lines that say something: trimmed, neither empty nor comments (#). The text must live on.
+// Iterates over the trimmed lines that are neither empty nor comments (#). The text must outlive it.
 class TextLines {
  public:
   explicit TextLines(std::string_view text) : rest_(text) {}
 
-  // False at the end.
+  // Moves to the next line; false at the end.
   bool next();
   std::string_view line() const { return line_; }
-  // "line 12"; the first of the text is 1.
+  // "line 12", counted from 1.
   std::string where() const { return "line " + std::to_string(number_); }
 
  private:

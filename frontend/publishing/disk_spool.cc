@@ -26,8 +26,8 @@ namespace {
 
 constexpr std::uint32_t kSessionMagic = 0x53504c53;  // "SLPS"
 constexpr std::uint32_t kSegmentMagic = 0x47504c53;  // "SLPG"
-constexpr std::uint16_t kSpoolVersion = 1;           // of segments, and of a session without extensions
-constexpr std::uint16_t kSessionVersion = 2;         // of a session whose header's extensions follow
+constexpr std::uint16_t kSpoolVersion = 1;           // of segments, and of a session file without extensions
+constexpr std::uint16_t kSessionVersion = 2;         // of a session file with the extensions of its header
 constexpr std::uint64_t kSegmentBytes = std::uint64_t{4} << 20;
 constexpr std::size_t kSegmentHeader = 6;
 constexpr std::size_t kRecordHeader = 8;  // u32 bytes, u32 crc
@@ -99,7 +99,7 @@ DiskSpool::~DiskSpool() {
 
 Status DiskSpool::load_session(SessionHeader header) {
   const std::string path = folder_ + "/session";
-  if (segments_.empty() || !fs::exists(path)) {  // what never held anything belongs to nobody
+  if (segments_.empty() || !fs::exists(path)) {  // a spool that never held anything belongs to no session
     if (header.uuid.is_nil()) header.uuid = SessionUuid::random();
     session_ = std::move(header);
     return spool_file::replace(folder_, "session", encode_session(session_));
@@ -173,7 +173,8 @@ Status DiskSpool::mark_unrepeatable() {
   return marked;
 }
 
-// The map is forgotten last: until then the rest belongs to it. An empty segment stays, so the folder is the session's.
+// The map is deleted last, since until then what is left belongs to it. An empty segment is left, so that the folder
+// still belongs to the session.
 Status DiskSpool::begin_anew() {
   if (unrepeatable_) {
     session_.uuid = SessionUuid::random();
@@ -250,7 +251,7 @@ std::uint64_t DiskSpool::disk_bytes() const {
   return total;
 }
 
-// A process never appends to what another one wrote: that may end in the middle of a record.
+// A process never appends to a segment of another process, which may end in the middle of a record.
 Status DiskSpool::open_segment() {
   if (file_ >= 0) ::close(file_);
   const std::uint32_t number = segments_.empty() ? 0 : segments_.rbegin()->first + 1;

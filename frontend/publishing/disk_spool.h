@@ -1,9 +1,10 @@
-// A spool on disk. Survives the death of its process and, but for what was being written, that of the machine.
+// A spool on disk. It survives a crash of its process and, except for the record that was being written, of the
+// machine.
 //
-// A folder holds `lock`, `session` (the header, uuid included), `recording` (what it is made of), `map` (the one that
-// the session is in: its uuid and epoch, a line), `unrepeatable` (empty, where it is) and numbered segments, each a row
-// of checksummed records (keyframe, gap). Records are only ever appended; a segment is deleted when nothing in it is
-// wanted any more.
+// Its folder holds `lock`, `session` (the header with the uuid), `recording` (one line that identifies the source),
+// `map` (one line with uuid and epoch of the map that the session is in), `unrepeatable` (an empty file, present if the
+// session is so) and numbered segments. A segment is a sequence of checksummed records (keyframe, gap). Records are
+// only ever appended; a segment is deleted when none of its records is needed any more.
 #pragma once
 
 #include <cstdint>
@@ -18,23 +19,23 @@ namespace relmap::publishing {
 
 class DiskSpool final : public Spool {
  public:
-  // Begins a spool for `header` (a nil uuid becomes a random one), or opens the one in `folder`. `recording`: one line
-  // that tells what the session is made of from anything else it might be; empty: not said. FOLDER_LOCKED, IO_ERROR,
-  // CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session or recording and
-  // ever held anything. Records damaged at the end of a segment are dropped.
+  // Opens the spool in `folder`, or creates one for `header`, in which a nil uuid is replaced by a random one.
+  // `recording` is one line that identifies the source of the session; empty if it is not known. FOLDER_LOCKED,
+  // IO_ERROR, CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session or
+  // recording and ever held anything. Damaged records at the end of a segment are dropped.
   static Result<std::unique_ptr<DiskSpool>> open(const std::string& folder, SessionHeader header,
                                                  const std::string& recording = {});
   ~DiskSpool() override;
 
-  // Forgets the keyframes and the map: the session is begun anew. Under its uuid, so that what a map has of it is not
-  // taken in twice; but where it is unrepeatable under another, since a map that has part of it would get keyframes of
-  // another run behind those that it has. IO_ERROR.
+  // Deletes the keyframes and the map, so that the session starts over. It keeps its uuid, so that a map does not take
+  // the same keyframes twice. An unrepeatable session gets a new uuid, since a map that has a part of it would
+  // otherwise get keyframes of another run behind that part. IO_ERROR.
   Status begin_anew();
 
   std::size_t damaged_bytes() const { return damaged_bytes_; }  // dropped by open()
   std::uint64_t disk_bytes() const;
 
-  // On disk when they return.
+  // Their changes are on disk when they return.
   Status set_map(const MapIdentity& map) override;
   Status mark_unrepeatable() override;
   Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) override;
@@ -66,8 +67,8 @@ class DiskSpool final : public Spool {
   const std::string folder_;
   const int lock_;  // file descriptor
   std::map<std::uint32_t, Segment> segments_;
-  std::map<std::uint32_t, Place> places_;  // of the keyframes
-  int file_ = -1;                          // of the last segment, open for appending
+  std::map<std::uint32_t, Place> places_;  // where each keyframe's payload is, by sequence
+  int file_ = -1;                          // the last segment, open for appending
   std::size_t damaged_bytes_ = 0;
   bool unrepeatable_ = false;
 };

@@ -70,7 +70,7 @@ TEST_F(DiskSpoolTest, KeepsSessionKeyframesAndGaps) {
   EXPECT_EQ(spool->damaged_bytes(), 0u);
 }
 
-TEST_F(DiskSpoolTest, KnowsItsMapAndForgetsItWhereItBeginsAnew) {
+TEST_F(DiskSpoolTest, RemembersItsMapUntilItBeginsAnew) {
   const MapIdentity map{Uuid::random(), 1'764'000'000'000'000};
   SessionUuid uuid;
   {
@@ -174,7 +174,7 @@ TEST_F(DiskSpoolTest, BelongsToOneRecording) {
   EXPECT_TRUE(DiskSpool::open(folder_.string(), header_).ok());
 }
 
-TEST_F(DiskSpoolTest, BelongsToNobodyBeforeItHeldAnything) {
+TEST_F(DiskSpoolTest, BelongsToNoSessionBeforeItHeldAnything) {
   EXPECT_TRUE(DiskSpool::open(folder_.string(), header_, "the first drive").ok());
   SessionHeader other = header_;
   other.camera.f += 1;
@@ -198,7 +198,7 @@ TEST_F(DiskSpoolTest, HalfARecordAtTheEndIsDropped) {
   EXPECT_EQ(segments().size(), 2u);
 }
 
-TEST_F(DiskSpoolTest, DamageIsNotHandedOut) {
+TEST_F(DiskSpoolTest, DamagedKeyframesAreNotReturned) {
   const auto spool = open();
   append(*spool, 0);
   std::fstream file(segments().front(), std::ios::in | std::ios::out | std::ios::binary);
@@ -217,7 +217,7 @@ TEST_F(DiskSpoolTest, DamagedSessionIsNamed) {
   EXPECT_EQ(DiskSpool::open(folder_.string(), header_).reason(), Reason::CORRUPT);
 }
 
-TEST_F(DiskSpoolTest, SegmentsGoWhenAllInThemIsSettled) {
+TEST_F(DiskSpoolTest, SegmentsAreDeletedWhenAllInThemIsSettled) {
   const auto spool = open();
   for (std::uint32_t s = 0; s < 200; ++s) append(*spool, s);
   const std::size_t full = segments().size();

@@ -6,7 +6,7 @@ namespace relmap::publishing {
 
 namespace {
 
-// The daemon's lookups may be some thousand keyframes behind; what is older is not worth its memory.
+// The daemon's lookups may be some thousand keyframes behind; older ones are not worth the memory.
 constexpr std::size_t kMaxPoses = 4096;
 
 }  // namespace
@@ -28,8 +28,9 @@ std::optional<SE3> Localisation::odometry(std::uint32_t sequence) const {
   return it->T_odom_keyframe;
 }
 
-// How many guesses this closes that nothing else does, or leaves open again.
-std::uint64_t Localisation::reach_across(const Ends& ends, bool in_force) {
+// Counts the closure in (or, if it is no longer in force, out) at each unmeasured step that it bridges. Returns the
+// number of steps that are bridged by it alone.
+std::uint64_t Localisation::bridge(const Ends& ends, bool in_force) {
   const auto& [keyframe, frame] = ends;
   std::uint64_t changed = 0;
   for (Guess& guess : guesses_) {
@@ -45,7 +46,7 @@ std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
   const std::lock_guard lock(mutex_);
   ++counts_.heard;
   if (news.kind != PoseNews::Kind::kClosure && news.kind != PoseNews::Kind::kClosureOut) return std::nullopt;
-  if (news.keyframe.session != session_) {  // another map: what the one before said means nothing in it
+  if (news.keyframe.session != session_) {  // another map, to which the closures so far do not apply
     closures_.clear();
     for (Guess& guess : guesses_) guess.closures = 0;
     session_ = news.keyframe.session;
@@ -55,7 +56,7 @@ std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
   if (news.kind == PoseNews::Kind::kClosureOut) {
     if (closures_.erase(ends) == 0) return std::nullopt;
     ++counts_.withdrawn;
-    counts_.recovered_steps -= reach_across(ends, false);
+    counts_.recovered_steps -= bridge(ends, false);
     return std::nullopt;
   }
   const auto [closure, is_new] = closures_.try_emplace(ends);
@@ -64,7 +65,7 @@ std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
     closure->second = news.T_frame_keyframe * T_odom_keyframe->inverse();
   if (closures_.size() > kMaxPoses) closures_.erase(closures_.begin());
   ++counts_.closures;
-  const std::uint64_t steps = reach_across(ends, true);
+  const std::uint64_t steps = bridge(ends, true);
   counts_.recovered_steps += steps;
   if (steps == 0) return std::nullopt;
   return Recovery{news.keyframe, news.frame, news.T_frame_keyframe.t.norm(), steps};

@@ -1,6 +1,6 @@
-// Where the robot is in the map, by what the daemon says of its keyframes: a closure ties one of them to an older
-// frame, and the odometry since then does the rest. Across a step that vision did not measure the odometry is only a
-// guess; from there on the place is unknown until a later keyframe is recognised.
+// Where the robot is in the map: a closure that the daemon reports connects one of its keyframes to an older frame, and
+// the odometry since then gives the rest. Across a step that vision did not measure, the odometry is only a guess, so
+// the place is unknown until a later keyframe is recognised.
 #pragma once
 
 #include <cstdint>
@@ -17,30 +17,31 @@ namespace relmap::publishing {
 // Thread-safe.
 class Localisation {
  public:
-  // A keyframe is about to be published; in the order of their sequences.
+  // Must be called for each keyframe before it is published, in the order of sequences.
   void publishing(const Keyframe& keyframe);
 
-  // A keyframe behind unmeasured steps was recognised in what the map held before them, or in another session.
+  // A keyframe after unmeasured steps was recognised in a frame from before them, or in another session.
   struct Recovery {
     FrameId keyframe, frame;
-    double distance_m = 0;    // between them
-    std::uint64_t steps = 0;  // unmeasured ones that nothing had closed yet
+    double distance_m = 0;    // between the two
+    std::uint64_t steps = 0;  // unmeasured steps that no closure had bridged before
   };
+  // Takes in news from the daemon. Returns a recovery if a closure bridges such steps.
   std::optional<Recovery> hear(const PoseNews& news);
 
   struct Place {
-    FrameId frame;       // of the map
-    SE3 T_frame_newest;  // of the newest keyframe
-    FrameId recognised;  // the keyframe whose closure says so
+    FrameId frame;       // a frame of the map
+    SE3 T_frame_newest;  // pose of the newest keyframe in it
+    FrameId recognised;  // the keyframe whose closure the place is from
   };
-  // nullopt: no closure in force is known, or vision was lost since.
+  // nullopt if no closure in force is known, or vision was lost since.
   std::optional<Place> place() const;
 
   struct Counts {
-    std::uint64_t closures = 0;   // that came into force
-    std::uint64_t withdrawn = 0;  // of them, taken out again
+    std::uint64_t closures = 0;   // closures that came into force
+    std::uint64_t withdrawn = 0;  // closures that were taken out again
     std::uint64_t unmeasured_steps = 0;
-    std::uint64_t recovered_steps = 0;  // of them, those that a closure in force reaches across
+    std::uint64_t recovered_steps = 0;  // unmeasured steps that a closure in force bridges
     std::uint64_t heard = 0;            // news of any kind
   };
   Counts counts() const;
@@ -50,21 +51,21 @@ class Localisation {
     std::uint32_t sequence = 0;
     SE3 T_odom_keyframe;
   };
-  // An unmeasured step, by the keyframe that it leads to.
+  // An unmeasured step.
   struct Guess {
-    std::uint32_t sequence = 0;
-    std::uint32_t closures = 0;  // in force, from behind it to before it
+    std::uint32_t sequence = 0;  // of the keyframe that it leads to
+    std::uint32_t closures = 0;  // closures in force that bridge it
   };
   using Ends = std::pair<FrameId, FrameId>;  // keyframe, frame
   std::optional<SE3> odometry(std::uint32_t sequence) const;
-  std::uint64_t reach_across(const Ends& ends, bool in_force);
+  std::uint64_t bridge(const Ends& ends, bool in_force);
 
   mutable std::mutex mutex_;
   std::deque<Pose> poses_;  // of the newest keyframes
   std::deque<Guess> guesses_;
-  // T_frame_odom of the closures in force, those of the newest keyframes; none where the keyframe's pose is not known.
+  // T_frame_odom of the closures in force, for the newest keyframes; nullopt if the keyframe's pose is not known.
   std::map<Ends, std::optional<SE3>> closures_;
-  SessionNumber session_ = 0;  // the map's number of this one
+  SessionNumber session_ = 0;  // this session's number in the map
   Counts counts_;
 };
 

@@ -94,7 +94,7 @@ TEST_F(LocalisationTest, AClosureThatIsTakenOutNoLongerSaysWhereTheRobotIs) {
   EXPECT_EQ(localisation_.counts().withdrawn, 2u);
 }
 
-TEST_F(LocalisationTest, AClosureThatIsTakenOutClosesNothingAnyMore) {
+TEST_F(LocalisationTest, AClosureThatIsTakenOutBridgesNoStep) {
   drive(30);
   drive(1, MotionSource::kConstantVelocity);  // 30
   drive(9);
@@ -112,13 +112,13 @@ TEST_F(LocalisationTest, AClosureThatIsTakenOutClosesNothingAnyMore) {
   EXPECT_EQ(localisation_.counts().recovered_steps, 1u);
 }
 
-TEST_F(LocalisationTest, AWithdrawalOfWhatWasNeverHeardOfIsNone) {
+TEST_F(LocalisationTest, TheWithdrawalOfAnUnknownClosureDoesNotCount) {
   drive(10);
   hear(5, {kOther, 5}, PoseNews::Kind::kClosureOut);
   EXPECT_EQ(localisation_.counts().withdrawn, 0u);
 }
 
-TEST_F(LocalisationTest, AnotherMapKnowsNothingOfTheOneBefore) {
+TEST_F(LocalisationTest, ClosuresOfTheMapBeforeAreForgotten) {
   drive(10);
   drive(1, MotionSource::kGyro);  // 10
   drive(9);
@@ -141,7 +141,7 @@ TEST_F(LocalisationTest, ManyLateNewsOfOldKeyframesLeaveTheNewest) {
   EXPECT_EQ(localisation_.place()->recognised, (FrameId{kMine, 3999}));
 }
 
-TEST_F(LocalisationTest, NewsOfAKeyframeThatIsNotKnownSayNothingOfThePlace) {
+TEST_F(LocalisationTest, NewsOfAnUnknownKeyframeGiveNoPlace) {
   hear(5, {kOther, 5});
   EXPECT_FALSE(localisation_.place());
   drive(10'000);

@@ -1,4 +1,5 @@
-// A spool that ends with its process: for sources that can be read again, whose keyframes are then made again.
+// A spool in memory, which ends with its process. It suits sources that give the same keyframes when they are read
+// again.
 #pragma once
 
 #include <cstdint>

@@ -30,7 +30,7 @@ TEST(MemorySpool, KeepsWhatIsWanted) {
   EXPECT_EQ(*spool.read(7), payload(7));
 }
 
-TEST(MemorySpool, TakesTheUuidItIsGiven) {
+TEST(MemorySpool, KeepsTheUuidItIsGiven) {
   const SessionHeader header = sample_keyframe().session;
   EXPECT_EQ(MemorySpool(header).session().uuid, header.uuid);
 }

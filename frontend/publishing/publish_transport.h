@@ -1,4 +1,4 @@
-// The way to the daemon and back: LCM, gRPC, or a test's.
+// The interface of transports to the daemon and back: LCM, gRPC, or a test's.
 #pragma once
 
 #include <cstddef>
@@ -8,34 +8,37 @@
 
 namespace relmap::publishing {
 
-// Loses, doubles and reorders as it likes; a lossless one loses only what was on its way when it broke, and says so.
+// A transport may lose, duplicate and reorder messages. A lossless one loses only what was on its way when it broke,
+// and reports that (Listener::broken).
 class PublishTransport {
  public:
   virtual ~PublishTransport() = default;
 
-  // Of a keyframe's payload in one part. `usual`: where nobody says otherwise.
+  // How many bytes of a keyframe's payload one part may have.
   struct PartBytes {
-    std::size_t least = kMinPartBytes, usual = kNetworkPartBytes, most = kMaxPartBytes;
+    std::size_t min = kMinPartBytes, usual = kNetworkPartBytes, max = kMaxPartBytes;
   };
   virtual PartBytes part_bytes() const { return {}; }
 
   virtual bool lossless() const { return false; }
 
-  // Why nothing gets through, as far as is known; OK: it does, or there is no telling. From any thread.
+  // Why no messages get through, as far as is known; ok if they do, or if that is not known. Thread-safe.
   virtual Status trouble() const { return {}; }
 
-  // Called from one thread. Return at once.
+  // Called from one thread. They do not block.
   virtual void send(const KeyframePart& part) = 0;
   virtual void send(const Gap& gap) = 0;
   virtual void send(const SessionEnd& end) = 0;
 
-  // What the daemon says, of any session, from a thread of the transport's, from listen() until stop() has returned.
+  // Receives the daemon's messages about all sessions, on a thread of the transport, from listen() until stop() has
+  // returned.
   struct Listener {
     std::function<void(const Acknowledgement&)> acknowledged;
     std::function<void(const PoseNews&)> news;
-    std::function<void()> broken;  // of a lossless transport: what was sent and is not acknowledged may be lost
-    // Which map the daemon of a boot serves. Of a lossless transport before anything else that this daemon says, and
-    // again after `broken`; of another now and then, and from an old daemon never.
+    // A lossless transport broke: what was sent and is not acknowledged may be lost.
+    std::function<void()> broken;
+    // Which map the daemon of a boot serves. A lossless transport calls it before any other message of that daemon, and
+    // again after `broken`; others call it now and then, and never for an old daemon.
     std::function<void(const DaemonIdentity&)> introduced = {};
   };
   virtual void listen(Listener listener) = 0;

@@ -95,7 +95,7 @@ struct Publisher::Impl {
     return {};
   }
 
-  // Whether the daemon takes anything of the session.
+  // Ok if the daemon accepts keyframes of the session.
   Status session_status() const {
     const std::string name = "session " + session.uuid.to_string();
     if (core.closed() == Reason::SESSION_DELETED)
@@ -105,11 +105,11 @@ struct Publisher::Impl {
   }
 
   Status map_status() const { return core.map_status(std::chrono::steady_clock::now()); }
-  // Of a source that can be read again: it is to be published from its beginning.
+  // Why a repeatable source has to be published from its beginning; ok if it has not.
   Status must_begin_anew() const { return options.repeatable() ? map_status() : Status(); }
 
-  // What is deleted takes nothing any more. And where the daemon has other keyframes of this session, what follows
-  // would be put behind them.
+  // A deleted session accepts nothing. If the daemon has other keyframes of this session, those that follow would be
+  // appended to them.
   Status check_session() const {
     if (Status status = session_status(); status.reason() == Reason::SESSION_DELETED) return status;
     if (Status status = must_begin_anew(); !status.ok()) return status;
@@ -152,7 +152,7 @@ struct Publisher::Impl {
   void acknowledge(const Acknowledgement& ack) {
     const std::lock_guard lock(mutex);
     core.acknowledge(ack, std::chrono::steady_clock::now());
-    // What cannot be removed now is removed with what follows; and nothing is before it is known which map has it.
+    // What cannot be removed now is removed later. Nothing is removed before the map that has it is on record.
     if (keep_map()) (void)spool->remove_below(core.keep_from());
     acknowledged = true;
     changed.notify_all();
@@ -165,7 +165,7 @@ struct Publisher::Impl {
     changed.notify_all();
   }
 
-  // In this order: with the map alone a later process would not know why the gaps are there.
+  // The gaps are stored before the map: with the map alone, a later process would not know that there are gaps.
   bool keep_map() {
     for (const Gap& hole : core.take_holes())
       if (!spool->append_gap(hole).ok()) return false;
@@ -208,7 +208,7 @@ struct Publisher::Impl {
     }
   }
 
-  // A daemon of another map may have answered meanwhile.
+  // False if, for example, a daemon of another map has answered meanwhile.
   bool may_send() const { return core.may_send(std::chrono::steady_clock::now()); }
 
   void say_end(std::unique_lock<std::mutex>& lock) {
@@ -233,7 +233,7 @@ struct Publisher::Impl {
     if (entry == spool->keyframes().end()) return;  // settled meanwhile
     const std::uint32_t crc = entry->second.crc;
     const Result<Bytes> payload = spool->read(send.sequence);
-    if (!payload.ok()) {  // the disk lost it: say so, rather than keep the daemon waiting for ever
+    if (!payload.ok()) {  // the disk lost it: declare a gap, so that the daemon does not wait for ever
       const Gap gap{session.uuid, send.sequence, send.sequence, Reason::DROPPED_BY_ROBOT};
       (void)spool->append_gap(gap);
       core.give_up(gap);
@@ -276,12 +276,12 @@ struct Publisher::Impl {
   PublisherCore core;
   std::uint64_t pushed = 0;
   std::uint64_t spooled = 0;
-  bool went_on = false;  // the spool held something
+  bool went_on = false;  // the spool held something at start
   bool acknowledged = false;
-  bool closed = false;                               // takes no more
-  bool interrupted = false;                          // finish() returns
-  bool ending = false;                               // the daemon is to be told that this is all
-  bool ended = false;                                // it knows
+  bool closed = false;                               // push() is refused
+  bool interrupted = false;                          // waits end at once
+  bool ending = false;                               // the daemon is to be told that the session has ended
+  bool ended = false;                                // the daemon has confirmed that
   std::chrono::steady_clock::time_point next_end{};  // when it is told again
   bool stopping = false;
   std::thread thread;
@@ -297,9 +297,9 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
     return {Reason::INVALID_ARGUMENT, "a spool needs at least " + std::to_string(kMinSpoolBytes) + " bytes"};
   const PublishTransport::PartBytes part_bytes = transport->part_bytes();
   if (options.part_bytes == 0) options.part_bytes = part_bytes.usual;
-  if (options.part_bytes < part_bytes.least || options.part_bytes > part_bytes.most)
+  if (options.part_bytes < part_bytes.min || options.part_bytes > part_bytes.max)
     return {Reason::INVALID_ARGUMENT, "parts of " + std::to_string(options.part_bytes) + " bytes; must be " +
-                                          std::to_string(part_bytes.least) + ".." + std::to_string(part_bytes.most)};
+                                          std::to_string(part_bytes.min) + ".." + std::to_string(part_bytes.max)};
   Result<std::unique_ptr<Spool>> spool = open_spool(options, std::move(header));
   if (!spool.ok()) return spool.status();
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*spool), std::move(transport));

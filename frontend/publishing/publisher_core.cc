@@ -8,12 +8,12 @@ namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr milliseconds kAskedAgain{60};  // a part is not sent again sooner: the first may still be on its way
-constexpr milliseconds kLosslessAsked{1000}, kLosslessRetry{10'000};  // likewise, by a lossless transport
-constexpr milliseconds kFirstRetry{250};                              // what nobody has asked for and nobody holds
-constexpr milliseconds kLastRetry{2000};
-constexpr milliseconds kSilence{1500};       // without a word from the daemon: it may be gone
-constexpr std::ptrdiff_t kKeepSettled = 64;  // the most that one acknowledgement settles, as the daemon's window is
+// A part that the daemon asks for is not sent again sooner than this, since the first one may still be on its way.
+constexpr milliseconds kAskedAgain{60}, kLosslessAsked{1000};
+// What the daemon neither holds nor asks for is sent again after this time, which grows over a lossy transport.
+constexpr milliseconds kFirstRetry{250}, kLastRetry{2000}, kLosslessRetry{10'000};
+constexpr milliseconds kSilence{1500};       // after this time without a message the daemon may be gone
+constexpr std::ptrdiff_t kKeepSettled = 64;  // one acknowledgement settles at most so many (the daemon's window)
 constexpr std::uint64_t kMinWindow = std::uint64_t{128} << 10;
 constexpr std::uint64_t kMaxWindow = std::uint64_t{2} << 20;
 constexpr std::uint64_t kMaxGapSpan = 1'000'000;  // sequences in one message
@@ -54,7 +54,7 @@ void PublisherCore::push(std::uint32_t sequence, std::uint32_t crc, std::uint32_
   forget_settled();
 }
 
-// Keyframes of the range that are not settled are forgotten; the gap takes their place, and joins the one before it.
+// The gap replaces the unsettled keyframes of its range and is merged with a gap just before it.
 void PublisherCore::give_up(const Gap& gap) {
   std::uint32_t from = gap.from;
   for (auto it = items_.lower_bound(gap.from); it != items_.end() && it->first <= gap.to;) {
@@ -72,7 +72,7 @@ void PublisherCore::give_up(const Gap& gap) {
   if (from > gap.to) return;
   counts_.gaps += gap.to - from + std::uint64_t{1};
   next_ = std::max(next_, gap.to + std::uint64_t{1});
-  // One that was sent stands for itself: the daemon may have it already.
+  // A gap that was sent is not extended, since the daemon may have it already.
   if (const auto after = items_.lower_bound(from); after != items_.begin()) {
     auto& [start, before] = *std::prev(after);
     if (before.gap && !before.settled && before.sends == 0 && before.reason == gap.reason &&
@@ -107,7 +107,7 @@ void PublisherCore::set_settled(Item& item, std::uint32_t sequence, bool settled
     item.refused = Reason::OK;
     item.held = false;
     item.sends = 0;
-    item.loaded = true;  // the daemon may find that it has it after all
+    item.loaded = true;  // the daemon may have it after all
   }
   if (item.gap) return;
   if (settled) {
@@ -119,7 +119,7 @@ void PublisherCore::set_settled(Item& item, std::uint32_t sequence, bool settled
   }
 }
 
-// Another daemon process: what the former one held in memory is gone.
+// A new daemon process: what the one before held in memory is lost.
 void PublisherCore::adopt_boot(const BootId& boot) {
   const bool first = !boot_;
   if (!first) {
@@ -139,10 +139,10 @@ void PublisherCore::adopt_boot(const BootId& boot) {
 void PublisherCore::settle_below(std::uint64_t next) {
   for (auto& [sequence, item] : items_) {
     if (item.to >= next) break;
-    // Never sent and yet known: under this uuid another has used the sequence.
+    // The daemon knows a keyframe that was never sent, so another source has used this uuid.
     if (!item.settled && !item.gap && item.sends == 0 && !item.loaded && item.refused == Reason::OK)
       item.refused = Reason::SEQUENCE_CONFLICT;
-    // The daemon had these before they were given up: an earlier part of the recording, for instance.
+    // The daemon already had these before they were given up, for example from an earlier part of the recording.
     if (item.gap && !item.settled && item.sends == 0 && !item.loaded) {
       counts_.gaps -= item.to - sequence + std::uint64_t{1};
       if (item.reason == Reason::MAP_RESTORED) counts_.lost_in_restores -= item.to - sequence + std::uint64_t{1};
@@ -152,13 +152,13 @@ void PublisherCore::settle_below(std::uint64_t next) {
   acknowledged_ = next;
 }
 
-// The daemon has lost what it had promised: it gets it again.
+// The daemon has lost settled keyframes, which will be sent again.
 void PublisherCore::unsettle_from(std::uint64_t next) {
   for (auto it = items_.rbegin(); it != items_.rend() && it->second.to >= next; ++it)
     set_settled(it->second, it->first, false);
 }
 
-// Sequences that the daemon lacks and the spool no longer has are lost, and said to be.
+// Declares gaps for sequences that the daemon lacks and the spool no longer has.
 void PublisherCore::fill_holes(std::uint64_t from, Reason reason) {
   std::vector<Gap> holes;
   for (const auto& [sequence, item] : items_) {
@@ -173,7 +173,7 @@ void PublisherCore::fill_holes(std::uint64_t from, Reason reason) {
 }
 
 void PublisherCore::mark_held(const std::vector<SequenceRange>& held) {
-  // A full list may have been cut short: beyond its end it says nothing.
+  // A list of maximum length may be incomplete, so it says nothing beyond its end.
   const std::uint64_t known = held.size() < kMaxAckRanges ? UINT64_MAX : held.back().to;
   auto range = held.begin();
   for (auto& [sequence, item] : items_) {
@@ -210,7 +210,7 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (ack.session != session_ || past_boots_.count(ack.boot)) return;
   if (!maps_.believes(ack.boot, now)) return;
   const bool fresh_boot = !boot_ || *boot_ != ack.boot;
-  if (!fresh_boot && ack.next_sequence < acknowledged_) return;  // overtaken on the way
+  if (!fresh_boot && ack.next_sequence < acknowledged_) return;  // a newer one overtook it
   last_ack_ = now;
   if (fresh_boot) adopt_boot(ack.boot);
   closed_ = Reason::OK;
@@ -218,7 +218,7 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
     if (refused.sequence == kWholeSession) closed_ = refused.reason;
     const auto it = items_.find(refused.sequence);
     if (it == items_.end() || it->second.gap || it->second.crc != refused.payload_crc) continue;
-    // What was settled before it was sent may turn out to be another version.
+    // A keyframe that was settled before it was sent may turn out to be another version.
     if (it->second.settled && it->second.refused == Reason::OK) ++counts_.refused[refused.reason];
     it->second.refused = refused.reason;
   }
@@ -275,7 +275,7 @@ PublisherCore::Send PublisherCore::make_send(std::uint32_t sequence, Item& item,
   } else {
     ++(item.sends == 0 ? counts_.sent : counts_.resent);
   }
-  // The process before gave them up, and it is this one that says so.
+  // A gap of an earlier process counts when this process sends it.
   if (item.gap && item.loaded && item.sends == 0) counts_.gaps += item.to - sequence + std::uint64_t{1};
   item.parts.clear();
   item.wanted = false;
@@ -284,11 +284,12 @@ PublisherCore::Send PublisherCore::make_send(std::uint32_t sequence, Item& item,
   return send;
 }
 
-// One item now and then, until the daemon speaks.
+// Sends one item now and then until the daemon answers.
 std::vector<PublisherCore::Send> PublisherCore::probe(Time now, std::uint32_t part_bytes) {
   for (auto& [sequence, item] : items_) {
     if (item.settled) continue;
-    // A daemon that does not know the session yet cannot know its gaps, and one that does may have what they stand for.
+    // Gaps are not used to probe: a daemon that does not know the session yet cannot know its gaps, and one that does
+    // may have their keyframes.
     if (item.gap && sequence != items_.rbegin()->first) continue;
     item.held = false;
     if (item.sends > 0 && !item.wanted && !due_again(item, now, true)) return {};

@@ -1,5 +1,5 @@
-// What to send, and when: the robot's half of the exchange as a state machine. Knows sizes and sequences, not bytes;
-// time is an argument; no threads, no I/O.
+// Decides what to send and when: the robot's half of the protocol as a state machine. It knows sizes and sequences but
+// not payloads, takes the time as an argument, and uses no threads and no I/O.
 #pragma once
 
 #include <chrono>
@@ -17,26 +17,27 @@
 namespace relmap::publishing {
 
 struct PublishCounts {
-  std::uint64_t sent = 0;    // keyframes, first time in this process
-  std::uint64_t resent = 0;  // whole
+  std::uint64_t sent = 0;    // keyframes sent for the first time in this process
+  std::uint64_t resent = 0;  // keyframes sent again as a whole
   std::uint64_t parts_resent = 0;
-  std::uint64_t settled = 0;
-  std::uint64_t gaps = 0;  // sequences given up
+  std::uint64_t settled = 0;  // sequences
+  std::uint64_t gaps = 0;     // sequences given up
   std::uint64_t restarts_seen = 0;
-  std::uint64_t lost_in_restores = 0;  // of the gaps: what a restored map lacks and the spool has no more
+  std::uint64_t lost_in_restores = 0;  // of the gaps, sequences that a restored map lacks and the spool no longer has
   std::map<Reason, std::uint64_t> refused;
 };
 
 struct PublisherCoreOptions {
-  // The source can be read again, and gives the same keyframes then. So they may have been published before, by another
-  // process: what the daemon has settled of them is not sent, but for the first keyframe, with which it is asked. And
-  // where the map lacks what was published, the source is published again from its beginning.
+  // The source gives the same keyframes when it is read again, so another process may have published them before.
+  // Keyframes that the daemon has settled are then not sent, except the first one, which is sent to learn what the
+  // daemon has. If the map lacks what was published, the source is published again from its beginning.
   bool repeated = false;
-  // The transport loses nothing without saying so: nothing is sent again just because no answer has come yet, which on
-  // a slow line would only make it slower.
+  // The transport loses nothing without reporting it. Messages are not sent again merely because no answer has come
+  // yet, since that would make a slow line slower.
   bool lossless = false;
 };
 
+// Not thread-safe.
 class PublisherCore {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -44,55 +45,57 @@ class PublisherCore {
   explicit PublisherCore(const SessionUuid& session, PublisherCoreOptions options = {})
       : session_(session), options_(options), maps_({options.repeated, options.lossless}) {}
 
-  // What a spool held when it was opened; before anything else. Keyframes and gaps may overlap: a gap is final.
+  // Load what a spool held when it was opened; before all other calls. Where keyframes and gaps overlap, the gap
+  // counts.
   void load_keyframe(std::uint32_t sequence, std::uint32_t crc, std::uint32_t bytes);
   void load_gap(const Gap& gap);
   void load_map(const MapIdentity& map) { maps_.load(map); }
 
-  // A keyframe that is in the spool now. `sequence` >= next_sequence(); what lies between is given up
-  // (CAPTURE_FAILED), and returned to be kept in the spool.
+  // The gap (CAPTURE_FAILED) between next_sequence() and `sequence`, to be stored in the spool before push().
   std::optional<Gap> skipped(std::uint32_t sequence) const;
+  // Takes a keyframe that is in the spool now; `sequence` >= next_sequence(). Sequences in between are given up.
   void push(std::uint32_t sequence, std::uint32_t crc, std::uint32_t bytes);
+  // Replaces the unsettled keyframes in the range of the gap by the gap.
   void give_up(const Gap& gap);
   // The oldest keyframe that the daemon does not hold yet, as a gap (DROPPED_BY_ROBOT) to be given to give_up().
   std::optional<Gap> oldest_to_drop() const;
 
-  // Which map a daemon serves. A session that is in a map sends nothing to a daemon of another one, and believes
-  // nothing that it says; the daemon that spoke last decides.
+  // A daemon says which map it serves. A session that is in a map sends nothing to a daemon of another one and ignores
+  // its messages; the daemon that spoke last decides.
   void introduce(const DaemonIdentity& daemon, Time now) { maps_.introduce(daemon, boot_, now); }
-  // Gaps that an acknowledgement has brought about, for the spool; once.
+  // Returns the gaps that acknowledgements have caused since the last call, to be stored in the spool.
   std::vector<Gap> take_holes() { return std::exchange(holes_, {}); }
-  // As of the daemon that was introduced with its boot, if it is believed (ServedMaps).
+  // Takes in an acknowledgement, if its daemon is believed (ServedMaps).
   void acknowledge(const Acknowledgement& ack, Time now);
-  // Whatever was sent and is not known to have come may be lost; of a lossless transport, the next daemon introduces
-  // itself.
+  // The transport broke: what was sent and is not acknowledged may be lost. Over a lossless transport, the next daemon
+  // introduces itself.
   void broken();
 
   struct Send {
     bool gap = false;
-    std::uint32_t sequence = 0;        // of a gap the first
-    std::uint32_t to = 0;              // of a gap
-    Reason reason = Reason::OK;        // of a gap
-    std::vector<std::uint32_t> parts;  // of a keyframe; empty: all of them
+    std::uint32_t sequence = 0;        // of the keyframe, or the first of the gap
+    std::uint32_t to = 0;              // last sequence of the gap
+    Reason reason = Reason::OK;        // of the gap
+    std::vector<std::uint32_t> parts;  // of the keyframe; empty for all
   };
-  // What is to be sent now. `part_bytes` is the size it will be cut into.
+  // What is to be sent now. `part_bytes` is the size of parts.
   std::vector<Send> poll(Time now, std::uint32_t part_bytes);
 
   std::uint64_t next_sequence() const { return next_; }
   std::uint64_t unsettled_bytes() const { return unsettled_bytes_; }
   std::uint64_t unsettled() const { return unsettled_; }  // keyframes
   bool all_settled() const { return items_.empty() || items_.rbegin()->second.settled; }
-  // Nothing below is needed again, even if the daemon should lose its last settled group.
+  // Sequences below this are not needed again, even if the daemon loses its last settled group.
   std::uint64_t keep_from() const;
   bool heard() const { return boot_.has_value(); }
-  // Of the maps that daemons serve (ServedMaps). The session's is to be kept with the spool.
+  // The state of ServedMaps. map() must be stored with the spool.
   const MapIdentity& map() const { return maps_.map(); }
   bool introduced() const { return maps_.introduced(); }
   Status map_status(Time now) const { return maps_.status(session_, now); }
   bool may_send(Time now) const { return maps_.may_send(now); }
   bool is_other(const BootId& boot) const { return maps_.is_other(boot); }
   const PublishCounts& counts() const { return counts_; }
-  // Why the daemon takes nothing of the session, as it said last: SESSION_DELETED, SESSION_FROZEN. OK: it does.
+  // Why the daemon accepts nothing of the session, as it said last: SESSION_DELETED, SESSION_FROZEN; OK if it does.
   Reason closed() const { return closed_; }
 
  private:
@@ -102,13 +105,13 @@ class PublisherCore {
     Reason reason = Reason::OK;
     std::uint32_t crc = 0;
     std::uint32_t bytes = 0;
-    bool loaded = false;  // of another process too: may have been settled before this one began
+    bool loaded = false;  // an earlier process may have sent it, so the daemon may have it already
     bool settled = false;
-    bool held = false;  // the daemon has it whole
+    bool held = false;  // the daemon has all of it
     std::uint32_t sends = 0;
     Time last_sent{};
-    bool wanted = false;               // asked for again, whole
-    std::vector<std::uint32_t> parts;  // asked for again
+    bool wanted = false;               // must be sent again as a whole
+    std::vector<std::uint32_t> parts;  // parts that must be sent again
     Reason refused = Reason::OK;
   };
   using Items = std::map<std::uint32_t, Item>;
@@ -130,12 +133,12 @@ class PublisherCore {
   Items items_;  // contiguous: each begins where the one before ends
   std::uint64_t next_ = 0;
   std::uint64_t acknowledged_ = 0;  // the daemon's next_sequence
-  std::uint64_t send_end_ = 0;      // by credits
+  std::uint64_t send_end_ = 0;      // credits allow sequences below this
   std::uint64_t unsettled_ = 0;
   std::uint64_t unsettled_bytes_ = 0;
-  std::uint64_t window_bytes_ = std::uint64_t{512} << 10;  // under way at a time
+  std::uint64_t window_bytes_ = std::uint64_t{512} << 10;  // maximum number of bytes in flight
   ServedMaps maps_;
-  std::vector<Gap> holes_;  // that the spool does not have yet
+  std::vector<Gap> holes_;  // gaps that the spool does not have yet
   std::optional<BootId> boot_;
   std::set<BootId> past_boots_;
   Time last_ack_{};

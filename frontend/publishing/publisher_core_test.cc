@@ -41,7 +41,7 @@ class PublisherCoreTest : public testing::Test {
   }()};
 };
 
-TEST_F(PublisherCoreTest, AsksWithOneKeyframeUntilTheDaemonSpeaks) {
+TEST_F(PublisherCoreTest, ProbesWithOneKeyframeUntilTheDaemonAnswers) {
   push(10);
   EXPECT_EQ(sent(), std::vector<std::uint32_t>{0});
   EXPECT_TRUE(sent().empty());
@@ -104,7 +104,7 @@ TEST_F(PublisherCoreTest, HeldKeyframesAreLeftAlone) {
   EXPECT_EQ(sent(), (std::vector<std::uint32_t>{1, 2}));
 }
 
-TEST_F(PublisherCoreTest, AcknowledgementsThatWereOvertakenAreIgnored) {
+TEST_F(PublisherCoreTest, OutdatedAcknowledgementsAreIgnored) {
   push(10);
   core_.acknowledge(ack(0), now_);
   (void)sent();
@@ -117,7 +117,7 @@ TEST_F(PublisherCoreTest, AcknowledgementsThatWereOvertakenAreIgnored) {
   EXPECT_EQ(core_.unsettled(), 2u);
 }
 
-TEST_F(PublisherCoreTest, RestartedDaemonGetsWhatItForgot) {
+TEST_F(PublisherCoreTest, ARestartedDaemonGetsTheKeyframesItLost) {
   push(20);
   core_.acknowledge(ack(0), now_);
   (void)sent();
@@ -154,7 +154,7 @@ TEST_F(PublisherCoreTest, CountsRefusalsOnce) {
   EXPECT_EQ(core_.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::NOT_FINITE, 1}}));
 }
 
-TEST_F(PublisherCoreTest, HearsThatTheSessionItselfTakesNothing) {
+TEST_F(PublisherCoreTest, ReportsThatTheDaemonAcceptsNothingOfTheSession) {
   push(1);
   sent();
   Acknowledgement a = ack(1);
@@ -166,13 +166,13 @@ TEST_F(PublisherCoreTest, HearsThatTheSessionItselfTakesNothing) {
   EXPECT_EQ(core_.closed(), Reason::OK) << "it was thawed";
 }
 
-TEST_F(PublisherCoreTest, ASequenceThatWasNeverSentAndIsKnownIsAConflict) {
+TEST_F(PublisherCoreTest, AKnownSequenceThatWasNeverSentIsAConflict) {
   push(1);
   core_.acknowledge(ack(5), now_);
   EXPECT_EQ(core_.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::SEQUENCE_CONFLICT, 1}}));
 }
 
-TEST_F(PublisherCoreTest, WhatIsPublishedAgainIsSentOnlyWhereItIsNotKnown) {
+TEST_F(PublisherCoreTest, ARepeatedSourceSendsOnlyWhatTheDaemonLacks) {
   PublisherCore again(uuid_, {.repeated = true});
   for (std::uint32_t s = 0; s < 3; ++s) again.push(s, 100 + s, 10'000);
   EXPECT_EQ(again.poll(now_, kPart).size(), 1u);  // the first one asks
@@ -191,7 +191,7 @@ TEST_F(PublisherCoreTest, WhatIsPublishedAgainIsSentOnlyWhereItIsNotKnown) {
   EXPECT_EQ(again.keep_from(), 200u - 64u);
 }
 
-TEST_F(PublisherCoreTest, WhatIsPublishedAgainMustBeTheSame) {
+TEST_F(PublisherCoreTest, ARepeatedSourceMustGiveTheSameKeyframes) {
   PublisherCore again(uuid_, {.repeated = true});
   again.push(0, 100, 10'000);
   (void)again.poll(now_, kPart);
@@ -203,7 +203,7 @@ TEST_F(PublisherCoreTest, WhatIsPublishedAgainMustBeTheSame) {
   EXPECT_EQ(again.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::SEQUENCE_CONFLICT, 1}}));
 }
 
-TEST_F(PublisherCoreTest, GapsOfWhatIsPublishedAgainAreSettledToo) {
+TEST_F(PublisherCoreTest, GapsOfARepeatedSourceAreSettledToo) {
   PublisherCore again(uuid_, {.repeated = true});
   again.push(0, 100, 10);
   (void)again.poll(now_, kPart);
@@ -214,7 +214,7 @@ TEST_F(PublisherCoreTest, GapsOfWhatIsPublishedAgainAreSettledToo) {
   EXPECT_TRUE(again.poll(now_, kPart).empty());
 }
 
-TEST_F(PublisherCoreTest, WhatLosesNothingIsGivenAgainOnlyWhatBrokeOff) {
+TEST_F(PublisherCoreTest, OverALosslessTransportOnlyWhatWasInFlightAtABreakIsSentAgain) {
   PublisherCore core(uuid_, {.lossless = true});
   for (std::uint32_t s = 0; s < 5; ++s) core.push(s, 100 + s, 10'000);
   EXPECT_EQ(core.poll(now_, kPart).size(), 1u);
@@ -300,7 +300,7 @@ TEST_F(PublisherCoreTest, ASessionIsInTheMapOfTheFirstDaemonThatAcknowledgesIt) 
   EXPECT_EQ(sent(), (std::vector<std::uint32_t>{1, 2}));
 }
 
-TEST_F(PublisherCoreTest, NothingIsSentToADaemonOfAnotherMapNorBelievedOfIt) {
+TEST_F(PublisherCoreTest, ADaemonOfAnotherMapIsSentNothingAndNotBelieved) {
   core_.load_map(map_of(9));
   for (std::uint32_t s = 20; s < 25; ++s) core_.load_keyframe(s, s, 10'000);
   core_.introduce({{1}, map_of(8)}, now_);
@@ -327,7 +327,7 @@ TEST_F(PublisherCoreTest, NothingIsSentToADaemonOfAnotherMapNorBelievedOfIt) {
   EXPECT_EQ(sent(), (std::vector<std::uint32_t>{21, 22, 23, 24}));
 }
 
-TEST_F(PublisherCoreTest, OfTwoDaemonsThatAreHeardTheOneOfItsMapIsSpokenTo) {
+TEST_F(PublisherCoreTest, OfTwoDaemonsTheOneOfTheSessionsMapIsUsed) {
   push(1);
   core_.introduce({{1}, map_of(9)}, now_);
   core_.acknowledge(ack(1), now_);
@@ -376,7 +376,7 @@ TEST_F(PublisherCoreTest, OverALosslessTransportNothingIsSentBeforeTheMapIsSaid)
   EXPECT_EQ(core.map_status(now_).reason(), Reason::WRONG_MAP);
 }
 
-TEST_F(PublisherCoreTest, ARestoredMapGetsWhatIsStillThereAndANamedGapForTheRest) {
+TEST_F(PublisherCoreTest, ARestoredMapGetsWhatTheSpoolHasAndANamedGapForTheRest) {
   core_.introduce({{1}, map_of(9)}, now_);
   push(200);
   core_.acknowledge(ack(0), now_);
@@ -400,7 +400,7 @@ TEST_F(PublisherCoreTest, ARestoredMapGetsWhatIsStillThereAndANamedGapForTheRest
   EXPECT_EQ(sends[1].sequence, 136u);
 }
 
-TEST_F(PublisherCoreTest, WhatCanBeReadAgainIsNotPatchedIntoARestoredMap) {
+TEST_F(PublisherCoreTest, ARepeatableSourceIsNotContinuedInARestoredMap) {
   PublisherCore core(uuid_, {.repeated = true, .lossless = true});
   core.introduce({{1}, map_of(9)}, now_);
   for (std::uint32_t s = 0; s < 200; ++s) core.push(s, s, 1000);

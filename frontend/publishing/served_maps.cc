@@ -5,9 +5,10 @@ namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr milliseconds kUnnamed{3000};     // a daemon that says which map it serves says it every second
-constexpr milliseconds kOtherAlone{2000};  // likewise: then it is the only one that speaks
-constexpr std::size_t kMaxDaemons = 64;    // whose maps are remembered, by their boots
+// A daemon introduces itself every second. After these times, one that has not done so never will, and one that has
+// been heard alone is the only one.
+constexpr milliseconds kUnnamed{3000}, kOtherAlone{2000};
+constexpr std::size_t kMaxDaemons = 64;  // whose maps are remembered
 
 }  // namespace
 
@@ -16,7 +17,7 @@ MapIdentity ServedMaps::of(const BootId& boot) const {
   return daemon == daemons_.end() ? MapIdentity{} : daemon->second;
 }
 
-// Whether what the session has published is there, as far as one knows.
+// Whether the map has what the session has published, as far as is known.
 bool ServedMaps::belongs_to(const MapIdentity& map) const {
   if (!map_.known() || !map.known()) return true;
   return map.uuid == map_.uuid && (!options_.repeated || map.epoch == map_.epoch);
@@ -28,17 +29,17 @@ void ServedMaps::hear_other(const MapIdentity& map, Time now) {
   other_heard_ = now;
 }
 
-// Where several may be heard, one that is silent has gone.
+// If several daemons may be heard, one that is silent has gone.
 bool ServedMaps::other_speaks(Time now) const { return other_ && (options_.lossless || now - other_heard_ < kUnnamed); }
 
 void ServedMaps::introduce(const DaemonIdentity& daemon, const std::optional<BootId>& acknowledging, Time now) {
-  if (daemons_.size() >= kMaxDaemons) daemons_.clear();  // they are heard again
+  if (daemons_.size() >= kMaxDaemons) daemons_.clear();  // they will introduce themselves again
   daemons_[daemon.boot] = daemon.map;
   unnamed_.erase(daemon.boot);
   if (!belongs_to(daemon.map)) return hear_other(daemon.map, now);
   introduced_ = true;
   other_.reset();
-  if (acknowledging == daemon.boot) acknowledged_by(daemon.boot);  // what it acknowledged is there
+  if (acknowledging == daemon.boot) acknowledged_by(daemon.boot);
 }
 
 bool ServedMaps::believes(const BootId& boot, Time now) {

@@ -1,5 +1,5 @@
-// Which daemon serves which map, and which of them a session may be published to. A state machine: time is an argument,
-// no threads, no I/O.
+// Knows which daemon serves which map, and to which of them a session may be published. It is a state machine that
+// takes the time as an argument and uses no threads and no I/O.
 #pragma once
 
 #include <chrono>
@@ -13,63 +13,64 @@
 namespace relmap::publishing {
 
 struct ServedMapsOptions {
-  // The source can be published again from its beginning: then a map that was restored from a backup since it was sent
-  // is another one.
+  // The source can be published again from its beginning. A map that was restored from a backup since the source was
+  // sent then counts as another map.
   bool repeated = false;
-  // There is one daemon at a time, and the next one introduces itself. Else several may be heard, whoever is silent for
-  // a while has gone, and one that never introduces itself is an old one, of whose map nothing is known.
+  // There is one daemon at a time, and the next one introduces itself. Otherwise several daemons may be heard, a daemon
+  // that is silent for a while has gone, and one that never introduces itself is an old one, whose map is not known.
   bool lossless = false;
 };
 
-// A session is in the map of the first daemon that acknowledged some of it. Not thread-safe.
+// A session belongs to the map of the first daemon that acknowledged a keyframe of it. Not thread-safe.
 class ServedMaps {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
   explicit ServedMaps(ServedMapsOptions options) : options_(options) {}
 
-  // The map that a spool says the session is in; before anything else.
+  // The session's map as stored in the spool; call it before all other functions.
   void load(const MapIdentity& map) { map_ = map; }
 
-  // A daemon says which map it serves. `acknowledging`: that with which the session is exchanged, if there is one.
+  // A daemon says which map it serves. `acknowledging` is the daemon that acknowledges the session's keyframes, if any.
   void introduce(const DaemonIdentity& daemon, const std::optional<BootId>& acknowledging, Time now);
-  // Whether what the daemon acknowledges is to be believed: it serves the session's map. Where the session is in one, a
-  // boot that was not introduced is believed only after a while: its daemon is an old one, that has nothing to say.
+  // Whether acknowledgements of the daemon count, that is, whether it serves the session's map. If the session is in a
+  // map, a daemon that was not introduced is believed only after a while: it must be an old one that never will be.
   bool believes(const BootId& boot, Time now);
-  // Whether its map is the session's, restored from a backup since.
+  // Whether the daemon serves the session's map as restored from a backup since.
   bool restored(const BootId& boot) const;
-  // It has acknowledged some of the session, and is believed: the session is in its map.
+  // A daemon that is believed has acknowledged keyframes: the session is in its map.
   void acknowledged_by(const BootId& boot);
-  // Somebody waits to send, from the first time on that this is called.
+  // The session waits to send; the first call counts.
   void wait_since(Time now);
   void broken();
 
-  // The map that the session is in; not known: in none yet.
+  // The session's map; not known if it is in none yet.
   const MapIdentity& map() const { return map_; }
-  // A daemon has said which map it serves, and it is the session's, or the session is in none yet.
+  // A daemon has said that it serves the session's map, or any map if the session is in none yet.
   bool introduced() const { return introduced_ && !other_; }
-  // WRONG_MAP: the daemon serves another map. MAP_RESTORED: this one, restored from a backup, and the source can be
-  // read again. Where several may be heard, only when no other has spoken for a while.
+  // WRONG_MAP if the daemon serves another map. MAP_RESTORED if it serves the session's map, restored from a backup,
+  // and the source is repeatable. If several daemons may be heard, only once no other one has spoken for a while.
   Status status(const SessionUuid& session, Time now) const;
-  // Whether anything may be sent to whoever listens now. Whoever gets the first keyframe takes the session in.
+  // Whether keyframes may be sent to the daemon that listens now. The one that gets the first keyframe takes the
+  // session.
   bool may_send(Time now) const;
-  // Whether a boot is one of a daemon that is not believed.
+  // Whether the daemon of this boot serves another map.
   bool is_other(const BootId& boot) const;
 
  private:
-  MapIdentity of(const BootId& boot) const;  // not known: it was not introduced, or serves no map yet
+  MapIdentity of(const BootId& boot) const;  // not known if it was not introduced, or serves no map yet
   bool belongs_to(const MapIdentity& map) const;
   void hear_other(const MapIdentity& map, Time now);
   bool other_speaks(Time now) const;
 
   const ServedMapsOptions options_;
   MapIdentity map_;
-  std::map<BootId, MapIdentity> daemons_;  // as they were introduced
-  std::map<BootId, Time> unnamed_;         // those that were not, since when they are heard
+  std::map<BootId, MapIdentity> daemons_;  // of daemons that were introduced
+  std::map<BootId, Time> unnamed_;         // when daemons that were not introduced were first heard
   bool introduced_ = false;
   std::optional<Time> waiting_since_;
-  std::optional<MapIdentity> other_;    // that of the daemon that spoke last, where the session is not in it
-  Time other_since_{}, other_heard_{};  // first, and last
+  std::optional<MapIdentity> other_;    // map of the daemon that spoke last, if it is not the session's
+  Time other_since_{}, other_heard_{};  // when such a daemon was heard first and last
 };
 
 }  // namespace relmap::publishing

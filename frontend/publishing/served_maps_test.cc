@@ -36,7 +36,7 @@ TEST_F(ServedMapsTest, ASessionIsInTheMapOfTheFirstDaemonThatAcknowledgesIt) {
   EXPECT_TRUE(maps_.may_send(now_));
 }
 
-TEST_F(ServedMapsTest, ADaemonThatServesAMapOnlyLaterSaysItWhileItIsExchangedWith) {
+TEST_F(ServedMapsTest, ADaemonMayIntroduceItselfAfterItsFirstAcknowledgement) {
   maps_.introduce({kFirst, {}}, {}, now_);
   EXPECT_TRUE(maps_.believes(kFirst, now_));
   maps_.acknowledged_by(kFirst);
@@ -47,7 +47,7 @@ TEST_F(ServedMapsTest, ADaemonThatServesAMapOnlyLaterSaysItWhileItIsExchangedWit
   EXPECT_EQ(maps_.map(), map_of(9));
 }
 
-TEST_F(ServedMapsTest, OneOfAnotherMapIsNeitherSentToNorBelievedWhileItSpeaks) {
+TEST_F(ServedMapsTest, ADaemonOfAnotherMapIsSentNothingAndNotBelievedWhileItIsHeard) {
   maps_.load(map_of(9));
   maps_.wait_since(now_);
   maps_.introduce({kFirst, map_of(8)}, {}, now_);
@@ -67,7 +67,7 @@ TEST_F(ServedMapsTest, OneOfAnotherMapIsNeitherSentToNorBelievedWhileItSpeaks) {
   EXPECT_TRUE(maps_.may_send(now_)) << "an old daemon may have come, which speaks only when it is spoken to";
 }
 
-TEST_F(ServedMapsTest, TheOneOfItsMapThatSpeaksPutsTheOtherAside) {
+TEST_F(ServedMapsTest, ADaemonOfTheSessionsMapSupersedesAnother) {
   maps_.load(map_of(9));
   maps_.introduce({kSecond, map_of(8)}, {}, now_);
   EXPECT_FALSE(maps_.may_send(now_));
@@ -81,7 +81,7 @@ TEST_F(ServedMapsTest, TheOneOfItsMapThatSpeaksPutsTheOtherAside) {
   EXPECT_TRUE(maps_.may_send(now_));
 }
 
-TEST_F(ServedMapsTest, OneThatNamesNoMapIsBelievedAfterAWhile) {
+TEST_F(ServedMapsTest, ADaemonThatNamesNoMapIsBelievedAfterAWhile) {
   maps_.load(map_of(9));
   EXPECT_FALSE(maps_.believes(kFirst, now_));
   EXPECT_FALSE(maps_.may_send(now_)) << "nobody has waited yet";
@@ -98,7 +98,7 @@ TEST_F(ServedMapsTest, OneThatNamesNoMapIsBelievedAfterAWhile) {
   EXPECT_EQ(maps_.map(), map_of(9));
 }
 
-TEST_F(ServedMapsTest, ARestoredMapIsAnotherForWhatCanBePublishedAgainOnly) {
+TEST_F(ServedMapsTest, ARestoredMapIsAnotherMapForRepeatableSourcesOnly) {
   maps_.load(map_of(9, 1));
   maps_.introduce({kFirst, map_of(9, 2)}, {}, now_);
   EXPECT_TRUE(maps_.believes(kFirst, now_));
@@ -115,7 +115,7 @@ TEST_F(ServedMapsTest, ARestoredMapIsAnotherForWhatCanBePublishedAgainOnly) {
   EXPECT_EQ(status(again), Reason::MAP_RESTORED);
 }
 
-TEST_F(ServedMapsTest, WhereNothingIsLostTheNextDaemonIntroducesItself) {
+TEST_F(ServedMapsTest, OverALosslessTransportTheNextDaemonIntroducesItself) {
   ServedMaps maps({.lossless = true});
   maps.load(map_of(9));
   maps.wait_since(now_);

@@ -1,4 +1,4 @@
-// Keyframes of one session until the daemon has settled them.
+// Stores the keyframes of one session until the daemon has settled them.
 #pragma once
 
 #include <cstdint>
@@ -25,22 +25,22 @@ class Spool {
   const std::map<std::uint32_t, Entry>& keyframes() const { return keyframes_; }
   const std::vector<Gap>& gaps() const { return gaps_; }  // in the order in which they were declared
 
-  // The map that the session is in; not known: no daemon has said it yet.
+  // The map that the session is in; not known before a daemon has said it.
   const MapIdentity& map() const { return map_; }
   virtual Status set_map(const MapIdentity& map) = 0;
 
-  // Another run of the source would give other keyframes under the same sequences: the tracking was begun in its midst,
-  // or pairs were dropped since it could not wait.
+  // Notes that another run of the source would give other keyframes under the same sequences, since tracking started in
+  // the middle of it, or pairs may have been dropped.
   virtual Status mark_unrepeatable() { return {}; }
 
-  // As safe as it gets when they return. IO_ERROR.
+  // When they return, the record is as durable as the spool can make it. IO_ERROR.
   virtual Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) = 0;
   virtual Status append_gap(const Gap& gap) = 0;
 
-  // NO_SUCH_FRAME, IO_ERROR; CORRUPT if it has changed.
+  // Returns a keyframe's payload. NO_SUCH_FRAME, IO_ERROR; CORRUPT if it has changed.
   virtual Result<Bytes> read(std::uint32_t sequence) const = 0;
 
-  // What lies below `sequence` is not wanted any more.
+  // Keyframes and gaps below `sequence` are no longer needed and may be removed.
   virtual Status remove_below(std::uint64_t sequence) = 0;
 
  protected:

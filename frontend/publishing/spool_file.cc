@@ -38,7 +38,7 @@ Status read_exactly(int file, std::uint64_t offset, Bytes& bytes, const std::str
     const ssize_t n = ::pread(file, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return io_error("read", path);
-    if (n == 0) return {Reason::TRUNCATED, path + " ends before what is looked for"};
+    if (n == 0) return {Reason::TRUNCATED, path + " is shorter than expected"};
     done += static_cast<std::size_t>(n);
   }
   return {};

@@ -1,4 +1,4 @@
-// The few calls on files that the spool makes, with errors that say what and where.
+// File operations of the spool, with errors that name the operation and the path.
 #pragma once
 
 #include <string>
@@ -14,11 +14,11 @@ Status io_error(const std::string& what, const std::string& path);
 Status write_all(int file, ByteSpan bytes, const std::string& path);
 Result<Bytes> read_all(const std::string& path);
 Result<Bytes> read_at(const std::string& path, std::uint64_t offset, std::size_t bytes);
-// So that a file that was made or renamed in it stays so.
+// Makes the creation and renaming of files in a folder durable.
 Status sync_folder(const std::string& folder);
-// With those above it that are missing; their names are durable then.
+// Creates a folder and its missing parents, durably.
 Status create_folder(const std::string& folder);
-// Whole or not at all.
+// Replaces the content of a file atomically and durably.
 Status replace(const std::string& folder, const std::string& name, ByteSpan bytes);
 
 }  // namespace relmap::publishing::spool_file

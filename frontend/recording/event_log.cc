@@ -61,9 +61,9 @@ std::size_t EventLog::read(std::uint64_t position, std::span<std::uint8_t> bytes
   return got;
 }
 
-ByteSpan EventLog::from(std::uint64_t position, std::size_t least) {
+ByteSpan EventLog::from(std::uint64_t position, std::size_t min_bytes) {
   const std::uint64_t left = bytes_ - std::min(position, bytes_);
-  if (!is_buffered(position, static_cast<std::size_t>(std::min<std::uint64_t>(least, left)))) {
+  if (!is_buffered(position, static_cast<std::size_t>(std::min<std::uint64_t>(min_bytes, left)))) {
     buffer_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kBufferBytes, left)));
     buffer_.resize(read(position, buffer_));
     buffered_at_ = position;
@@ -76,8 +76,8 @@ ByteSpan EventLog::at(std::uint64_t position, std::size_t bytes) {
   return rest.first(std::min(bytes, rest.size()));
 }
 
-// A sync word, or as much of one as the log has left. Where a length claims that one is, far away, the buffer stays:
-// else every false length would cost a buffer.
+// Whether a sync word is at a position, or as much of one as the log has left. The position may come from a false
+// length and be far away, so the buffer is not refilled there: otherwise every false length would cost a read.
 bool EventLog::begins_event(std::uint64_t position) {
   std::array<std::uint8_t, kSyncWord.size()> word{};
   const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(word.size(), bytes_ - std::min(position, bytes_)));
@@ -118,7 +118,7 @@ std::optional<EventLog::Event> EventLog::take_event(std::uint64_t begin) {
   const std::uint64_t end = event->data_at + event->data_bytes;
   position_ = end;
   if (end == bytes_ || begins_event(end)) return event;
-  // Nothing follows where it ends: its lengths may be wrong, and hide others.
+  // No event follows at its end, so its lengths may be wrong and hide other events.
   if (const std::uint64_t hidden = find_sync_word(begin + kSyncWord.size()); hidden < end) {
     position_ = hidden;
     ++damages_;

@@ -1,6 +1,6 @@
-// The events of a log that lcm-logger wrote: each is the sync word 0xEDA1DA01, a number and a time (8 bytes each), the
-// lengths of channel and data (4 bytes each), and these two; big-endian.
-// LCM's own reader believes every length: one event of 2^31 - 1 bytes ends its process.
+// Reads the events of a log that lcm-logger wrote. An event has the sync word 0xEDA1DA01, a number and a time (8 bytes
+// each), the lengths of channel and data (4 bytes each), and channel and data; all big-endian. LCM's own reader trusts
+// every length: one event of 2^31 - 1 bytes ends its process.
 #pragma once
 
 #include <algorithm>
@@ -23,31 +23,32 @@ class EventLog {
  public:
   struct Event {
     std::string channel;
-    std::uint64_t data_at = 0;  // where in the log
+    std::uint64_t data_at = 0;  // position in the log
     std::uint32_t data_bytes = 0;
   };
 
   static Result<EventLog> open(const std::string& path);  // NO_SUCH_FILE
-  // `name` is what messages call it.
+  // `name` is used in messages.
   EventLog(std::unique_ptr<std::istream> in, std::uint64_t bytes, std::string name);
 
-  // The next; nothing at the end. What is damaged is passed over up to the next sync word. At a damaged end, once:
-  // TRUNCATED (in the midst of an event), CORRUPT (no event), IO_ERROR; the message says at which byte.
+  // Returns the next event; nothing at the end. Damage is skipped up to the next sync word. If the end is damaged,
+  // returns once TRUNCATED (in the middle of an event), CORRUPT (no event) or IO_ERROR; the message has the byte.
   Result<std::optional<Event>> next();
 
-  // Its first 64 KiB, more than any message of relmap's; good until the next call of any function.
+  // The first 64 KiB of an event's data, more than any message of relmap has; valid until the next call of any
+  // function.
   ByteSpan data(const Event& event) { return at(event.data_at, std::min(event.data_bytes, kMaxData)); }
 
   const std::string& name() const { return name_; }
-  std::uint64_t damages() const { return damages_; }  // stretches passed over since the beginning
+  std::uint64_t damages() const { return damages_; }  // number of damaged stretches skipped since the beginning
   void rewind();
 
  private:
   static constexpr std::uint32_t kMaxData = 64 * 1024;
   bool is_buffered(std::uint64_t position, std::size_t bytes) const;
   std::size_t read(std::uint64_t position, std::span<std::uint8_t> bytes);
-  // All that the buffer holds from there on, filled anew if that is less.
-  ByteSpan from(std::uint64_t position, std::size_t least);
+  // What the buffer holds from `position` on; it is refilled if that is less than `min_bytes`.
+  ByteSpan from(std::uint64_t position, std::size_t min_bytes);
   ByteSpan at(std::uint64_t position, std::size_t bytes);
   bool begins_event(std::uint64_t position);
   std::uint64_t find_sync_word(std::uint64_t position);
@@ -59,7 +60,7 @@ class EventLog {
   std::string name_;
   std::uint64_t position_ = 0;
   std::uint64_t damages_ = 0;
-  bool failed_ = false;  // the disk
+  bool failed_ = false;  // reading the disk failed
   Bytes buffer_;         // bytes of the log from buffered_at_ on
   std::uint64_t buffered_at_ = 0;
 };

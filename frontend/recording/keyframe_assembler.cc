@@ -9,7 +9,7 @@
 namespace relmap::recording {
 
 namespace {
-constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
+constexpr std::size_t kOverhead = 512;  // approximate memory of an assembly besides its bytes
 }
 
 Result<KeyframePart> read_part(ByteSpan message) {

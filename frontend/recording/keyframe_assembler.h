@@ -1,4 +1,5 @@
-// Recorded parts to payloads, within a bound: beyond it, what is not whole is given up from the lowest sequence on.
+// Assembles recorded parts to payloads. Memory is bounded: beyond the bound, incomplete payloads are dropped, those
+// with the lowest sequences first.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +11,14 @@
 
 namespace relmap::recording {
 
-// The message of RELMAP_KEYFRAME: decode_lcm_part() and check_part().
+// Decodes and checks a message of RELMAP_KEYFRAME (decode_lcm_part(), check_part()).
 Result<KeyframePart> read_part(ByteSpan message);
 
-// Versions of a keyframe with different checksums are put together apart.
+// Versions of a keyframe with different checksums are assembled separately.
 class KeyframeAssembler {
  public:
-  // The payload when this was its last part; nothing while others are missing. The part has passed check_part().
-  // CORRUPT: the payload is whole and fails its checksum; it is dropped.
+  // Adds a part, which must have passed check_part(). Returns the payload if this was its last part; nothing while
+  // others are missing. CORRUPT if the complete payload fails its checksum; it is then dropped.
   Result<std::optional<Bytes>> add(const KeyframePart& part);
 
   static constexpr std::size_t kMaxBytes = std::size_t{64} << 20;

@@ -11,9 +11,9 @@ namespace relmap::recording {
 
 namespace {
 
-constexpr std::size_t kOverhead = 512;       // of a waiting keyframe beside its bytes, about
-constexpr std::size_t kVersion = 48;         // what is remembered of a payload that was whole
-constexpr std::size_t kRemembered = 65'536;  // keyframes whose repeats are known as such
+constexpr std::size_t kOverhead = 512;       // approximate memory of a waiting keyframe besides its bytes
+constexpr std::size_t kVersion = 48;         // bytes of memory for each completed payload
+constexpr std::size_t kRemembered = 65'536;  // number of keyframes whose repeats are recognised
 constexpr std::size_t kMaxGaps = 4096;
 
 }  // namespace
@@ -80,7 +80,7 @@ void KeyframeLog::take(const KeyframePart& part) {
   whole_.insert(version);
   if (conflict) {
     ++left_out_[Reason::SEQUENCE_CONFLICT];
-  } else if (part.sequence >= next_) {  // else it was counted as lost when it was skipped
+  } else if (part.sequence >= next_) {  // otherwise it was counted as lost when it was skipped
     waiting_bytes_ += (*payload)->size() + kOverhead;
     waiting_.emplace(part.sequence, std::move(**payload));
   }
@@ -123,7 +123,7 @@ std::optional<Keyframe> KeyframeLog::give_lowest() {
   return std::nullopt;
 }
 
-// Counts what is missing before it: what the robot had given up, and what was lost on the way.
+// Counts the sequences that are missing before `sequence`: those in gaps, and those lost on the way.
 void KeyframeLog::skip_to(std::uint64_t sequence) {
   while (next_ < sequence) {
     while (!gaps_.empty() && gaps_.begin()->second.to < next_) gaps_.erase(gaps_.begin());

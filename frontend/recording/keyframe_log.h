@@ -1,6 +1,6 @@
-// The keyframes of one session, out of a log that lcm-logger wrote while a robot published them. As from a file of
-// keyframes (frontend/capture/keyframe_file.h) they come in the order of their sequences, each once; on the wire they
-// were in parts, doubled, lost, reordered and sent again.
+// Reads the keyframes of one session from a log that lcm-logger wrote while a robot published them. Like a file of
+// keyframes (frontend/capture/keyframe_file.h), it returns each keyframe once, in the order of sequences, although on
+// the wire they were split, duplicated, lost, reordered and resent.
 #pragma once
 
 #include <cstdint>
@@ -19,22 +19,24 @@ namespace relmap::recording {
 
 class KeyframeLog {
  public:
-  // `choice`: uuid or name of the session; empty: the only one. Reasons: EventLog::open()'s, list_sessions()'s,
-  // choose_session()'s.
+  // `choice` is the uuid or name of the session; empty for the only one. The reasons of EventLog::open(),
+  // list_sessions() and choose_session().
   static Result<KeyframeLog> open(const std::string& path, const std::string& choice = {});
   static Result<KeyframeLog> open(EventLog log, const std::string& choice = {});
 
-  // The next; nothing at the end. After the last one, where the log is damaged to its end: the reason (EventLog::next).
+  // Returns the next keyframe; nothing at the end. If the end of the log is damaged, returns the reason after the last
+  // keyframe (EventLog::next()).
   Result<std::optional<Keyframe>> next();
 
   const RecordedSession& session() const { return session_; }
 
-  // So far, by reason. Keyframes: DATA_LOSS (never whole, or too late), CALIBRATION_CHANGED, a gap's reason;
-  // SEQUENCE_CONFLICT, other versions of keyframes that were whole before; those of decode_keyframe(). Damaged messages
-  // and stretches of the log: CORRUPT and others of decode_lcm_part() and check_part().
+  // What was left out so far, by reason. For keyframes: DATA_LOSS (never complete, or too late), CALIBRATION_CHANGED,
+  // the reason of a gap, SEQUENCE_CONFLICT (another version of a keyframe that was complete before), and the reasons of
+  // decode_keyframe(). For damaged messages and stretches of the log: CORRUPT and the other reasons of
+  // decode_lcm_part() and check_part().
   std::map<Reason, std::uint64_t> left_out() const;
 
-  // Whole keyframes that may wait for one before them.
+  // Maximum size of complete keyframes that wait for an earlier one.
   static constexpr std::size_t kMaxWaitingBytes = std::size_t{64} << 20;
 
  private:
@@ -50,14 +52,14 @@ class KeyframeLog {
   EventLog log_;
   RecordedSession session_;
   bool ended_ = false;
-  Status end_;  // of the log
+  Status end_;  // the error at the end of the log
   KeyframeAssembler assembler_;
-  std::set<std::pair<std::uint32_t, std::uint32_t>> whole_;  // sequence and checksum of what was whole lately
-  std::uint32_t remembered_from_ = 0;                        // the sequence from which on whole_ is complete
-  std::map<std::uint32_t, Bytes> waiting_;                   // whole, by sequence
+  std::set<std::pair<std::uint32_t, std::uint32_t>> whole_;  // sequence and checksum of recently completed keyframes
+  std::uint32_t remembered_from_ = 0;                        // whole_ has all of them from this sequence on
+  std::map<std::uint32_t, Bytes> waiting_;                   // complete payloads, by sequence
   std::size_t waiting_bytes_ = 0;
-  std::map<std::uint32_t, Gap> gaps_;  // by first sequence; those that end at next_ or later
-  std::uint64_t next_;                 // the lowest sequence that was neither given nor skipped
+  std::map<std::uint32_t, Gap> gaps_;  // by first sequence; only those that end at next_ or later
+  std::uint64_t next_;                 // the lowest sequence that was neither returned nor skipped
   std::map<Reason, std::uint64_t> left_out_;
 };
 

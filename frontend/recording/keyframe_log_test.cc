@@ -41,7 +41,7 @@ std::vector<Message> messages_of(const std::vector<Keyframe>& keyframes, std::ui
   return messages;
 }
 
-// What a log gives, to its end.
+// Everything that a log returns up to its end.
 struct Replay {
   std::vector<Keyframe> keyframes;
   Status end;
@@ -94,7 +94,7 @@ class KeyframeLogTest : public testing::Test {
   std::string path_;
 };
 
-TEST_F(KeyframeLogTest, GivesWhatWasPublished) {
+TEST_F(KeyframeLogTest, ReturnsWhatWasPublished) {
   const auto keyframes = drive(20);
   auto messages = messages_of(keyframes);
   messages.insert(messages.begin() + 7, {"CAMERA", Bytes(300'000, 0xed)});  // others' channels
@@ -139,7 +139,7 @@ TEST_F(KeyframeLogTest, ARecordingThatBeganLateIsNotMissingItsBeginning) {
   EXPECT_EQ(replay.left_out, Counts());
 }
 
-TEST_F(KeyframeLogTest, WhatNeverBecameWholeIsSkippedAndCounted) {
+TEST_F(KeyframeLogTest, IncompleteKeyframesAreSkippedAndCounted) {
   const auto keyframes = drive(20);
   std::vector<Message> messages;
   for (const Keyframe& k : keyframes) {
@@ -160,7 +160,7 @@ TEST_F(KeyframeLogTest, WhatNeverBecameWholeIsSkippedAndCounted) {
             (Counts{{Reason::DATA_LOSS, 4}, {Reason::DROPPED_BY_ROBOT, 2}, {Reason::CAPTURE_FAILED, 1}}));
 }
 
-// A front-end that was started again with other options cuts the same keyframe into other parts.
+// A front-end that was restarted with other options splits the same keyframe into other parts.
 TEST_F(KeyframeLogTest, PartsOfAnotherSizeBeginAKeyframeAnew) {
   const auto keyframes = drive(3);
   auto messages = messages_of({keyframes[0]}, 1400);
@@ -227,7 +227,7 @@ TEST_F(KeyframeLogTest, OneOfSeveralSessionsIsChosen) {
   expect_same(replay_written(again[0].session.uuid.to_string()).keyframes, again);
 }
 
-TEST_F(KeyframeLogTest, ALogCutAnywhereGivesWhatIsWholeAndSaysSo) {
+TEST_F(KeyframeLogTest, ATruncatedLogReturnsWhatIsCompleteAndReportsItsEnd) {
   const auto keyframes = drive(4);
   write(messages_of(keyframes, kMaxPartBytes));
   const std::string whole = written();
@@ -247,7 +247,7 @@ TEST_F(KeyframeLogTest, ALogCutAnywhereGivesWhatIsWholeAndSaysSo) {
   EXPECT_EQ(cut.end.message(), "log, byte " + std::to_string(ends[2]) + ": ends within an event");
 }
 
-TEST_F(KeyframeLogTest, WhatIsNoLogOrHoldsNothingIsSaidByName) {
+TEST_F(KeyframeLogTest, OtherFilesAndEmptyLogsAreRefusedByName) {
   EXPECT_EQ(replay_written().end.reason(), Reason::NO_SUCH_FILE);
   EXPECT_EQ(replay(KeyframeLog::open(folder_.string())).end.reason(), Reason::NO_SUCH_FILE);
   EXPECT_EQ(replay_bytes("").end.reason(), Reason::BAD_SIZE);
@@ -267,7 +267,7 @@ TEST_F(KeyframeLogTest, WhatIsNoLogOrHoldsNothingIsSaidByName) {
   EXPECT_FALSE(is_event_log(path_));
 }
 
-// LCM's own reader allocates what such lengths say, or dies of them.
+// LCM's own reader allocates as much as such lengths say, or crashes.
 TEST_F(KeyframeLogTest, EventsOfAbsurdLengthHideNoOthers) {
   const auto keyframes = drive(3);
   write(messages_of(keyframes, kMaxPartBytes));
@@ -282,7 +282,7 @@ TEST_F(KeyframeLogTest, EventsOfAbsurdLengthHideNoOthers) {
   }
 }
 
-TEST_F(KeyframeLogTest, GarbageBetweenEventsIsPassedOver) {
+TEST_F(KeyframeLogTest, GarbageBetweenEventsIsSkipped) {
   const auto keyframes = drive(3);
   write(messages_of(keyframes, kMaxPartBytes));
   const std::string whole = written();
@@ -296,8 +296,9 @@ TEST_F(KeyframeLogTest, GarbageBetweenEventsIsPassedOver) {
   EXPECT_EQ(behind.end.message(), "log, byte " + std::to_string(whole.size()) + ": no event of an LCM log");
 }
 
-// Whatever happens to the file: what comes is what was published, in order, and the rest of the log is still read.
-TEST_F(KeyframeLogTest, DamageTakesOnlyWhatItMeets) {
+// Whatever is damaged in the file, only published keyframes are returned, in order, and the rest of the log is still
+// read.
+TEST_F(KeyframeLogTest, DamageLosesOnlyWhatItHits) {
   const auto keyframes = drive(40);
   write(messages_of(keyframes));
   const std::string whole = written();
@@ -324,7 +325,7 @@ TEST_F(KeyframeLogTest, DamageTakesOnlyWhatItMeets) {
       }
     }
     const Replay replay = replay_bytes(bytes);
-    // A wound of 400 bytes meets two parts at most.
+    // Damage of 400 bytes hits two parts at most.
     EXPECT_GE(replay.keyframes.size(), keyframes.size() - 2 * static_cast<std::size_t>(wounds)) << round;
     std::int64_t last = -1;
     for (const Keyframe& k : replay.keyframes) {
@@ -350,7 +351,7 @@ class CountedBytes : public std::stringbuf {
 };
 
 // Each of 20,000 events claims 300 kB: what is read stays in proportion to the log.
-TEST(EventLogTest, FalseLengthsCostNoMoreThanTheLogIsLong) {
+TEST(EventLogTest, FalseLengthsReadNoMoreThanTheLog) {
   std::string event("\xed\xa1\xda\x01", 4);
   event += std::string(19, '\0') + '\x01' + std::string("\x00\x04\x93\xe0", 4) + 'x';
   ASSERT_EQ(event.size(), 29u);
@@ -366,7 +367,7 @@ TEST(EventLogTest, FalseLengthsCostNoMoreThanTheLogIsLong) {
 }
 
 // Keyframes of 170 kB behind one that comes only when 64 MiB of them wait.
-TEST_F(KeyframeLogTest, WhatComesTooLateForTheWindowIsLost) {
+TEST_F(KeyframeLogTest, KeyframesTooLateForTheWindowAreLost) {
   const std::size_t bytes_each = 170'000;
   Keyframe k = drive(1)[0];
   k.appearance.resize(kMaxAppearance);
@@ -395,7 +396,7 @@ TEST_F(KeyframeLogTest, WhatComesTooLateForTheWindowIsLost) {
 }
 
 // Parts of 512 bytes that announce 256 KiB each.
-TEST(KeyframeAssembler, TakesNoMoreThanItsBoundHoweverMuchIsAnnounced) {
+TEST(KeyframeAssembler, UsesNoMoreThanItsBoundHoweverMuchIsAnnounced) {
   KeyframeAssembler assembler;
   const Bytes payload(kMaxKeyframeBytes, 1);
   KeyframePart part = cut_part({}, 0, payload, 0, kMinPartBytes, 0);

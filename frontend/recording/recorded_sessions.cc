@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaxSessions = 1000;
 
-// The header, once a keyframe of the session is whole.
+// The header, as soon as a keyframe of the session is complete.
 class Census {
  public:
   Status take(const KeyframePart& part) {
@@ -50,7 +50,7 @@ class Census {
   KeyframeAssembler assembler_;
 };
 
-// A terminal must not obey what stands in a log.
+// Removes control characters, so that a log cannot control a terminal.
 std::string printable(const std::string& name) { return check_name("name", name).ok() ? name : "(no name)"; }
 
 std::string describe(const std::vector<RecordedSession>& sessions) {
@@ -65,7 +65,7 @@ std::string describe(const std::vector<RecordedSession>& sessions) {
 
 Result<std::vector<RecordedSession>> list_sessions(EventLog& log) {
   Census census;
-  Status refused;  // the first
+  Status refused;  // the first refusal
   auto event = log.next();
   for (; event.ok() && event->has_value(); event = log.next()) {
     if ((*event)->channel != kKeyframeChannel) continue;

@@ -1,4 +1,4 @@
-// Which sessions a log holds: a robot's keyframes may have been recorded beside those of others.
+// Lists the sessions that a log holds, since a log may have the keyframes of several robots.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 namespace relmap::recording {
 
 struct RecordedSession {
-  SessionHeader header;               // of its first whole keyframe
-  std::uint32_t first = 0, last = 0;  // the sequences of which anything was recorded
+  SessionHeader header;               // of its first complete keyframe
+  std::uint32_t first = 0, last = 0;  // range of the sequences of which anything was recorded
 };
 
-// Sessions with a whole keyframe, in the order in which they begin. Reads all of the log, and rewinds it. The reason
-// there is none: BAD_SIZE (nothing of relmap's is in it), or why what is in it could not be read. BUDGET_EXCEEDED: more
-// than a thousand.
+// Lists the sessions that have a complete keyframe, in the order of their beginnings. Reads the whole log and rewinds
+// it. If there is none: BAD_SIZE if the log has no messages of relmap, otherwise the reason why these could not be
+// read. BUDGET_EXCEEDED if there are more than a thousand.
 Result<std::vector<RecordedSession>> list_sessions(EventLog& log);
 
-// The one with that uuid or name; with an empty choice the only one. INVALID_ARGUMENT if there are several of them,
-// NO_SUCH_SESSION; the message lists them all.
+// Returns the session with that uuid or name, or the only one if `choice` is empty. INVALID_ARGUMENT if there are
+// several, NO_SUCH_SESSION; the message lists all sessions.
 Result<RecordedSession> choose_session(const std::string& log_name, const std::vector<RecordedSession>& sessions,
                                        const std::string& choice);
 

@@ -1,4 +1,4 @@
-// A queue between two threads that holds only so much: who is faster waits.
+// A queue of bounded capacity between two threads: the faster one waits.
 #pragma once
 
 #include <condition_variable>
@@ -16,7 +16,7 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
 
-  // Waits while the queue is full. False: cancelled, the item is gone.
+  // Waits while the queue is full. Returns false, and drops the item, if the queue is cancelled.
   bool push(T item) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return cancelled_ || items_.size() < capacity_; });
@@ -27,9 +27,10 @@ class BoundedQueue {
   }
 
   struct Pushed {
-    bool taken = false;    // false: cancelled
-    bool dropped = false;  // the oldest item made room
+    bool taken = false;    // false if the queue is cancelled
+    bool dropped = false;  // the oldest item was dropped to make room
   };
+  // Does not wait: drops the oldest item if the queue is full.
   Pushed push_dropping_oldest(T item) {
     const std::lock_guard lock(mutex_);
     if (cancelled_) return {};
@@ -40,7 +41,7 @@ class BoundedQueue {
     return {.taken = true, .dropped = full};
   }
 
-  // Waits for an item; nothing once the queue is closed and empty, or cancelled.
+  // Waits for an item. Nothing once the queue is closed and empty, or cancelled.
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return cancelled_ || closed_ || !items_.empty(); });
@@ -51,14 +52,14 @@ class BoundedQueue {
     return item;
   }
 
-  // Nothing more will be pushed; what is held is still given out.
+  // Nothing more will be pushed. pop() still returns the items that are left.
   void close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;
     changed_.notify_all();
   }
 
-  // Both sides give up at once.
+  // Ends all waits at once; the items are lost.
   void cancel() {
     const std::lock_guard lock(mutex_);
     cancelled_ = true;

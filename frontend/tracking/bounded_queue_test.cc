@@ -20,7 +20,7 @@ TEST(BoundedQueue, GivesEverythingInOrder) {
   EXPECT_EQ(next, kItems);
 }
 
-TEST(BoundedQueue, TheOldestMakesRoom) {
+TEST(BoundedQueue, DropsTheOldestItemToMakeRoom) {
   BoundedQueue<int> queue(2);
   for (const int item : {1, 2, 3}) {
     const auto pushed = queue.push_dropping_oldest(item);
@@ -33,7 +33,7 @@ TEST(BoundedQueue, TheOldestMakesRoom) {
   EXPECT_EQ(queue.pop(), std::nullopt);
 }
 
-TEST(BoundedQueue, CancelledBothSidesGiveUp) {
+TEST(BoundedQueue, CancellingEndsTheWaitsOfBothSides) {
   BoundedQueue<int> full(1), empty(1);
   EXPECT_TRUE(full.push(1));
   std::jthread giver([&] { EXPECT_FALSE(full.push(2)); });

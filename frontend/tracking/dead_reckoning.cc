@@ -9,10 +9,10 @@ namespace {
 
 constexpr double kSmoothing = 0.4;     // seconds
 constexpr double kTurnDecay = 0.5;     // seconds
-constexpr double kAcceleration = 1.0;  // m/s^2, of a robot that brakes or pulls away
-constexpr double kSpeedError = 0.05;   // of the speed
-constexpr double kTurnRate = 0.3;      // rad/s: what a turn that nobody saw may come to
-constexpr double kFastTurnRate = 2.0;  // rad/s: what turns a picture into another one
+constexpr double kAcceleration = 1.0;  // m/s^2, of a robot that brakes or accelerates
+constexpr double kSpeedError = 0.05;   // share of the speed
+constexpr double kTurnRate = 0.3;      // rad/s, of a turn that was not measured
+constexpr double kFastTurnRate = 2.0;  // rad/s, of a turn after which the picture looks different
 constexpr double kUnknownSpeed = 1.0;  // m/s
 
 }  // namespace
@@ -29,8 +29,8 @@ DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn, boo
   Vector6 motion = (stale_s_ > 0 ? steady_ : fresh_.value_or(Vector6::Zero())) * dt;
   motion.tail<3>() *= std::exp(-stale_s_ / kTurnDecay) * std::min(1.0, kTurnDecay / dt);
   Step step{SE3::exp(motion)};
-  // A change of speed adds up with the time since the speed was known: the errors of steps have the same sign, and so
-  // have those of turns. Summed over steps, variances must give the square of the whole.
+  // The errors of consecutive steps are correlated: an error of speed or turn rate has the same sign in each. The
+  // variances of the steps must add up to the square of the error over the whole time without vision.
   const auto added = [&](auto error) {
     const double before = error(blind_s_), after = error(blind_s_ + dt);
     return after * after - before * before;

@@ -23,7 +23,7 @@ DeadReckoning steady(const Vector3& velocity, const Vector3& turn = Vector3::Zer
   return reckoning;
 }
 
-TEST(DeadReckoning, ExpectsNothingOfACameraThatItDoesNotKnow) {
+TEST(DeadReckoning, ExpectsNoMotionBeforeTheFirstMeasurement) {
   const DeadReckoning reckoning;
   EXPECT_FALSE(reckoning.knows_velocity());
   const auto step = reckoning.expect(kDt);
@@ -50,7 +50,7 @@ TEST(DeadReckoning, ContinuesAConstantVelocity) {
   EXPECT_NEAR(reckoning.blind_s(), 3, 1e-9);
 }
 
-TEST(DeadReckoning, FollowsTheLastPairAndBridgesByTheLastOnes) {
+TEST(DeadReckoning, PredictsByTheLastPairAndBridgesBySmoothedVelocity) {
   DeadReckoning reckoning = steady({0, 0, 2});
   reckoning.sensed(motion({0, 0, 3}, Vector3::Zero(), kDt), kDt);
   EXPECT_NEAR(reckoning.expect(kDt).T_from_to.t.z(), 0.3, 1e-9);
@@ -60,7 +60,7 @@ TEST(DeadReckoning, FollowsTheLastPairAndBridgesByTheLastOnes) {
   EXPECT_LT(later, 0.25);
 }
 
-TEST(DeadReckoning, TurnsDieDown) {
+TEST(DeadReckoning, RotationDecays) {
   const Vector3 turn{0, 0.5, 0};
   DeadReckoning reckoning = steady({0, 0, 1}, turn);
   double before = rotation_angle(reckoning.expect(kDt).T_from_to.R), sum = before;
@@ -76,7 +76,7 @@ TEST(DeadReckoning, TurnsDieDown) {
   EXPECT_LT(sum, 0.5);  // in all no more than a second's
 }
 
-// However long the steps, their variances add up to those of a speed that is wrong and changes.
+// For steps of any length, the variances add up to the error of a speed that is wrong and changes.
 TEST(DeadReckoning, UncertaintyOfTranslationAddsUpOverSteps) {
   const double speed = 4;
   for (const double dt : {0.02, 0.1, 0.5}) {
@@ -93,7 +93,7 @@ TEST(DeadReckoning, UncertaintyOfTranslationAddsUpOverSteps) {
   }
 }
 
-// Of a turn that nobody saw, and of a gyro's bias: not less for smaller steps.
+// This holds for a turn that was not measured and for a gyro's bias: smaller steps do not give less uncertainty.
 TEST(DeadReckoning, UncertaintyOfRotationAddsUpOverSteps) {
   const double noise = 0.0005, bias = 0.001;
   for (const double dt : {0.02, 0.1, 0.5}) {
@@ -124,7 +124,7 @@ TEST(DeadReckoning, AGivenTurnReplacesTheRotation) {
   }
 }
 
-TEST(DeadReckoning, PicturesThatLookUnlikeMayHaveTurnedFast) {
+TEST(DeadReckoning, PicturesThatLookDifferentWidenTheRotation) {
   const DeadReckoning reckoning = steady({0, 0, 1});
   const auto usual = reckoning.expect(0.2), unlike = reckoning.expect(0.2, nullptr, true);
   EXPECT_EQ(unlike.T_from_to.R, usual.T_from_to.R);

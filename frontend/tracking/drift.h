@@ -10,17 +10,17 @@ namespace relmap::tracking {
 
 struct PosePair {
   SE3 truth;     // T_world_camera
-  SE3 estimate;  // T_odom_camera, in its own world
+  SE3 estimate;  // T_odom_camera
 };
 
 struct Drift {
-  double translation = 0;  // mean over segments: error of the end's position over the length (0.01: 1 %)
-  double rotation = 0;     // mean over segments: radians a metre
+  double translation = 0;  // mean over the segments of the error of the end position / length (0.01 is 1 %)
+  double rotation = 0;     // mean over the segments, radians per metre
   std::size_t segments = 0;
 };
 
-// Of all segments that are `length` metres of true path long, one from each pose that has one: it ends at the first
-// pose at or beyond that length. The world of the estimate plays no part.
+// Measures the drift over all segments of `length` metres of true path. A segment starts at each pose and ends at the
+// first pose at or beyond that length; poses too close to the end start none. The two world frames need not agree.
 Drift measure_drift(std::span<const PosePair> poses, double length);
 
 }  // namespace relmap::tracking

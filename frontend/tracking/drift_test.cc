@@ -7,7 +7,7 @@
 namespace relmap::tracking {
 namespace {
 
-TEST(Drift, IsZeroForAChainThatIsOnlyElsewhere) {
+TEST(Drift, DoesNotDependOnTheWorldFrame) {
   const SE3 elsewhere{so3_exp({0.3, -0.2, 1.0}), {5, 6, 7}};
   std::vector<PosePair> poses;
   for (int i = 0; i < 50; ++i) {

@@ -8,7 +8,7 @@ namespace relmap::tracking {
 namespace {
 
 constexpr std::int64_t kMaxHoleUs = 50'000;
-constexpr double kFirstBias = 0.02;   // rad/s: what a gyro may have when it is switched on
+constexpr double kFirstBias = 0.02;   // rad/s, standard deviation of the bias when a gyro is switched on
 constexpr double kGate = 4;           // sigmas
 constexpr double kMinSeconds = 0.02;  // seconds
 
@@ -29,7 +29,7 @@ void Gyro::add(std::span<const ImuSample> samples) {
 }
 
 void Gyro::forget_before(std::int64_t time_us) {
-  // One before is kept, to interpolate from.
+  // One sample before that time is kept for interpolation.
   while (rates_.size() > 1 && rates_[1].time_us <= time_us) rates_.pop_front();
 }
 
@@ -69,7 +69,7 @@ void Gyro::correct(std::int64_t from_us, std::int64_t to_us, const Matrix3& R_fr
       std::min(kFirstBias * kFirstBias, bias_variance_ + calibration_.gyro_walk * calibration_.gyro_walk * dt);
   const auto mine = turn(from_us, to_us);
   if (!mine || dt < kMinSeconds) return;
-  // Too much bias taken out turns too little, by the excess times the time.
+  // If too little bias was subtracted, the gyro's rotation is too large by the excess times the time.
   const Vector3 excess = so3_log(R_from_to.transpose() * mine->R_from_to) / dt;
   const double noise = calibration_.gyro_noise * calibration_.gyro_noise * dt + sigma * sigma;
   const double variance = noise / (dt * dt);

@@ -50,7 +50,7 @@ TEST(Gyro, IntegratesInTheCamerasAxesBetweenAnyTwoTimes) {
   }
 }
 
-TEST(Gyro, LearnsItsBiasFromVisionAndHoldsTenSecondsWithoutIt) {
+TEST(Gyro, LearnsItsBiasFromVisionAndBridgesTenSecondsWithoutVision) {
   ImuCalibration calibration;
   calibration.R_camera_imu = so3_exp({0.1, -0.2, 1.5});
   const Vector3 bias(0.012, -0.007, 0.004);

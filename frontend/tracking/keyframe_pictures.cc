@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kMinDepth = 0.4;      // metres
 constexpr float kMinDisparity = 0.5F;  // pixels
-constexpr float kPatchScale = 5.0F;    // diameter of a SIFT keypoint that a 9 x 9 patch fits on level 0
+constexpr float kPatchScale = 5.0F;    // diameter of the SIFT keypoint that corresponds to a 9 x 9 patch on level 0
 
 float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
   if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();

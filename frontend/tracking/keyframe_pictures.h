@@ -1,4 +1,4 @@
-// What a keyframe carries of its pictures: the appearance set and the left one itself.
+// What a keyframe carries of its pictures: the appearance set and the left picture itself.
 #pragma once
 
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace relmap::tracking {
 
-// The tracks of `keyframe` described, then detected keypoints, `max_features` in all, with disparities where the right
-// picture has them, `offset` taken off (stereo_offset.h). `pair` is the keyframe's own. May run on any thread.
+// Describes the tracks of `keyframe` and then detected keypoints, `max_features` in all. Features that the right
+// picture shows get a disparity, less `offset` pixels (stereo_offset.h). `pair` is the keyframe's own. Thread-safe.
 std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& keyframe, double offset,
                                               int max_features);
 
-// Of the left eye's picture: nothing, enough to be looked at, or all, in which the map finds again what it knows
-// (Keyframe::picture).
+// The left picture that a keyframe carries (Keyframe::picture): none, a thumbnail, or the whole, in which the map can
+// find its landmarks again.
 enum class KeyframePicture { kNone, kSmall, kWhole };
 Bytes keyframe_picture(vision::ImageView picture, KeyframePicture kind);
 

@@ -6,8 +6,7 @@ namespace relmap::tracking {
 
 namespace {
 
-// Less disparity than this is no depth.
-constexpr double kMinDisparity = 0.2;
+constexpr double kMinDisparity = 0.2;  // pixels; below it there is no depth
 
 }  // namespace
 

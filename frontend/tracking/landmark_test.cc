@@ -9,7 +9,7 @@ namespace {
 
 const StereoCamera kCamera{400, 256, 192, 0.12, 512, 384};
 
-TEST(StereoEstimate, GoesThereAndBack) {
+TEST(StereoEstimate, ConvertsToPixelsAndBack) {
   const Vector3 point{0.7, -0.4, 5};
   Vector3 same;
   Matrix3 covariance;
@@ -24,7 +24,7 @@ TEST(StereoEstimate, GoesThereAndBack) {
   EXPECT_LT((back_covariance - covariance).norm(), 1e-9 * covariance.norm());
 }
 
-TEST(JoinMeasurement, AveragesAndGrowsCertain) {
+TEST(JoinMeasurement, AveragesAndReducesTheCovariance) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0, 0.5);
   const Vector3 truth{0.5, 0.3, 8};

@@ -1,4 +1,4 @@
-// How long things took, in little memory however many there were.
+// Quantiles of durations in constant memory.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace relmap::tracking {
 
-// Within 1 % from 10 us to 100 s; what lies outside counts as that. Not thread-safe.
+// A histogram that is accurate to 1 % from 10 us to 100 s. Durations outside count as the nearer end. Not thread-safe.
 class Latencies {
  public:
   void add(double ms) {
@@ -19,7 +19,7 @@ class Latencies {
   }
   std::uint64_t count() const { return count_; }
 
-  // Milliseconds; share 0.5: the median. 0 where there are none.
+  // In milliseconds; a share of 0.5 is the median. 0 if there are no durations.
   double quantile(double share) const {
     if (count_ == 0) return 0;
     auto left = static_cast<std::uint64_t>(std::lround(share * static_cast<double>(count_ - 1)));

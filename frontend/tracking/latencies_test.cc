@@ -16,7 +16,7 @@ TEST(Latencies, QuantilesAreWithinAPercent) {
   EXPECT_NEAR(latencies.quantile(1), 1000, 10.5);
 }
 
-TEST(Latencies, WhatLiesOutsideCountsAsTheEnds) {
+TEST(Latencies, ValuesOutOfRangeCountAsTheEnds) {
   Latencies latencies;
   latencies.add(0);
   latencies.add(1e9);

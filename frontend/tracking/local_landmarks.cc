@@ -9,11 +9,11 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr int kMaxMissed = 2;          // pairs without a landmark before it is dropped
+constexpr int kMaxMissed = 2;          // consecutive pairs; a landmark that is missed in more is dropped
 constexpr double kForgetting = 0.06;   // pixels added to a landmark's uncertainty at each keyframe
 constexpr double kPassed = 0.1;        // metres before the camera
-constexpr double kAnchorScale = 1.25;  // larger changes of size make a new anchor
-constexpr double kAnchorTurn = 0.2;    // radians, likewise
+constexpr double kAnchorScale = 1.25;  // a larger change of size needs a new anchor
+constexpr double kAnchorTurn = 0.2;    // radians; so does a larger rotation
 
 }  // namespace
 
@@ -72,7 +72,7 @@ void LocalLandmarks::rebase(const SE3& T_keyframe_pair, const Pair& pair, double
                            vision::to_level(static_cast<float>(s.pixel.x()), landmark.level),
                            vision::to_level(static_cast<float>(s.pixel.y()), landmark.level), SE3());
   }
-  // What has come too near or fallen behind is not measured any more, and dropped with the next pair.
+  // Landmarks that are too near or behind the camera are not measured any more; the next note() drops them.
   const auto passed = [](const Landmark& landmark) { return landmark.point.z() < kPassed; };
   std::erase_if(sightings, [&](const Sighting& s) { return passed(landmarks_[s.landmark]); });
   for (Landmark& landmark : landmarks_)
@@ -91,7 +91,8 @@ void LocalLandmarks::replenish(const Pair& pair, const std::vector<std::vector<v
   }
 }
 
-std::vector<TrackMeasurement> LocalLandmarks::state(std::uint32_t sequence, std::span<const Sighting> sightings) {
+std::vector<TrackMeasurement> LocalLandmarks::track_measurements(std::uint32_t sequence,
+                                                                 std::span<const Sighting> sightings) {
   std::vector<TrackMeasurement> tracks;
   for (const Sighting& s : sightings) {
     if (tracks.size() >= kMaxTracks) break;

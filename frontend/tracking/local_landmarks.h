@@ -1,4 +1,4 @@
-// The landmarks round the robot, in the frame of the last keyframe, and how they fare from pair to pair.
+// The landmarks around the robot, in the frame of the last keyframe, with their bookkeeping from pair to pair.
 #pragma once
 
 #include <cstdint>
@@ -23,21 +23,23 @@ class LocalLandmarks {
   void clear() { landmarks_.clear(); }
   double median_depth() const;  // metres; 0 without landmarks
 
-  // Counts who was found; who is missed too often is dropped. The sightings keep pointing at the right ones.
+  // Notes which landmarks were found, and drops those that were missed in three pairs in a row. Updates the indices of
+  // the sightings.
   void note(std::vector<Sighting>& sightings);
 
-  // The frame of `pair`, at `T_keyframe_pair`, becomes the last keyframe: landmarks move to it and take in what was
-  // measured there, with `sigma` pixels a coordinate on level 0. Sightings of landmarks that are passed are dropped.
+  // Makes the frame of `pair`, at `T_keyframe_pair`, the last keyframe: transforms the landmarks to it and updates them
+  // with the sightings, whose standard deviation is `sigma` pixels a coordinate on level 0. Removes the sightings of
+  // landmarks that the robot has passed.
   void rebase(const SE3& T_keyframe_pair, const Pair& pair, double sigma, std::vector<Sighting>& sightings);
 
-  // New ones at `corners` of the pair, but not beside the points to `avoid`, until `wanted` are seen; adds the
-  // sightings of the new. `offset`: pixels to be taken off measured disparities.
+  // Starts new landmarks at `corners` of the pair, away from the points to `avoid`, until `wanted` are seen, and adds
+  // their sightings. `offset` pixels are subtracted from measured disparities.
   void replenish(const Pair& pair, const std::vector<std::vector<vision::Corner>>& corners,
                  std::span<const vision::PicturePoint> avoid, int wanted, double sigma, double offset,
                  std::vector<Sighting>& sightings);
 
-  // As keyframe `sequence` states them; landmarks that are stated for the first time become tracks of it.
-  std::vector<TrackMeasurement> state(std::uint32_t sequence, std::span<const Sighting> sightings);
+  // The sightings as track measurements of keyframe `sequence`. A landmark's first one gives its track a name.
+  std::vector<TrackMeasurement> track_measurements(std::uint32_t sequence, std::span<const Sighting> sightings);
 
  private:
   StereoCamera camera_;

@@ -43,9 +43,9 @@ TEST_F(LocalLandmarksTest, StartWhereBothEyesSeeThem) {
   EXPECT_EQ(landmarks_.median_depth(), 0);
 }
 
-TEST_F(LocalLandmarksTest, MissedThreeTimesAreDroppedAndSightingsKeepPointingAtTheRightOnes) {
+TEST_F(LocalLandmarksTest, AreDroppedWhenMissedThreeTimesAndSightingsAreRenumbered) {
   const std::size_t all = landmarks_.size();
-  landmarks_.state(7, sightings_);  // names them
+  landmarks_.track_measurements(7, sightings_);  // names them
   std::shuffle(sightings_.begin(), sightings_.end(), std::mt19937(1));
   std::vector<Sighting> seen;
   std::vector<TrackId> names;
@@ -62,7 +62,7 @@ TEST_F(LocalLandmarksTest, MissedThreeTimesAreDroppedAndSightingsKeepPointingAtT
   }
 }
 
-TEST_F(LocalLandmarksTest, FoundAgainTheyStay) {
+TEST_F(LocalLandmarksTest, StayWhenFoundAgain) {
   const std::size_t all = landmarks_.size();
   std::vector<Sighting> none;
   for (int round = 0; round < 3; ++round) {
@@ -75,7 +75,7 @@ TEST_F(LocalLandmarksTest, FoundAgainTheyStay) {
   EXPECT_EQ(landmarks_.size(), 0u);
 }
 
-TEST_F(LocalLandmarksTest, MoveToTheNewKeyframeAndGrowCertain) {
+TEST_F(LocalLandmarksTest, MoveToTheNewKeyframeAndReduceTheirCovariance) {
   const SE3 there{so3_exp({0, 0.02, 0}), {0.1, 0, 0.2}};
   const auto pair = wall_.seen(there, 2);
   double before = 0;
@@ -96,7 +96,7 @@ TEST_F(LocalLandmarksTest, MoveToTheNewKeyframeAndGrowCertain) {
   EXPECT_LT(after, 0.8 * before);
 }
 
-TEST_F(LocalLandmarksTest, PassedOnesAreNotStatedAndSoonDropped) {
+TEST_F(LocalLandmarksTest, PassedOnesAreNotInKeyframesAndSoonDropped) {
   const auto pair = wall_.seen(SE3(), 2);
   landmarks_.rebase({Matrix3::Identity(), {0, 0, Wall::kDepth + 0.5}}, *pair, kSigma, sightings_);
   EXPECT_TRUE(sightings_.empty());
@@ -104,8 +104,8 @@ TEST_F(LocalLandmarksTest, PassedOnesAreNotStatedAndSoonDropped) {
   EXPECT_EQ(landmarks_.size(), 0u);
 }
 
-TEST_F(LocalLandmarksTest, TracksKeepTheNameOfTheKeyframeThatFirstStatedThem) {
-  const auto first = landmarks_.state(4, sightings_);
+TEST_F(LocalLandmarksTest, TracksKeepTheNameFromTheirFirstKeyframe) {
+  const auto first = landmarks_.track_measurements(4, sightings_);
   ASSERT_EQ(first.size(), sightings_.size());
   for (std::size_t i = 0; i < first.size(); ++i) {
     EXPECT_EQ(first[i].track, (TrackId{4, static_cast<std::uint32_t>(i)}));
@@ -115,14 +115,14 @@ TEST_F(LocalLandmarksTest, TracksKeepTheNameOfTheKeyframeThatFirstStatedThem) {
   sightings_[0].pixel.z() = kNoRight;
   replenish(140);
   ASSERT_GT(sightings_.size(), old);
-  const auto second = landmarks_.state(5, sightings_);
+  const auto second = landmarks_.track_measurements(5, sightings_);
   for (std::size_t i = 0; i < second.size(); ++i)
     EXPECT_EQ(second[i].track, i < old ? first[i].track : (TrackId{5, static_cast<std::uint32_t>(i)}));
   EXPECT_TRUE(is_mono(second[0].pixel()));
   EXPECT_FALSE(is_mono(second[1].pixel()));
 }
 
-// Coarse ones are lost more often here, and corners of fine levels are never short: still each level gets its due.
+// Although coarse landmarks are lost more often here and fine levels always have corners, each level keeps its share.
 TEST_F(LocalLandmarksTest, LevelsKeepTheirShareThroughManyReplenishments) {
   const auto by_level = [&] {
     std::array<int, 4> counts{};

@@ -13,9 +13,9 @@ namespace {
 constexpr double kMinViewDepth = 0.2;                  // metres
 constexpr int kCoarseSad = 20 * vision::kPatchPixels;  // at most 20 grey levels a pixel
 constexpr float kCornerRatio = 0.85F;
-constexpr std::size_t kEnoughSightings = 48;  // for a pose to search finely from
+constexpr std::size_t kEnoughSightings = 48;  // for a pose from which the fine search starts
 constexpr int kMaxWindow = 10;                // pixels of the level, either way
-constexpr int kFineSearch = 2;                // likewise
+constexpr int kFineSearch = 2;                // pixels of the level, either way
 constexpr float kMinCorrelation = 0.8F;
 
 struct Place {
@@ -49,7 +49,8 @@ Best search_window(const vision::SadPatch& patch, vision::ImageView image, int x
   return best;
 }
 
-// Every other pixel, then the neighbours of the best: the difference falls within two pixels of the right place.
+// Searches every other pixel, then the neighbours of the best one: the difference already falls within two pixels of
+// the right place.
 Best search_coarsely(const vision::SadPatch& patch, vision::ImageView image, int x, int y, int reach) {
   Best best;
   const int x0 = std::max(x - reach, vision::kPatchRadius),
@@ -121,7 +122,7 @@ std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3&
           !vision::patch_fits(image, corner->x, corner->y))
         continue;
       const int sad = patch.coarse.compare(image, corner->x, corner->y);
-      // A neighbouring pixel is no rival.
+      // A neighbour of the best pixel does not count as second best.
       const bool apart = std::abs(best.x - corner->x) > 2 || std::abs(best.y - corner->y) > 2;
       if (sad < best.sad) {
         if (apart) second = best.sad;

@@ -1,4 +1,4 @@
-// Landmarks found again in a new picture.
+// Finds landmarks in a new picture.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,17 @@
 namespace relmap::tracking {
 
 struct Sighting {
-  std::uint32_t landmark = 0;  // index
-  StereoPixel pixel;           // u_right NaN: not found in the right picture
-  float difference = 0;        // of the patches, mean over the pixels, grey levels: the smaller the likelier
+  std::uint32_t landmark = 0;  // its index
+  StereoPixel pixel;           // u_right is NaN if it was not found in the right picture
+  float difference = 0;        // mean absolute difference of the patches, grey levels; smaller is likelier
 };
 
-// How landmarks should look to one eye from a pose: their patches, warped once for all the searches from about there.
+// The patches of landmarks, warped to how one eye should see them from a pose. They serve all searches from about
+// there.
 class ExpectedPatches {
  public:
-  // `T_eye_keyframe`: the pose of that eye, whose picture has `levels` pyramid levels. Landmarks behind the eye,
-  // outside the picture, or of which the patch cannot be had, are not expected.
+  // `T_eye_keyframe` is the pose of that eye, whose picture has `levels` pyramid levels. Landmarks that are behind the
+  // eye, outside the picture, or whose patch cannot be warped, are left out.
   ExpectedPatches(std::span<const Landmark> landmarks, const SE3& T_eye_keyframe, const StereoCamera& camera,
                   int levels);
 
@@ -40,25 +41,27 @@ class ExpectedPatches {
   std::vector<Patch> patches_;
 };
 
-// All of one eye: u_right of the sightings is NaN, and `pixel` is where that eye sees the landmark.
+// The next three functions search the picture of one eye. `pixel` of a sighting is where that eye sees the landmark,
+// and u_right is NaN.
 
-// Whole pixels, everywhere within `radius` pixels (of the picture) of where the pose puts the landmark. Fine levels
-// are left out where a wider radius would cost too much, and once there are enough sightings for a pose: they are found
-// from that.
+// Searches whole pixels within `radius` pixels (of the picture) of where the pose predicts the landmark. It leaves out
+// levels so fine that the radius would cost too much, and all finer levels once there are enough sightings for a pose:
+// align_patches() finds their landmarks from that pose.
 std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
                                     const StereoCamera& camera, const vision::Pyramid& eye, double radius);
 
-// The same against the corners of the picture only, so that it may be wide.
+// The same among the corners of the picture only, so that the radius may be large.
 std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
                                      const StereoCamera& camera, const vision::Pyramid& eye,
                                      const std::vector<std::vector<vision::Corner>>& corners, double radius);
 
-// Where the pose is known to a few pixels: searched within two pixels of the level and aligned to a fraction of one.
-// `in_view`: how many should have been seen from there.
+// For a pose that is known to a few pixels: searches within two pixels of the level and aligns to a fraction of a
+// pixel. `in_view` is set to the number of landmarks that should be seen from the pose.
 std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
                                     const StereoCamera& camera, const vision::Pyramid& eye, std::size_t& in_view);
 
-// Fills in u_right of sightings of the left eye, where the right one has them. `offset`: to be taken off disparities.
+// Fills in u_right of those sightings of the left eye that the right eye sees, too. `offset` pixels are subtracted from
+// measured disparities.
 void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe, const StereoCamera& camera,
                  double offset, const vision::Pyramid& left, const vision::Pyramid& right,
                  std::vector<Sighting>& sightings);

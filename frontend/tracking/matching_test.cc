@@ -119,7 +119,7 @@ TEST_F(Matching, AlignsToATenthOfAPixel) {
   EXPECT_LE(std::sqrt(squares / static_cast<double>(good)), 0.1);
 }
 
-TEST_F(Matching, TakesTheOffsetOffRightPixels) {
+TEST_F(Matching, SubtractsTheOffsetFromDisparities) {
   const SE3 there{Matrix3::Identity(), {0.03, 0, 0.1}};
   const auto pair = wall_.seen(there, 2, 0.6);
   std::size_t in_view = 0;

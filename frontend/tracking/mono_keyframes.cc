@@ -62,7 +62,7 @@ Status run_mono(const vision::Rectifier& rectifier, const SessionHeader& session
   const std::size_t at_once = std::min(threads, kMaxDescribedAtOnce);
   std::optional<std::int64_t> last_us = options.resumed_us;
   std::uint32_t sequence = options.first_sequence;
-  std::deque<std::future<Described>> in_work;  // each waits for its thread when it goes
+  std::deque<std::future<Described>> in_work;  // the destructor of each waits for its thread
   for (bool more = true; more || !in_work.empty();) {
     while (more && in_work.size() < at_once) {
       auto captured = stages.capture();

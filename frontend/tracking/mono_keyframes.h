@@ -14,8 +14,8 @@ namespace relmap::tracking {
 // With fewer features a picture can neither be recognised nor confirmed (docs/method.md, 7).
 inline constexpr std::size_t kMinPlaceFeatures = 30;
 
-// `rectified` is of the session's camera. The appearance set is that of a question (vision/picture_appearance.h), so
-// that words mean the same in both.
+// Makes a keyframe of a picture: an appearance set and a thumbnail. `rectified` is of the session's camera. The
+// appearance set is that of a localisation query (vision/picture_appearance.h), so that words mean the same in both.
 Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std::int64_t time_us,
                        vision::ImageView rectified);
 
@@ -28,25 +28,26 @@ struct MonoPicture {
 };
 
 struct MonoStages {
-  // The next picture, as the left one; nothing ends the run. An error is one picture that cannot be had.
+  // Returns the next picture, as the left one of a pair; nothing ends the run. An error means that one picture is not
+  // available; the run goes on.
   std::function<Result<std::optional<CapturedPair>>()> capture;
-  std::function<Status(MonoPicture&)> publish;  // in order; an error ends the run
-  std::function<void(const Status&)> refused;   // why a picture was left out; the message names it
+  std::function<Status(MonoPicture&)> publish;  // takes the keyframes in order; an error ends the run
+  std::function<void(const Status&)> refused;   // told why a picture was left out; the message names it
 };
 
-// Pictures described at once: one of half a megapixel, to which they are reduced, takes 30 MB meanwhile, so all of them
-// take 240 MB on whatever machine.
+// The number of pictures described at once is limited, since describing a picture of half a megapixel (to which they
+// are reduced) takes 30 MB: 240 MB in all on any machine.
 inline constexpr unsigned kMaxDescribedAtOnce = 8;
 
 struct MonoOptions {
   std::uint32_t first_sequence = 0;
-  std::optional<std::int64_t> resumed_us;  // time of the last keyframe where a session goes on
-  unsigned threads = 0;  // described at once; 0: as many as there are processors. At most kMaxDescribedAtOnce
+  std::optional<std::int64_t> resumed_us;  // time of the last keyframe if a session is continued
+  unsigned threads = 0;  // pictures described at once, at most kMaxDescribedAtOnce; 0 means one per processor
 };
 
-// Every picture becomes a keyframe but one that is not later than the one before (TIME_BACKWARDS), has too few features
-// (TOO_FEW_FEATURES) or is not of the camera's size (BAD_SIZE). Stages are called by the caller's thread. Returns
-// publish()'s error; what a stage throws comes out.
+// Turns each picture into a keyframe, except those that are not later than the one before (TIME_BACKWARDS), have too
+// few features (TOO_FEW_FEATURES) or are not of the camera's size (BAD_SIZE). Stages are called on the caller's thread.
+// Returns publish()'s error; exceptions of a stage propagate.
 Status run_mono(const vision::Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
                 const MonoOptions& options = {});
 

@@ -103,8 +103,8 @@ TEST_F(MonoKeyframes, KeepTheOrderHoweverManyAreDescribedAtOnce) {
   for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(encode_keyframe(runs[0][i]), encode_keyframe(runs[1][i])) << i;
 }
 
-// Each takes memory.
-TEST_F(MonoKeyframes, NoMoreThanSomeAreDescribedAtOnceHoweverManyProcessorsThereAre) {
+// Each picture takes memory while it is described.
+TEST_F(MonoKeyframes, TheNumberDescribedAtOnceIsBoundedOnAnyMachine) {
   std::vector<Result<CapturedPair>> pictures;
   for (int i = 0; i < 3 * static_cast<int>(kMaxDescribedAtOnce); ++i) pictures.emplace_back(picture(i, textured(i)));
   MonoOptions options;
@@ -114,7 +114,7 @@ TEST_F(MonoKeyframes, NoMoreThanSomeAreDescribedAtOnceHoweverManyProcessorsThere
   EXPECT_EQ(most_in_work_, kMaxDescribedAtOnce);
 }
 
-TEST_F(MonoKeyframes, WhatCannotBeAPlaceIsLeftOutByName) {
+TEST_F(MonoKeyframes, UnusablePicturesAreLeftOutByName) {
   std::vector<Result<CapturedPair>> pictures;
   pictures.emplace_back(picture(0, textured(0)));
   pictures.emplace_back(Status(Reason::PICTURE_DAMAGED, "1.jpg"));
@@ -131,7 +131,7 @@ TEST_F(MonoKeyframes, WhatCannotBeAPlaceIsLeftOutByName) {
   EXPECT_EQ(refused_, expected);
 }
 
-TEST_F(MonoKeyframes, GoOnAfterTheLastOne) {
+TEST_F(MonoKeyframes, ContinueAnInterruptedSession) {
   MonoOptions options;
   options.first_sequence = 7;
   options.resumed_us = picture(0, {}).time_us;
@@ -140,7 +140,7 @@ TEST_F(MonoKeyframes, GoOnAfterTheLastOne) {
   EXPECT_EQ(keyframes_[0].sequence, 7u);
 }
 
-TEST_F(MonoKeyframes, EndWhereTheyCannotBePublished) {
+TEST_F(MonoKeyframes, EndWhenPublishingFails) {
   published_ = Status(Reason::IO_ERROR, "no room");
   std::vector<Result<CapturedPair>> pictures;
   for (int i = 0; i < 6; ++i) pictures.emplace_back(picture(i, textured(i)));

@@ -10,13 +10,13 @@ namespace relmap::tracking {
 namespace {
 
 constexpr double kMinDepth = 0.4;      // metres
-constexpr float kMinDisparity = 1.0F;  // pixels: below that the depth is anybody's guess
-constexpr float kApart = 0.012F;       // of the picture's width
-constexpr float kBerth = 0.03F;        // likewise, kept from what is to be avoided
+constexpr float kMinDisparity = 1.0F;  // pixels; below that the depth is too uncertain
+constexpr float kApart = 0.012F;       // distance between landmarks, as a share of the picture's width
+constexpr float kBerth = 0.03F;        // distance from points to avoid, as a share of the picture's width
 constexpr int kRounds = 3;             // of replacing corners that have no stereo match
 
-// Share of the wanted tracks that stand on `level` and those above it: each level has a third of the one below it. Fine
-// levels measure better, coarse ones are found from further off.
+// Share of the wanted tracks on `level` and the coarser levels above it: each level has a third of the one below it.
+// Fine levels measure better, coarse ones are found from further away.
 double share_from(int level, int levels) {
   const double all = 1 - std::pow(1.0 / 3, levels);
   return (std::pow(1.0 / 3, level) - std::pow(1.0 / 3, levels)) / all;
@@ -53,8 +53,8 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std
   std::vector<TakenPoint> all(taken.begin(), taken.end());
   const int levels = pair.left.levels();
   for (int level = levels - 1; level >= 0; --level) {
-    // From the coarsest level on, each may fill up what it and those above it are due: what is finer does not count, or
-    // fine tracks, of which there are always more, would in time be all there is.
+    // From the coarsest level down, each level is filled up to the share of it and the coarser levels together. Tracks
+    // on finer levels do not count toward that: they are always plenty and would in time displace all others.
     std::vector<vision::PicturePoint> here;
     for (const TakenPoint& t : all)
       if (t.level >= level) here.push_back({vision::to_level(t.point.x, level), vision::to_level(t.point.y, level)});

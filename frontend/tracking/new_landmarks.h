@@ -11,7 +11,7 @@
 
 namespace relmap::tracking {
 
-// Where a track goes on.
+// The position of a track that continues.
 struct TakenPoint {
   vision::PicturePoint point;  // pixels of the picture
   int level = 0;
@@ -22,9 +22,10 @@ struct NewLandmark {
   StereoPixel pixel;
 };
 
-// At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on,
-// pixels of the picture) included; where coarse levels have fewer than their share, some more. `sigma`: of a coordinate
-// on level 0, pixels. `offset`: to be taken off disparities, pixels.
+// Starts landmarks at `corners` of the left picture (by level) that have a stereo match, away from the points to
+// `avoid`. Makes up to `wanted` landmarks including those `taken`, and some more if coarse levels have fewer than their
+// share. `sigma` is the standard deviation of a coordinate on level 0 in pixels. `offset` pixels are subtracted from
+// disparities.
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<vision::Corner>>& corners,
                                          const StereoCamera& camera, std::span<const TakenPoint> taken,
                                          std::span<const vision::PicturePoint> avoid, int wanted, double sigma,

@@ -1,4 +1,4 @@
-// A stereo pair made ready to be tracked through.
+// A stereo pair prepared for tracking.
 #pragma once
 
 #include <memory>
@@ -8,15 +8,15 @@
 namespace relmap::tracking {
 
 struct Pair {
-  vision::Image picture;  // the left one, rectified, as it came
-  // Brought to the same exposure (vision/exposure.h). Without levels: that eye sees nothing.
+  vision::Image picture;  // the left one, rectified, with its own exposure
+  // Pyramids of the pictures with normalised exposure (vision/exposure.h); without levels if an eye sees nothing.
   vision::Pyramid left, right;
 
   bool sees_left() const { return left.levels() > 0; }
   bool sees_right() const { return right.levels() > 0; }
 };
 
-// Of one eye, from its rectified picture; the two may be made on two threads. An empty picture sees nothing.
+// The pyramid of one eye's rectified picture; without levels if the picture is empty or blind. Thread-safe.
 vision::Pyramid prepare_eye(vision::ImageView picture);
 
 std::shared_ptr<const Pair> prepare_pair(vision::Image left, vision::ImageView right);

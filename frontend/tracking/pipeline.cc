@@ -25,17 +25,17 @@ struct Captured {
   Clock::time_point arrived;
 };
 
-// One eye made ready.
+// One eye's picture, prepared for tracking.
 struct Eye {
-  Status status;          // why a picture is missing, if that is to be told
-  vision::Image picture;  // rectified; empty: there is none
+  Status status;          // why the picture is missing, if that is to be reported
+  vision::Image picture;  // rectified; empty if there is none
   vision::Pyramid pyramid;
   double ms = 0;
 };
 
 struct LeftEye {
   Eye eye;
-  Captured captured;  // its pictures have gone on
+  Captured captured;  // without its pictures
 };
 
 // "pair 17 (000017.png): ..."
@@ -44,7 +44,7 @@ Status of_pair(const CapturedPair& pair, const Status& status) {
   return {status.reason(), "pair " + std::to_string(pair.index) + picture + ": " + status.message()};
 }
 
-Eye make_ready(const vision::Rectifier& rectifier, vision::Image raw, bool left) {
+Eye prepare(const vision::Rectifier& rectifier, vision::Image raw, bool left) {
   const auto begin = Clock::now();
   Eye eye;
   if (raw.empty()) return eye;
@@ -77,9 +77,9 @@ struct Pipeline::Impl {
   BoundedQueue<Eye> right_ready;
   BoundedQueue<TrackedPair> tracked, described;
 
-  std::mutex mutex;            // of what follows
-  std::exception_ptr failure;  // the first
-  Status ended;                // why publish() wanted no more
+  std::mutex mutex;            // guards the members below
+  std::exception_ptr failure;  // the first exception
+  Status ended;                // publish()'s error
   PipelineSummary summary;
 
   Impl(StereoTracker& given_tracker, const vision::Rectifier& given_rectifier, PipelineStages given_stages,
@@ -110,7 +110,7 @@ struct Pipeline::Impl {
     if (stages.refused) stages.refused(status);
   }
 
-  // A stage until it ends by itself; whatever it throws ends them all.
+  // Runs a stage until it ends. An exception ends all stages.
   template <typename Stage>
   void guarded(Stage stage) noexcept {
     try {
@@ -158,7 +158,7 @@ struct Pipeline::Impl {
   void left_eye() {
     while (auto item = captured.pop()) {
       if (!right_raw.push(std::move(item->pair.right))) break;
-      Eye eye = make_ready(rectifier, std::move(item->pair.left), true);
+      Eye eye = prepare(rectifier, std::move(item->pair.left), true);
       if (eye.status.ok()) eye.status = std::move(item->pair.eye_missing);
       if (!left_ready.push({std::move(eye), std::move(*item)})) break;
     }
@@ -168,7 +168,7 @@ struct Pipeline::Impl {
 
   void right_eye() {
     while (auto raw = right_raw.pop())
-      if (!right_ready.push(make_ready(rectifier, std::move(*raw), false))) break;
+      if (!right_ready.push(prepare(rectifier, std::move(*raw), false))) break;
     right_ready.close();
   }
 
@@ -180,7 +180,7 @@ struct Pipeline::Impl {
       const CapturedPair& named = left->captured.pair;
       if (const Status& missing = left->eye.status.ok() ? right->status : left->eye.status; !missing.ok()) {
         refuse(of_pair(named, missing));
-        // With one eye there is nothing to begin with.
+        // A run cannot begin with one eye.
         if (!begun || (left->eye.picture.empty() && right->picture.empty())) continue;
       }
       auto result = track(*left, *right);
@@ -194,9 +194,9 @@ struct Pipeline::Impl {
     tracked.close();
   }
 
-  // Takes the pictures out of both.
+  // Moves the pictures out of both eyes.
   Result<TrackedPair> track(LeftEye& left, Eye& right) {
-    // The tracker takes pictures of the camera's size; black says as little as none.
+    // The tracker needs a picture of the camera's size; a black one counts as none.
     if (left.eye.picture.empty()) left.eye.picture = vision::Image(rectifier.camera().width, rectifier.camera().height);
     TrackedPair result;
     result.pair = std::make_shared<const Pair>(

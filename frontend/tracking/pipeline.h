@@ -1,11 +1,11 @@
-// The whole way of a stereo pair to a published keyframe, its stages at work on different pairs at once.
+// The pipeline from stereo pairs to published keyframes. Its stages work on different pairs at the same time.
 //
 //   capture -> left eye  -> tracking -> description -> publishing
 //          \-> right eye -/
 //
-// The caller's thread captures; every other stage has a thread of its own, with a bounded queue before it. A slow stage
-// makes those before it wait; a source that cannot wait has its oldest waiting pair dropped instead. Unless pairs are
-// dropped the results are, bit for bit, those of one thread that does one thing after another.
+// The caller's thread captures; each other stage has its own thread, with a bounded queue before it. A slow stage makes
+// the stages before it wait. If the source cannot wait, the oldest waiting pair is dropped instead. Unless pairs are
+// dropped, the results are bit for bit those of a single thread.
 #pragma once
 
 #include <chrono>
@@ -32,72 +32,73 @@ namespace relmap::tracking {
 struct CapturedPair {
   vision::Image left, right;  // raw
   std::int64_t time_us = 0;
-  Status eye_missing = {};                                            // why one is empty, if that is to be counted
-  std::uint64_t index = 0;                                            // in the source
-  std::string picture = {};                                           // the left one's file name; may be empty
-  std::optional<std::chrono::steady_clock::time_point> arrived = {};  // else when capture gives it
+  Status eye_missing = {};   // why one picture is empty, if that is to be counted
+  std::uint64_t index = 0;   // in the source
+  std::string picture = {};  // file name of the left picture; may be empty
+  // When the pair arrived; if not set, when capture() returned it.
+  std::optional<std::chrono::steady_clock::time_point> arrived = {};
 };
 
-// What became of a pair.
+// A pair after tracking.
 struct TrackedPair {
   std::shared_ptr<const Pair> pair;
-  std::int64_t time_us = 0;  // as StampFilter gives it
-  std::uint64_t index = 0;   // as capture gave them
+  std::int64_t time_us = 0;  // after StampFilter
+  std::uint64_t index = 0;   // of the CapturedPair, as is `picture`
   std::string picture;
-  bool both_came = true;  // the pictures of both eyes, whatever they show
+  bool both_came = true;  // both pictures arrived, whatever they show
   PairReport report;
-  std::optional<Keyframe> keyframe;               // complete
-  std::chrono::steady_clock::time_point arrived;  // as capture tells, else when it gave the pair
-  double left_ms = 0, right_ms = 0;               // rectified and made ready
-  double tracking_ms = 0;                         // the report's stages together, and what lies between them
-  double description_ms = 0;                      // 0: no keyframe
-  double until_tracked_ms = 0;                    // since it arrived
+  std::optional<Keyframe> keyframe;               // complete, with appearance and picture
+  std::chrono::steady_clock::time_point arrived;  // of the CapturedPair; if not set, when capture() returned it
+  double left_ms = 0, right_ms = 0;               // rectification and preparation of each eye
+  double tracking_ms = 0;                         // all of tracking; the report's stages are parts of it
+  double description_ms = 0;                      // 0 if the pair is no keyframe
+  double until_tracked_ms = 0;                    // from `arrived` until it was tracked
 };
 
-// Each is called by one thread at a time, never after Pipeline::run() has returned. What one of them throws ends the
-// run and comes out of run().
+// Functions of the caller. Each is called by one thread at a time, and never after Pipeline::run() has returned. An
+// exception ends the run and is rethrown by run().
 struct PipelineStages {
-  // By the caller's thread. The next pair; nothing ends the run, once the pairs before are published. An error is one
-  // pair that cannot be had.
+  // Returns the next pair, on the caller's thread. Nothing ends the run, once the pairs before are published. An error
+  // means that one pair is not available; the run goes on.
   std::function<Result<std::optional<CapturedPair>>()> capture;
-  // By the tracking thread, before a pair of that time is tracked: the place to feed a gyro. May be empty.
+  // Called on the tracking thread before a pair of that time is tracked, for example to feed a gyro. May be empty.
   std::function<void(StereoTracker&, std::int64_t time_us)> before_tracking;
-  // By the publishing thread: every pair tracked, in order. An error ends the run.
+  // Takes each tracked pair in order, on the publishing thread. An error ends the run.
   std::function<Status(TrackedPair&)> publish;
-  // By any stage's thread: why a pair was left out, or one eye of it; the message names it. May be empty.
+  // Told, on any stage's thread, why a pair or one eye of it was left out; the message names the pair. May be empty.
   std::function<void(const Status&)> refused;
 };
 
 struct PipelineOptions {
-  std::size_t waiting = 4;   // pairs before each stage, at most
-  bool drop_oldest = false;  // of the pairs that wait for the eyes, where a new one finds no room
-  int appearance = 300;      // features of a keyframe's appearance set, at most
+  std::size_t waiting = 4;   // maximum number of pairs that wait before each stage
+  bool drop_oldest = false;  // if a new pair finds the first queue full, its oldest pair is dropped
+  int appearance = 300;      // maximum number of features of a keyframe's appearance set
   KeyframePicture picture = KeyframePicture::kWhole;
-  StampFilter stamps;  // where a session goes on: after what was before
+  StampFilter stamps;  // if a session is continued, it starts at the last keyframe's time
 };
 
 struct PipelineSummary {
   std::uint64_t tracked = 0;                // pairs given to publish()
-  std::uint64_t dropped = 0;                // to make room
-  std::map<Reason, std::uint64_t> refused;  // capture's errors and missing eyes, TIME_BACKWARDS, TIME_AHEAD, BAD_SIZE
-  // From when a pair had come, until it was tracked; until publish() was called with its keyframe.
+  std::uint64_t dropped = 0;                // pairs dropped to make room
+  std::map<Reason, std::uint64_t> refused;  // capture()'s errors, missing eyes, TIME_BACKWARDS, TIME_AHEAD, BAD_SIZE
+  // Time from a pair's arrival until it was tracked, and until publish() was called with its keyframe.
   Latencies tracking, keyframes;
 };
 
-// NOT_STEREO: with one eye (baseline 0) there is no measure of metres.
+// NOT_STEREO if `camera` has one eye (baseline 0): metric scale cannot be measured with it.
 Status check_stereo(const StereoCamera& camera);
 
 // Not thread-safe.
 class Pipeline {
  public:
-  // `tracker` and `rectifier` are of the same camera and must outlive it.
+  // `tracker` and `rectifier` are of the same camera and must outlive the pipeline.
   Pipeline(StereoTracker& tracker, const vision::Rectifier& rectifier, PipelineStages stages,
            PipelineOptions options = {});
   ~Pipeline();
 
-  // Once. Returns when all its threads have ended. NOT_STEREO, publish()'s errors.
+  // Runs the pipeline; may be called once. Returns when all its threads have ended. NOT_STEREO, and publish()'s error.
   Status run();
-  // After run(), however it ended.
+  // Valid after run(), however it ended.
   const PipelineSummary& summary() const;
 
  private:

@@ -163,7 +163,7 @@ TEST(Pipeline, GivesTheSameBytesAsOneThread) {
   }
 }
 
-// A suite of its own, which ThreadSanitizer does not run.
+// This is a separate suite, because ThreadSanitizer does not run it.
 TEST(KeyframePictures, AreTheSameBytesAsOfOneThread) {
   for (const KeyframePicture picture : {KeyframePicture::kSmall, KeyframePicture::kWhole}) {
     PipelineOptions options = lean_options();
@@ -227,7 +227,7 @@ TEST(Pipeline, PairsOfOneEyeAreTracked) {
   EXPECT_FALSE(ran.reports[8].one_eye);
 }
 
-TEST(Pipeline, AnEyeThatCannotBeHadIsCountedAndItsPairTrackedByTheOther) {
+TEST(Pipeline, AMissingEyeIsCountedAndItsPairTrackedByTheOther) {
   std::vector<CapturedPair> pairs = drive();
   pairs[4].right = vision::Image();
   pairs[4].eye_missing = {Reason::PICTURE_DAMAGED, "000004.png"};
@@ -247,7 +247,7 @@ TEST(Pipeline, AnEyeThatCannotBeHadIsCountedAndItsPairTrackedByTheOther) {
   }
 }
 
-// One would have to wait for the second, to start anew behind a guess.
+// A run that began with one eye would have to start anew, with a guessed step, when the second eye comes.
 TEST(Pipeline, ARunBeginsWithBothEyes) {
   std::vector<CapturedPair> pairs = drive();
   pairs[0].left = vision::Image();
@@ -260,7 +260,7 @@ TEST(Pipeline, ARunBeginsWithBothEyes) {
   for (std::size_t i = 1; i < ran.reports.size(); ++i) EXPECT_TRUE(ran.reports[i].tracked) << i;
 }
 
-TEST(Pipeline, TheOldestWaitingPairIsDroppedWhereTheSourceCannotWait) {
+TEST(Pipeline, TheOldestWaitingPairIsDroppedIfTheSourceCannotWait) {
   PipelineOptions options = lean_options();
   options.waiting = 2;
   options.drop_oldest = true;
@@ -280,7 +280,7 @@ TEST(Pipeline, ARunThatGoesOnTakesTheLastKeyframesOwnPairAndNoneBefore) {
   EXPECT_EQ(ran.times.front(), drive()[4].time_us);
 }
 
-TEST(Pipeline, EveryPairFindsItsGyroFed) {
+TEST(Pipeline, TheGyroIsFedBeforeEachPair) {
   std::vector<std::int64_t> fed;
   StereoTracker tracker(header());
   Pipeline pipeline(tracker, rectifier(),
@@ -321,7 +321,7 @@ TEST(Pipeline, PublishingThatFailsEndsTheRun) {
   EXPECT_EQ(published, 3);
 }
 
-TEST(Pipeline, WhatAStageThrowsComesOut) {
+TEST(Pipeline, ExceptionsOfAStageAreRethrown) {
   const auto throws = [](PipelineStages stages) {
     StereoTracker tracker(header());
     Pipeline pipeline(tracker, rectifier(), std::move(stages), lean_options());

@@ -14,7 +14,7 @@ namespace relmap::tracking {
 namespace {
 
 constexpr float kMinDisparity = 1.0F;  // pixels
-constexpr double kRatio = 0.8;         // of the distances to the best and the second best (Lowe 2004, 7.1)
+constexpr double kRatio = 0.8;         // distance to the best / to the second best (Lowe 2004, 7.1)
 constexpr int kHypothesis = 12;        // inliers
 constexpr std::size_t kEnough = 30;
 constexpr int kFeatures = 400;
@@ -31,10 +31,10 @@ int distance(const Descriptor& a, const Descriptor& b) {
   return sum;
 }
 
-// A SIFT keypoint lies within about a tenth of the diameter of what it describes.
+// The standard deviation of a SIFT keypoint's position grows with the diameter of the region that it describes.
 double feature_sigma(double scale, double pixel_sigma) { return pixel_sigma * std::max(2.0, 0.2 * scale); }
 
-// One window or poster like another gives a wrong pose with many inliers, all in one place.
+// A window or poster that looks like another gives a wrong pose with many inliers, all in one place of the picture.
 bool spread_out(const std::vector<vision::Correspondence>& matches, const vision::Motion& motion,
                 const StereoCamera& camera) {
   constexpr int kColumns = 8, kRows = 6;
@@ -94,7 +94,7 @@ Result<Recognition> recognise(std::span<const DescribedPoint> points, vision::Im
   options.min_inliers = kHypothesis;
   auto motion = vision::estimate_motion(matches, camera, options);
   if (!motion.ok()) return motion.status();
-  // From a pose close before uncertain points any pixel lies within their gates.
+  // If the pose is close in front of uncertain points, any pixel lies within their gates.
   if (motion->rms_px > kMaxRms * camera.width)
     return {Reason::TOO_FEW_INLIERS, "the matches agree only where the points tell nothing"};
   Status doubt;

@@ -8,7 +8,7 @@ constexpr std::int64_t kSpanUs = 500'000;
 
 void Speedometer::add(std::int64_t time_us, const Vector3& position) {
   const std::int64_t elapsed = entries_.empty() ? 0 : time_us - entries_.back().time_us;
-  // Keep the newest entry that is at least the span old, and what follows it.
+  // Keep the newest entry that is at least as old as the span, and those after it.
   while (entries_.size() > 1 && time_us - entries_[1].time_us >= kSpanUs) entries_.pop_front();
   entries_.push_back({time_us, position});
   if (elapsed <= 0) return;

@@ -10,8 +10,8 @@ namespace relmap::tracking {
 
 inline constexpr double kStandingSpeed = 0.05;  // m/s
 
-// The speed is that over the last half second or more: between neighbouring pictures noise of millimetres would look
-// like motion.
+// The speed is measured over at least the last half second: between consecutive pictures, noise of millimetres would
+// look like motion.
 class Speedometer {
  public:
   void add(std::int64_t time_us, const Vector3& position);
@@ -19,7 +19,7 @@ class Speedometer {
   double speed() const { return speed_; }  // m/s
   std::int64_t driven_us() const { return driven_us_; }
   std::int64_t standing_us() const { return standing_us_; }
-  // At a keyframe: both counters start again.
+  // Resets both times; called at each keyframe.
   void restart() { driven_us_ = standing_us_ = 0; }
 
  private:

@@ -31,7 +31,7 @@ TEST(Speedometer, IsNotFooledByNoise) {
   EXPECT_GT(static_cast<double>(speedometer.standing_us()), 0.9 * 300 * 33'333);
 }
 
-TEST(Speedometer, TakesALongGap) {
+TEST(Speedometer, HandlesALongGap) {
   Speedometer speedometer;
   speedometer.add(0, {0, 0, 0});
   speedometer.add(10'000'000, {0, 0, 5});

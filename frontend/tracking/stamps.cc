@@ -18,7 +18,7 @@ Result<std::int64_t> StampFilter::admit(std::int64_t stamp_us) {
     } else if (time_us <= *last_us_) {
       if (Result<std::int64_t> doubted = doubt(stamp_us, Reason::TIME_BACKWARDS); doubted_ < kConfirmBack)
         return doubted;
-      // The pairs refused took their time.
+      // The time that passed during the refused stamps is kept.
       time_us = *last_us_ + interval_us_ + (stamp_us - *first_doubted_us_);
       offset_us_ = time_us - stamp_us;
     } else {

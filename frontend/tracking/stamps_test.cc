@@ -24,14 +24,14 @@ TEST(StampFilter, RefusesOneStampThatJumpsAndGoesOn) {
   EXPECT_EQ(filter.admit(kBase + 2 * kStep).value(), kBase + 2 * kStep);
 }
 
-TEST(StampFilter, BelievesAClockThatWasSetAhead) {
+TEST(StampFilter, AcceptsAClockThatWasSetAhead) {
   StampFilter filter(kBase);
   EXPECT_EQ(filter.admit(kBase + kHour).reason(), Reason::TIME_AHEAD);
   EXPECT_EQ(filter.admit(kBase + kHour + kStep).value(), kBase + kHour + kStep);
   EXPECT_EQ(filter.admit(kBase + kHour + 2 * kStep).value(), kBase + kHour + 2 * kStep);
 }
 
-TEST(StampFilter, GoesOnWhereItStoodWhenTheClockWasSetBack) {
+TEST(StampFilter, ContinuesWhenTheClockWasSetBack) {
   StampFilter filter;
   std::int64_t last = 0;
   for (int i = 0; i < 3; ++i) last = filter.admit(kBase + i * kStep).value();

@@ -9,9 +9,9 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr double kMaxOffset = 1.0;         // pixels
-constexpr double kShare = 0.05;            // of the information: a landmark brings its error to all its steps
-constexpr double kMaxInformation = 2.5e3;  // so that it can follow a camera that warms up
+constexpr double kMaxOffset = 1.0;  // pixels
+constexpr double kShare = 0.05;     // of the information counts, since a landmark's error is the same in all its steps
+constexpr double kMaxInformation = 2.5e3;  // 1/px^2; a limit, so that the offset can follow a camera that warms up
 constexpr double kMinUsedDepth = 0.2;      // metres
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
@@ -23,7 +23,7 @@ double StereoOffset::sigma() const { return 1 / std::sqrt(information_); }
 
 void StereoOffset::learn(std::span<const vision::Correspondence> correspondences, const SE3& T_reference_camera,
                          const StereoCamera& camera) {
-  // One Gauss-Newton step from the motion found, with the offset as a seventh unknown.
+  // One Gauss-Newton step from the estimated motion, with the offset as a seventh unknown.
   const SE3 T_camera_reference = T_reference_camera.inverse();
   Matrix7 A = Matrix7::Zero();
   Vector7 b = Vector7::Zero();
@@ -35,7 +35,7 @@ void StereoOffset::learn(std::span<const vision::Correspondence> correspondences
     Eigen::Matrix<double, 3, 7> J;
     J.leftCols<3>() = -H;
     J.middleCols<3>(3) = H * skew(p);
-    // A point of disparity d moves by p/d for each pixel of offset, and each right pixel by one.
+    // Per pixel of offset, a point p with disparity d moves by p/d, and each right pixel by one.
     J.col(6) = HR * c.point * (c.point.z() / (camera.f * camera.baseline));
     J(2, 6) -= 1;
     const Matrix3 W = (c.sigma * c.sigma * Matrix3::Identity() + HR * c.point_covariance * HR.transpose()).inverse();

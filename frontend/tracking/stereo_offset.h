@@ -1,10 +1,10 @@
-// What rectification has left between the columns of the two eyes. A turn of one eye by a hundredth of a degree, which
-// every calibration has after a warm day, shifts all disparities of a camera of 700 pixels by a tenth of a pixel, and
-// with them every distance: at 10 pixels of disparity by a hundredth.
+// Estimates the constant error of disparities that the calibration has left. If one eye turns by a hundredth of a
+// degree, as after a warm day, all disparities of a camera with f = 700 pixels shift by a tenth of a pixel, and
+// distances change accordingly: by 1 % at a disparity of 10 pixels.
 //
-// It shows when the camera moves: things grow in the picture by their true distance, and their disparities by the
-// measured one. With disparities too large by delta, a point that comes nearer by the ratio r is seen with a disparity
-// that is too small for its growth by delta (r - 1).
+// The offset becomes visible when the camera moves: a thing grows in the picture with its true distance, and its
+// measured disparity should grow by the same ratio r. If disparities are too large by delta, the disparity of a point
+// that comes nearer falls short of its growth by delta (r - 1).
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,17 @@ namespace relmap::tracking {
 
 class StereoOffset {
  public:
-  double pixels() const { return pixels_; }  // to be taken off measured disparities
-  double sigma() const;
+  double pixels() const { return pixels_; }  // to be subtracted from measured disparities
+  double sigma() const;                      // standard deviation of pixels()
 
-  // From the motion between two keyframes and the correspondences that agreed with it. Both their points and their
-  // pixels have the offset known so far taken off.
+  // Updates the offset from the motion between two keyframes and its inliers. The offset so far must have been
+  // subtracted from both their points and their pixels.
   void learn(std::span<const vision::Correspondence> correspondences, const SE3& T_reference_camera,
              const StereoCamera& camera);
 
  private:
   double pixels_ = 0;
-  double information_ = 25;  // 1/px^2: a fifth of a pixel to begin with
+  double information_ = 25;  // 1/px^2; the prior sigma is a fifth of a pixel
 };
 
 }  // namespace relmap::tracking

@@ -43,7 +43,7 @@ class Drive {
   }
 
  private:
-  // Too large a disparity is too small a u_right; what is known of it is taken off, as tracking does.
+  // A disparity that is too large means a u_right that is too small. The offset so far is subtracted, as tracking does.
   StereoPixel measured(const Vector3& point, const StereoOffset& offset) {
     StereoPixel pixel = kCamera.project(point);
     for (int k = 0; k < 3; ++k) pixel[k] += kNoise * noise_(random_);
@@ -88,7 +88,7 @@ TEST(StereoOffset, StandingStillTeachesNothing) {
   EXPECT_GT(offset.sigma(), 0.9 * before);
 }
 
-// It says little: a yaw looks nearly the same. What is learnt is no further off than it says, and to neither side.
+// Sideways motion tells little, since a yaw looks nearly the same. The estimate must be unbiased and within its sigma.
 TEST(StereoOffset, SidewaysMotionDoesNoHarm) {
   constexpr unsigned kDrives = 12;
   for (const double truth : {0.0, 0.2}) {
@@ -105,7 +105,7 @@ TEST(StereoOffset, SidewaysMotionDoesNoHarm) {
   }
 }
 
-TEST(StereoOffset, OfOneEyeOrNothingNothingIsLearnt) {
+TEST(StereoOffset, LearnsNothingFromOneEyeOrNoCorrespondences) {
   StereoOffset offset;
   offset.learn({}, kForward, kCamera);
   vision::Correspondence mono;

@@ -21,36 +21,37 @@ namespace relmap::tracking {
 
 namespace {
 
-// Searched round an expected place, of the picture's width.
+// Search radii around an expected position, as a share of the picture's width.
 constexpr double kNearRadius = 0.016, kWideRadius = 0.04;
-constexpr double kFarRadius = 0.22;            // likewise, among corners: where little is known of the motion
-constexpr int kMinCoarse = 8;                  // inliers of a coarse pose: the fine search will tell
-constexpr double kCoarseSigma = 0.7;           // pixels of the level: whole pixels
-constexpr double kMaxPredictionSeconds = 0.5;  // seconds that a velocity is believed
-constexpr double kSteady = 0.25;               // seconds that a robot goes on nearly as it did
-constexpr double kMinSeen = 0.3;               // of the landmarks that a pose would show
-constexpr double kManySeen = 40;               // landmarks: that many agree by chance nowhere
-constexpr double kSureSeen = 0.7;              // of the landmarks that a pose would show: no other pose shows as many
-constexpr double kRivalShare = 0.5;       // of a pose's inliers: another pose that gathers as many may be the right one
-constexpr double kElsewhere = 22.5;       // chi-square of six, 99.9 %: two poses are not the same
-constexpr double kFewFound = 0.6;         // of them: look again from the better pose,
-constexpr int kMaxRounds = 8;             // as long as that finds more
-constexpr double kMinCorrelation = 0.7;   // of small pictures whose rotation is believed
-constexpr double kRotationSigma = 0.008;  // radians that near things may pretend
-constexpr double kRecoveryEveryS = 0.5;   // descriptors are dear
-// The M-estimate takes measurements for independent. Errors of patches and of landmarks last from pair to pair: over
-// drives of known truth steps are wrong by this much more variance than it says.
+constexpr double kFarRadius = 0.22;            // among corners, when little is known of the motion
+constexpr int kMinCoarse = 8;                  // inliers of a coarse pose, which the fine search confirms
+constexpr double kCoarseSigma = 0.7;           // pixels of the level: measurements are whole pixels
+constexpr double kMaxPredictionSeconds = 0.5;  // for which a velocity is trusted
+constexpr double kSteady = 0.25;               // seconds for which a robot moves nearly as before
+constexpr double kMinSeen = 0.3;               // share of the landmarks in view that must agree with a pose,
+constexpr double kManySeen = 40;               // but so many suffice: they do not agree by chance
+constexpr double kSureSeen = 0.7;              // share of the landmarks in view with which no other pose can be as good
+constexpr double kRivalShare = 0.5;            // a pose with this share of the best one's inliers may be the right one
+constexpr double kElsewhere = 22.5;            // chi-square with 6 degrees of freedom, 99.9 %: two poses differ
+constexpr double kFewFound = 0.6;              // with a smaller share found, search again from the better pose,
+constexpr int kMaxRounds = 8;                  // as long as that finds more
+constexpr double kMinCorrelation = 0.7;        // of small pictures, for their rotation to be trusted
+constexpr double kRotationSigma = 0.008;       // radians; error of that rotation from near things
+constexpr double kRecoveryEveryS = 0.5;        // descriptors are expensive
+
+// The M-estimator assumes independent measurements, but errors of patches and landmarks persist from pair to pair. On
+// drives with ground truth the variance of steps is larger than estimated by this factor.
 constexpr double kCommonError = 2;
 constexpr int kCorners = 700;  // to start tracks at, on level 0
 constexpr int kRecoveryFeatures = 300;
-constexpr double kUnsensedAfterS = 60;  // longer dead reckoning says nothing
+constexpr double kUnsensedAfterS = 60;  // dead reckoning over a longer time is worthless
 
-// Translations forward over the median depth of the landmarks, to be tried where the speed is not known.
+// Forward translations, as a share of the median depth of the landmarks, that are tried if the speed is not known.
 constexpr std::array kParallaxes{0.04, 0.08, 0.13, -0.04};
 
 double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 
-// Adds the time until it goes to a sum of milliseconds.
+// Adds its lifetime to a sum of milliseconds.
 class Timed {
  public:
   explicit Timed(double& ms) : ms_(ms) {}
@@ -63,14 +64,14 @@ class Timed {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-// Found in a pair and agreed with its motion.
+// The pose of a pair with the sightings behind it.
 struct Tracked {
   SE3 T_keyframe_pair;
   Matrix6 covariance;
   double rms_px = 0, variance_factor = 1;
   std::size_t expected = 0;
   std::vector<Sighting> sightings;  // inliers
-  std::vector<Sighting> disagree;   // found where they do not fit the motion
+  std::vector<Sighting> disagree;   // found, but not in agreement with the motion
   bool one_eye = false;
   bool left = true;  // the sightings are the left eye's
 };
@@ -82,12 +83,12 @@ std::vector<vision::PicturePoint> points_of(std::span<const Sighting> sightings)
   return points;
 }
 
-// How wrong a coordinate measured on level 0 is, from how well measurements agree with the motion they gave.
+// Estimates the standard deviation of a coordinate measured on level 0, from the residuals of the estimated motions.
 class MeasurementNoise {
  public:
   double sigma() const { return sigma_; }  // pixels
   void learn(double variance_factor) {
-    // A step at a time: a pair with much that moves must not upset it.
+    // Small steps, so that a pair with many moving things does not upset the estimate.
     const double factor = std::clamp(variance_factor, 0.25, 4.0);
     sigma_ = std::clamp(sigma_ * std::pow(factor, 0.5 * kRate), 0.08, 1.0);
   }
@@ -116,24 +117,25 @@ struct StereoTracker::Impl {
   std::optional<std::int64_t> resumed_us;  // until the first pair after resume()
   SE3 T_odom_keyframe;
   std::size_t tracks_at_keyframe = 0;
-  std::shared_ptr<const Pair> keyframe_pair;  // of the last keyframe, in case the landmarks are lost
-  Keyframe last_keyframe;                     // likewise: its camera and tracks
-  std::vector<DescribedPoint> remembered;     // its descriptors, once they are needed
+  // The last keyframe, for recovery if the landmarks are lost; its descriptors are made when they are needed.
+  std::shared_ptr<const Pair> keyframe_pair;
+  Keyframe last_keyframe;
+  std::vector<DescribedPoint> remembered;
   std::int64_t next_recovery_us = 0;
-  std::int64_t min_apart_us = 0;  // keyframes, where vision allows it
+  std::int64_t min_apart_us = 0;  // between keyframes, as long as vision allows it
 
   std::shared_ptr<const Pair> previous;
   std::optional<std::int64_t> pair_us;
   SE3 T_keyframe_pair;
   Matrix6 pair_covariance = Matrix6::Zero();   // of T_keyframe_pair
-  bool gyro_held = false;                      // the rotation since vision was lost is the gyro's
-  std::optional<vision::MotionLimits> limits;  // of this pair's pose in the last keyframe's frame
+  bool gyro_held = false;                      // the whole rotation since vision was lost is the gyro's
+  std::optional<vision::MotionLimits> limits;  // for this pair's pose in the last keyframe's frame
   std::uint64_t pairs = 0;
 
   Impl(SessionHeader header, TrackerOptions given)
       : session(std::move(header)), options(given), camera(session.camera), landmarks(camera) {}
 
-  // The right eye sees what the left one would from a baseline to the right.
+  // The pose of an eye in the left camera's frame.
   SE3 T_left_eye(bool left) const { return {Matrix3::Identity(), {left ? 0 : camera.baseline, 0, 0}}; }
 
   std::vector<std::vector<vision::Corner>> corners_of(const vision::Pyramid& eye) {
@@ -151,9 +153,9 @@ struct StereoTracker::Impl {
     return correspondences;
   }
 
-  // Of the left eye, or of the right: `limits` are the left one's.
+  // The pose of one eye from its sightings. `limits` apply to the left eye and are moved to the right one if needed.
   std::optional<vision::Motion> solve(std::vector<Sighting>& sightings, double sigma, bool left,
-                                      const SE3& T_keyframe_guess, int least) {
+                                      const SE3& T_keyframe_guess, int min_inliers) {
     const Timed timed(report.motion_ms);
     std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
       return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
@@ -161,7 +163,7 @@ struct StereoTracker::Impl {
     const auto correspondences = correspond(sightings, sigma);
     vision::MotionOptions motion_options;
     motion_options.seed = pairs;
-    motion_options.min_inliers = least;
+    motion_options.min_inliers = min_inliers;
     motion_options.ordered = true;
     motion_options.limits = limits;
     if (limits) motion_options.limits->T_reference_camera = limits->T_reference_camera * T_left_eye(left);
@@ -170,9 +172,9 @@ struct StereoTracker::Impl {
     return std::move(*motion);
   }
 
-  // From a guess of the pose to what the patches of one eye say, of both where both see.
-  // `radius`: searched, of the picture's width; among `corners` only, if they are given. `other_than`: the guess
-  // becomes better by landmarks only that this does not explain.
+  // Tracks the pair with one eye (and the right one besides the left, if both see), starting from a guess of the pose.
+  // `radius` is the search radius as a share of the picture's width; if `corners` are given, only these are searched.
+  // If `other_than` is given, the coarse pose is estimated only from landmarks that are not inliers of it.
   std::optional<Tracked> track_from(const Pair& pair, bool left, const SE3& T_keyframe_guess, double radius,
                                     const std::vector<std::vector<vision::Corner>>* corners = nullptr,
                                     const Tracked* other_than = nullptr) {
@@ -209,9 +211,9 @@ struct StereoTracker::Impl {
       report.found = std::max(report.found, static_cast<int>(sightings.size()));
       const auto motion = solve(sightings, noise.sigma(), left, T_keyframe_eye, options.min_inliers);
       if (!motion) break;
-      // From a wrong pose chance likenesses are found too, but few of those that should be seen.
-      const double least = std::min(kMinSeen * static_cast<double>(in_view), kManySeen);
-      if (static_cast<double>(motion->inliers.size()) < least) break;
+      // A wrong pose also has matches by chance, but only for few of the landmarks in view.
+      const double min_seen = std::min(kMinSeen * static_cast<double>(in_view), kManySeen);
+      if (static_cast<double>(motion->inliers.size()) < min_seen) break;
       T_keyframe_eye = motion->T_reference_camera;
       Tracked next;
       next.T_keyframe_pair = T_keyframe_eye * T_left_eye(left).inverse();
@@ -237,7 +239,7 @@ struct StereoTracker::Impl {
     return tracked;
   }
 
-  // By descriptors, and from there by patches where they are still there.
+  // Finds the pose by descriptors, and refines it by patches if these are still visible.
   std::optional<Tracked> recover(const Pair& pair, std::int64_t time_us) {
     if (!keyframe_pair || time_us < next_recovery_us) return std::nullopt;
     next_recovery_us = time_us + std::llround(1e6 * kRecoveryEveryS);
@@ -258,9 +260,9 @@ struct StereoTracker::Impl {
     return tracked;
   }
 
-  // `expected` is known from a velocity or from elsewhere: the first pose near it that many landmarks agree with is the
-  // right one. Where it is not known, patterns that repeat (a chequerboard, a facade) agree with a wrong pose as well:
-  // every way of looking is tried until nearly all landmarks are found.
+  // Searches the pose of the pair. `expected` says that T_expected comes from a recent velocity or from the robot: then
+  // the first pose near it with many inliers is the right one. Otherwise repeating patterns (a chequerboard, a facade)
+  // may also agree with a wrong pose, so all ways of searching are tried until nearly all landmarks are found.
   std::optional<Tracked> track(const Pair& pair, const SE3& T_expected, bool expected, bool motion_known,
                                std::int64_t time_us) {
     std::vector<Tracked> found;
@@ -281,7 +283,7 @@ struct StereoTracker::Impl {
     const auto look = [&] {
       if (done(track_from(pair, left, T_expected, kNearRadius))) return;
       if (done(track_from(pair, left, T_expected, kWideRadius))) return;
-      // Nobody knows how fast it goes: perhaps straight on.
+      // The speed is not known; the robot may have moved straight ahead.
       if (!motion_known) {
         for (const double parallax : kParallaxes) {
           const SE3 T = T_expected * SE3{Matrix3::Identity(), {0, 0, parallax * landmarks.median_depth()}};
@@ -294,7 +296,7 @@ struct StereoTracker::Impl {
       if (!found.empty() && expected) return;
       if (left && done(recover(pair, time_us))) return;
       if (found.empty()) return;
-      // What the best pose does not explain may agree on another one, or lead to a better one.
+      // Landmarks that the best pose does not explain may agree on another pose, or lead to a better one.
       const Tracked first = found[best];
       if (done(track_from(pair, left, T_expected, kFarRadius, &corners, &first))) return;
       done(track_from(pair, left, first.T_keyframe_pair, kWideRadius, nullptr, &first));
@@ -305,10 +307,10 @@ struct StereoTracker::Impl {
     return std::move(found[best]);
   }
 
-  // Other poses that explain about as much make this one less certain: by how far off they are.
+  // If other poses explain about as much, widens the covariance of the best one by its distance to them.
   void widen_by_rivals(std::vector<Tracked>& found, std::size_t best) {
     Tracked& chosen = found[best];
-    const double least = kRivalShare * static_cast<double>(chosen.sightings.size());
+    const double min_inliers = kRivalShare * static_cast<double>(chosen.sightings.size());
     const Matrix6 own = chosen.covariance;
     const auto make_room = [&](const SE3& T_keyframe_rival, const Matrix6& covariance) {
       const Vector6 apart = (chosen.T_keyframe_pair.inverse() * T_keyframe_rival).log();
@@ -316,25 +318,25 @@ struct StereoTracker::Impl {
         chosen.covariance += apart * apart.transpose();
     };
     for (std::size_t i = 0; i < found.size(); ++i)
-      if (i != best && static_cast<double>(found[i].sightings.size()) >= least)
+      if (i != best && static_cast<double>(found[i].sightings.size()) >= min_inliers)
         make_room(found[i].T_keyframe_pair, found[i].covariance);
     // Landmarks of one age may agree on one pose, and those of another age on another.
-    if (static_cast<double>(chosen.disagree.size()) >= least) {
+    if (static_cast<double>(chosen.disagree.size()) >= min_inliers) {
       const SE3 T_left_eye = this->T_left_eye(chosen.left);
       const auto rival = solve(chosen.disagree, noise.sigma(), chosen.left, chosen.T_keyframe_pair * T_left_eye,
-                               std::max(options.min_inliers, static_cast<int>(std::ceil(least))));
+                               std::max(options.min_inliers, static_cast<int>(std::ceil(min_inliers))));
       if (rival) make_room(rival->T_reference_camera * T_left_eye.inverse(), own);
     }
   }
 
-  // What a robot can have done that was expected to do `step`: it brakes and pulls away only so fast.
+  // Limits of the poses that a robot can have reached that was expected to move by `step`.
   vision::MotionLimits reachable(const SE3& T_keyframe_expected, const DeadReckoning::Step& step, double dt) const {
     const double blind = dt + reckoning.stale_s();
-    vision::MotionLimits reach{T_keyframe_expected, 0.02 + options.hardest_brake * blind * blind,
+    vision::MotionLimits reach{T_keyframe_expected, 0.02 + options.max_acceleration * blind * blind,
                                0.02 + 4 * std::sqrt(step.covariance(5, 5)) + 2 * std::sqrt(pair_covariance(5, 5))};
-    if (!reckoning.knows_velocity() || blind > kMaxPredictionSeconds) reach.metres += options.fastest * blind;
-    if (!reckoning.knows_velocity()) reach.radians += options.fastest_turn * blind;
-    // To pictures what moves sideways before something near seems to turn.
+    if (!reckoning.knows_velocity() || blind > kMaxPredictionSeconds) reach.metres += options.max_speed * blind;
+    if (!reckoning.knows_velocity()) reach.radians += options.max_turn_rate * blind;
+    // In pictures, a sideways motion in front of something near looks like a rotation.
     if (report.rotation_correlation > 0)
       reach.radians += step.T_from_to.t.norm() / std::max(landmarks.median_depth(), 0.5);
     return reach;
@@ -363,7 +365,8 @@ struct StereoTracker::Impl {
       }
     }
     DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr, seen && !turn);
-    // Across a gap another part of the place may look like this one: the rotation says where to look, and no more.
+    // After a gap another part of the scene may look like this one, so the rotation only guides the search, and its
+    // covariance is that of no measurement.
     if (seen && dt > kMaxPredictionSeconds) step.covariance = reckoning.expect(dt, nullptr, true).covariance;
     report.R_previous_this = step.T_from_to.R;
     return step;
@@ -375,9 +378,9 @@ struct StereoTracker::Impl {
       return false;
     const auto count = static_cast<double>(tracked.sightings.size());
     const double parallax = T_keyframe_pair.t.norm() / std::max(landmarks.median_depth(), 1e-3);
-    // The right eye alone measures nothing that a keyframe can state.
+    // Keyframes state pixels of the left eye, so the right one alone makes none.
     if (!tracked.left) return false;
-    // One eye cannot start new tracks: a keyframe only spends the ones there are.
+    // One eye cannot start new tracks, so keyframes of one eye are rare.
     if (tracked.one_eye) return parallax > 4 * options.parallax && count >= 2 * options.min_inliers;
     if (options.every_pair) return true;
     if (count < options.min_share * static_cast<double>(tracks_at_keyframe) || count < options.min_tracks)
@@ -386,8 +389,8 @@ struct StereoTracker::Impl {
     return parallax > options.parallax || rotation_angle(T_keyframe_pair.R) > options.rotation;
   }
 
-  // The pair becomes the frame that motion is measured from.
-  void settle_on(std::shared_ptr<const Pair> pair, std::size_t tracks) {
+  // Makes the pair the reference from which motion is measured.
+  void set_reference(std::shared_ptr<const Pair> pair, std::size_t tracks) {
     T_odom_keyframe = (T_odom_keyframe * T_keyframe_pair).normalized();
     T_keyframe_pair = SE3();
     pair_covariance.setZero();
@@ -423,13 +426,13 @@ struct StereoTracker::Impl {
       landmarks.clear();
     }
     if (is_vision(source) || sightings.empty()) replenish(landmarks, *pair, avoid, sightings);
-    keyframe.tracks = landmarks.state(keyframe.sequence, sightings);
+    keyframe.tracks = landmarks.track_measurements(keyframe.sequence, sightings);
     if (source != MotionSource::kStart) {
       keyframe.driven_us = speedometer.driven_us();
       keyframe.standing_us = speedometer.standing_us();
     }
     speedometer.restart();
-    settle_on(std::move(pair), keyframe.tracks.size());
+    set_reference(std::move(pair), keyframe.tracks.size());
     keyframe.T_odom_frame = T_odom_keyframe;
     last_keyframe = keyframe;
     report.keyframe = true;
@@ -440,10 +443,10 @@ struct StereoTracker::Impl {
 
   std::optional<Keyframe> first_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us) {
     if (resumed_us && *resumed_us == time_us) {
-      // The last keyframe's own pair: its landmarks again, published with the next keyframe.
+      // This is the last keyframe's own pair: new landmarks start here and are published with the next keyframe.
       std::vector<Sighting> sightings;
       replenish(landmarks, *pair, {}, sightings);
-      settle_on(pair, sightings.size());
+      set_reference(pair, sightings.size());
       report.tracked = true;
       return std::nullopt;
     }
@@ -501,7 +504,7 @@ struct StereoTracker::Impl {
     const bool motion_known = expected || reckoning.knows_velocity();
     report.landmarks = static_cast<int>(landmarks.size());
     limits = reachable(T_keyframe_pair * step.T_from_to, step, dt);
-    // After a gap the landmarks are looked for where they were: the robot may as well have stopped.
+    // After a gap the search starts without translation: the robot may as well have stopped.
     SE3 searched = step.T_from_to;
     if (!expected && dt > kMaxPredictionSeconds && reckoning.blind_s() == 0) searched.t.setZero();
     auto tracked =
@@ -523,7 +526,7 @@ struct StereoTracker::Impl {
     return start_anew(pair, time_us);
   }
 
-  // Behind a keyframe whose step is dead reckoning, if there is anything to see.
+  // Starts anew with a keyframe whose step is dead reckoning, if there is enough to see.
   std::optional<Keyframe> start_anew(const std::shared_ptr<const Pair>& pair, std::int64_t time_us) {
     if (reckoning.blind_s() < options.lost_s) return std::nullopt;
     LocalLandmarks fresh(camera);

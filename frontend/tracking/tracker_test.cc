@@ -117,7 +117,7 @@ vision::Image dark() {
 }
 std::shared_ptr<const Pair> dark_pair() { return prepare_pair(dark(), dark()); }
 
-// Of the step from one keyframe to the next, against what its covariance says.
+// Normalised estimation error squared (NEES) of the step from one keyframe to the next.
 double nees(const Keyframe& from, const Keyframe& to) {
   const SE3 truth = Street::get().step(frame_at(from.time_us), frame_at(to.time_us));
   const SE3 estimate = from.T_odom_frame.inverse() * to.T_odom_frame;
@@ -205,7 +205,7 @@ TEST(StereoTracker, SamePicturesSameBytes) {
     EXPECT_EQ(encode_keyframe(first.keyframes[i]), encode_keyframe(second.keyframes[i]));
 }
 
-TEST(StereoTracker, BridgesABlindMomentWithoutANewStart) {
+TEST(StereoTracker, BridgesAShortLossOfVisionWithoutANewStart) {
   StereoTracker tracker(header());
   feed(tracker, 0, 10);
   ASSERT_TRUE(tracker.feed(dark_pair(), Street::get().time_us(10)).ok());
@@ -241,7 +241,7 @@ TEST(StereoTracker, LeavesOutAPairGivenTwiceWithoutHarmToTheNextPrediction) {
   EXPECT_EQ(after.tracked, 3);
   EXPECT_FALSE(doubled.report().repeated);
 
-  // As if pair 10 had never come.
+  // The same as if pair 10 had been missing.
   feed(whole, 0, 10);
   const Fed same = feed(whole, 11, 14);
   for (std::size_t i = 0; i < after.poses.size(); ++i)
@@ -308,7 +308,7 @@ TEST(StereoTracker, HoldsItsRotationByTheGyroThroughThreeSecondsOfBlack) {
   }
 }
 
-TEST(StereoTracker, CoversTheErrorOfABridgeByItsCovariance) {
+TEST(StereoTracker, TheCovarianceOfABridgeCoversItsError) {
   for (const std::size_t from : {5u, 25u, 80u, 160u, 225u}) {
     StereoTracker tracker(header());
     const Fed before = feed(tracker, from, from + 8);
@@ -345,7 +345,7 @@ TEST(StereoTracker, EveryPairBecomesAKeyframeIfAsked) {
   EXPECT_EQ(feed(tracker, 0, 12).keyframes.size(), 12u);
 }
 
-TEST(StereoTracker, PutsKeyframesOffIfAskedAsLongAsItCan) {
+TEST(StereoTracker, LimitsTheRateOfKeyframesIfAsked) {
   StereoTracker often(header()), rare(header());
   rare.at_most(0.5);
   const std::size_t many = feed(often, 0, 30).keyframes.size();
@@ -420,7 +420,7 @@ TEST(StereoTracker, RefusesAPairFromAnotherPlaceAndGoesOn) {
 
 TEST(StereoTracker, RefusesAMotionThatTheRobotCannotMake) {
   TrackerOptions slow;
-  slow.fastest = 2;
+  slow.max_speed = 2;
   for (const bool in_time : {false, true}) {
     StereoTracker tracker(header(), slow);
     feed(tracker, 0, 1);
@@ -436,7 +436,7 @@ TEST(StereoTracker, RefusesAMotionThatTheRobotCannotMake) {
   EXPECT_EQ(feed(driving, 11, 16).tracked, 5);
 }
 
-TEST(StereoTracker, TakesLongStepsAndAHint) {
+TEST(StereoTracker, TracksLongStepsAndUsesAHint) {
   StereoTracker tracker(header());
   const Fed fed = feed(tracker, 0, 45, 4);  // 0.8 m between pairs
   EXPECT_GE(fed.tracked, static_cast<int>(fed.poses.size()) - 2);
@@ -449,9 +449,9 @@ TEST(StereoTracker, TakesLongStepsAndAHint) {
   EXPECT_LT((hinted.report().T_odom_frame.t - step.t).norm(), 0.05);
 }
 
-// Half a minute later and metres on, where nobody expects it: found by descriptors, or honestly lost; never wrong
-// (three metres on, this street has a facade like the one before).
-TEST(StereoTracker, FindsItselfByDescriptorsAfterAGap) {
+// Half a minute later and metres further, where it is not expected, the tracker recovers by descriptors or says that it
+// is lost; it is never wrong (three metres further, this street has a facade like the one before).
+TEST(StereoTracker, RecoversByDescriptorsAfterAGap) {
   for (const std::size_t gap : {5u, 8u, 15u}) {
     StereoTracker tracker(header());
     const Fed before = feed(tracker, 0, 3);
@@ -467,7 +467,7 @@ TEST(StereoTracker, FindsItselfByDescriptorsAfterAGap) {
   }
 }
 
-// What a tracker says of a step that begins before `first` and ends before `second`, five seconds later.
+// Tracks a step from a view of `first` to a view of `second`, five seconds later.
 Keyframe after_a_gap(const testing_wall::Wall& first, const testing_wall::Wall& second, const SE3& T_wall_second) {
   SessionHeader session = header();
   session.camera = testing_wall::kCamera;
@@ -485,8 +485,8 @@ double nees_of(const Keyframe& keyframe, const SE3& truth) {
   return error.dot(keyframe.step_covariance.ldlt().solve(error));
 }
 
-// The middle of the wall repeats every 24 cm, as a chequerboard does, and the robot has moved by 20 cm: to most of what
-// is near where it was, it seems to have moved by 4 cm the other way.
+// The middle of the wall repeats every 24 cm, as a chequerboard does, and the robot has moved by 20 cm: most of the
+// landmarks near their old position suggest that it has moved by 4 cm the other way.
 TEST(StereoTracker, IsNotDeceivedByAPatternThatRepeatsAfterAGap) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const testing_wall::Wall wall(seed, [](const Vector2& p) {
@@ -500,9 +500,9 @@ TEST(StereoTracker, IsNotDeceivedByAPatternThatRepeatsAfterAGap) {
   }
 }
 
-// Half of the picture says that the robot stood, the other half that it moved by 30 cm: a gate may have opened before
-// it. Nobody can tell which is so; the covariance leaves room for both.
-TEST(StereoTracker, LeavesRoomForTwoPosesThatHalfThePictureAgreesOnEach) {
+// Half of the picture says that the robot stood still, the other half that it moved by 30 cm, as when a gate opens in
+// front of it. The two cannot be told apart, so the covariance must cover both.
+TEST(StereoTracker, TheCovarianceCoversTwoPosesThatHalfThePictureSupportsEach) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const testing_wall::Wall before(seed);
     const testing_wall::Wall after(seed, [](const Vector2& p) { return p.x() < 0 ? Vector2(p.x() + 0.3, p.y()) : p; });
@@ -514,9 +514,9 @@ TEST(StereoTracker, LeavesRoomForTwoPosesThatHalfThePictureAgreesOnEach) {
   }
 }
 
-// Two seconds of black before a bend: some thirty wrong matches once made a pose among the points themselves, where
-// each is so near that it might appear anywhere.
-TEST(StereoTracker, IsNotFoundAmongThePointsThemselves) {
+// Two seconds of darkness before a bend: some thirty wrong matches once gave a pose among the points themselves, where
+// each point is so near that it might appear anywhere.
+TEST(StereoTracker, RejectsPosesAmongThePointsThemselves) {
   StereoTracker tracker(header());
   const Fed before = feed(tracker, 240, 248);
   for (std::size_t i = 248; i < 268; ++i) tracker.feed(dark_pair(), Street::get().time_us(i)).value();
@@ -541,9 +541,8 @@ TEST(StereoTracker, StandsStillWithoutKeyframesAndWithoutDrift) {
   EXPECT_LT(tracker.report().speed, 0.01);
 }
 
-// Eight metres a second, two seconds of black, and then it stands: the speed of before must not stay an article of
-// faith.
-TEST(StereoTracker, FindsAnotherSpeedAfterBlackness) {
+// The robot moves at 8 m/s, sees nothing for two seconds, and then stands: the old speed must not be trusted for ever.
+TEST(StereoTracker, FindsAChangedSpeedAfterDarkness) {
   StereoTracker tracker(header());
   std::int64_t time_us = 1'000'000;
   for (std::size_t i = 0; i <= 20; i += 2, time_us += 50'000)
@@ -578,7 +577,7 @@ TEST(StereoTracker, GoesOnAfterAnInterruption) {
   const SE3 estimate = last.T_odom_frame.inverse() * after.poses.back().estimate;
   EXPECT_LT((Street::get().step(own, 29).t - estimate.t).norm(), 0.05);
 
-  // Not where it stopped: the robot may have been carried.
+  // The robot is not where it stopped; it may have been carried.
   StereoTracker elsewhere(header());
   elsewhere.resume(last);
   const Fed carried = feed(elsewhere, own + 5, own + 6);

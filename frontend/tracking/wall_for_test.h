@@ -1,4 +1,4 @@
-// A wall with a texture of waves before a stereo camera: where each of its points is seen is known exactly.
+// A textured wall in front of a stereo camera: the exact pixel of each of its points is known.
 #pragma once
 
 #include <functional>
@@ -15,26 +15,27 @@ namespace relmap::tracking::testing_wall {
 
 inline const StereoCamera kCamera{300, 159.5, 119.5, 0.12, 320, 240};
 
-// Upright, 3 m before the camera at the identity.
+// An upright wall, 3 m in front of the camera at the identity.
 class Wall {
  public:
   static constexpr double kDepth = 3;  // 12 pixels of disparity
 
-  // Where in the texture a point of the wall is painted from, in metres: itself, unless the wall repeats or has moved.
+  // Maps a point of the wall to the position in the texture that is painted there, in metres. It is the identity,
+  // unless the wall repeats or has moved.
   using PaintedFrom = std::function<Vector2(const Vector2&)>;
 
   explicit Wall(
       unsigned seed, PaintedFrom painted_from = [](const Vector2& p) { return p; })
       : waves_(seed, 7, 60), painted_from_(std::move(painted_from)) {}
 
-  // `offset`: pixels that disparities are too large by.
+  // The pair that a camera sees. All disparities are too large by `offset` pixels.
   std::shared_ptr<const Pair> seen(const SE3& T_wall_camera, unsigned noise_seed, double offset = 0) const {
     const SE3 T_left_right{Matrix3::Identity(), {kCamera.baseline, 0, 0}};
     return prepare_pair(eye(T_wall_camera, 2 * noise_seed, 0),
                         eye(T_wall_camera * T_left_right, 2 * noise_seed + 1, offset));
   }
 
-  // The point that the camera at `T_wall_camera` sees at (u, v), from the camera at the identity.
+  // The point that the camera at `T_wall_camera` sees at (u, v), in the frame of the camera at the identity.
   static Vector3 point(const SE3& T_wall_camera, double u, double v) {
     const Vector3 ray = T_wall_camera.R * Vector3((u - kCamera.cx) / kCamera.f, (v - kCamera.cy) / kCamera.f, 1);
     return T_wall_camera.t + (kDepth - T_wall_camera.t.z()) / ray.z() * ray;

@@ -26,8 +26,8 @@ cv::Mat as_mat(ImageView image) {
 
 cv::Ptr<cv::SIFT> make_sift() { return cv::SIFT::create(0, kLayers, kContrast, kEdge, kSigma, CV_8U); }
 
-// SIFT always doubles what it is given, so the halved picture makes the picture itself its first octave: a quarter of
-// the time and memory, and the keypoints lost are those of the finest scale, which repeat worst.
+// SIFT always doubles its input. Given the halved picture, its first octave is the picture itself: that takes a quarter
+// of the time and memory, and the keypoints lost are those of the finest scale, which are the least repeatable.
 // Doubling moves pixel centres: a position x of the picture is x/2 in SIFT's coordinates of the halved one (exactly:
 // the quarter pixels of halving and doubling cancel), and x + 1/4 in those of the whole one.
 struct Base {
@@ -188,7 +188,7 @@ std::vector<cv::KeyPoint> tracked_keypoints(const Base& base, const cv::Mat& gre
 std::vector<AppearanceFeature> describe(const Base& base, std::vector<cv::KeyPoint>& keypoints) {
   std::vector<AppearanceFeature> features(keypoints.size());
   if (keypoints.empty()) return features;
-  // SIFT may reorder or drop what it is given; its class_id brings each descriptor home.
+  // SIFT may reorder or drop keypoints; class_id assigns each descriptor to its feature.
   for (std::size_t i = 0; i < keypoints.size(); ++i) keypoints[i].class_id = static_cast<int>(i);
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     const cv::Point2f p = base.to_picture(keypoints[i].pt);
@@ -207,7 +207,7 @@ std::vector<AppearanceFeature> describe(const Base& base, std::vector<cv::KeyPoi
   return features;
 }
 
-// The base that yields enough, and its keypoints, strongest first.
+// The base that yields enough keypoints, and these, strongest first.
 std::pair<Base, std::vector<cv::KeyPoint>> detect_enough(const cv::Mat& grey, int wanted) {
   Base base = Base::halved(grey);
   auto keypoints = detect_all(base);

@@ -18,18 +18,19 @@ namespace {
 
 using LensCovariance = Eigen::Matrix<double, Lens::kParameters, Lens::kParameters>;
 
-// What is supposed of a lens that need not be the named one.
+// The prior of a lens that need not be the named one.
 constexpr LensSigmas kFree{.log_f = 0.3, .k1 = 0.2, .k2 = 0.1, .centre = 0.03, .log_aspect = 0.2};
-constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kFree
-// The squared distance of the lens that fits from the one that is named, in sigmas of both. Right calibrations of four
-// recordings had up to 3.2 where enough agrees, those with a focal length 5 % off 8.7 and more.
+constexpr double kHeld = 1e-4;  // sigma of a parameter that is held fixed, as a share of kFree's
+// Squared Mahalanobis distance between the lens that fits and the named one. With enough inliers, correct calibrations
+// of four recordings had up to 3.2, and those with a focal length 5 % off 8.7 and more.
 constexpr double kMaxDistance = 8;
-// By how much the named lens must explain what is seen worse: of the squared residuals, in sigmas, cut off at the gate;
-// at least, and for each correspondence. Where only a few agree, a free lens bends to them.
+// By how much the cost of the named lens (squared residuals in sigmas, cut off at the gate) must exceed that of the
+// lens that fits: at least kMinGain, and kMinGainEach for each correspondence. With few inliers more is needed, since a
+// free lens adapts to them.
 constexpr std::size_t kEnough = 40, kFew = 25;  // inliers
 constexpr double kMinGain = 40, kMinGainEach = 0.4, kMinGainEachOfFew = 2.5;
 
-constexpr double kMaxAgree = 0.75;  // of the correspondences: more do not agree with the named camera by chance
+constexpr double kMaxAgree = 0.75;  // of the correspondences; more do not agree with the named camera by chance
 constexpr double kOtherFocalLengths[] = {0.8, 1.25};
 constexpr int kTrials = 100;
 
@@ -37,14 +38,15 @@ constexpr double kMaxLogBaseline = 0.12;
 constexpr double kSigmas = 5;
 constexpr std::size_t kMinDisparities = 20;
 
-// The named lens is the prior's mean; what is not free is held.
+// The prior's mean is the named lens; its sigmas are those of kFree times `freedom` (1 for a free parameter, kHeld for
+// a fixed one).
 LensPrior prior_of(const StereoCamera& camera, const Lens::Parameters& freedom) {
   LensPrior prior{lens_of(camera)};
   prior.inverse_sigma = lens_sigmas(kFree, camera, camera.f).cwiseProduct(freedom).cwiseInverse();
   return prior;
 }
 
-// One question about the camera: poses and lenses for what its left eye sees.
+// Fits poses and lenses to what the left eye of the camera sees.
 class Fits {
  public:
   Fits(std::span<const Correspondence> left, const StereoCamera& camera, const SE3& T_reference_camera,
@@ -55,21 +57,22 @@ class Fits {
     LensProblem::State state;
     LensCovariance covariance;  // of the lens's parameters
     std::size_t inliers = 0;
-    double cost = 0;  // of all: squared residuals in sigmas, cut off at the gate
+    double cost = 0;  // over all correspondences: squared residuals in sigmas, cut off at the gate
   };
 
-  // From the pose of the named camera; and where little agrees with that, a pose that only chance has made, from those
-  // of a camera with another focal length, if the focal length is free. Nothing: too few agree.
+  // Starts from the pose of the named camera. If few correspondences agree with that pose, it may be a chance one; if
+  // the focal length is free, the fit then also starts from poses of cameras with other focal lengths. Nothing if too
+  // few correspondences agree.
   std::optional<Fit> fit(const Lens::Parameters& freedom) const {
     const LensPrior prior = prior_of(camera_, freedom);
     const LensProblem problem(left_, camera_, prior, options_);
     std::optional<Fit> best;
     const auto start_from = [&](const LensProblem::State& state) {
-      const auto settled = settle_lens(problem, state, problem.inliers(state), kFew);
-      if (!settled.ok() || (best && settled->inliers.size() <= best->inliers)) return;
-      const auto& refined = settled->refined;
+      const auto lens = refine_lens(problem, state, problem.inliers(state), kFew);
+      if (!lens.ok() || (best && lens->inliers.size() <= best->inliers)) return;
+      const auto& refined = lens->fit;
       best = Fit{refined.state, refined.covariance().bottomRightCorner<Lens::kParameters, Lens::kParameters>(),
-                 settled->inliers.size(), cost(problem, refined.state)};
+                 lens->inliers.size(), cost(problem, refined.state)};
     };
     start_from(named_);
     const auto agree = static_cast<double>(problem.inliers(named_).size());
@@ -86,7 +89,7 @@ class Fits {
     return best;
   }
 
-  // Of the named camera, where its pose is.
+  // The cost of the named camera at its pose.
   double named_cost() const {
     const LensPrior prior = prior_of(camera_, Lens::Parameters::Ones());
     return cost(LensProblem(left_, camera_, prior, options_), named_);
@@ -105,12 +108,12 @@ class Fits {
 
 std::string percent(double share) { return number_text(100 * std::abs(share)) + " %"; }
 
-// By the one cause that alone explains most.
+// Names the single cause that alone explains the most.
 Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
   struct Cause {
     Lens::Parameters freedom;
     std::string (*text)(const Lens& lens, const StereoCamera& camera);
-    double allowance = 0;  // of squared residuals, since it has more freedom
+    double allowance = 0;  // added to the cost of a cause with more free parameters
   };
   const auto focal_length = [](const Lens& lens, const StereoCamera& named) {
     return "a focal length " + percent(lens.f / named.f - 1) + (lens.f > named.f ? " longer" : " shorter");
@@ -135,18 +138,18 @@ Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
   causes[1].freedom[Lens::kK1] = causes[1].freedom[Lens::kK2] = 1;
   causes[2].freedom[Lens::kCx] = causes[2].freedom[Lens::kCy] = 1;
   causes[3].freedom[Lens::kLogF] = causes[3].freedom[Lens::kLogAspect] = 1;
-  std::optional<double> least;
+  std::optional<double> min_cost;
   std::string text = "another lens";
   for (const Cause& cause : causes) {
     const auto fit = fits.fit(cause.freedom);
-    if (!fit || (least && fit->cost + cause.allowance >= *least)) continue;
-    least = fit->cost + cause.allowance;
+    if (!fit || (min_cost && fit->cost + cause.allowance >= *min_cost)) continue;
+    min_cost = fit->cost + cause.allowance;
     text = cause.text(fit->state.lens, camera);
   }
   return {Reason::WRONG_CALIBRATION, text};
 }
 
-// disparity = scale * expected + offset, robustly: an offset is what a turned eye makes, and no baseline.
+// Fits measured = scale * expected + offset robustly. A wrong baseline is a scale; a yaw of one eye makes an offset.
 struct Disparity {
   double expected, measured, sigma;  // pixels
 };
@@ -162,7 +165,7 @@ Status check_baseline(const std::vector<Disparity>& disparities) {
     for (const Disparity& d : disparities) {
       const Vector2 row(d.expected, 1);
       const double residual = (d.measured - row.dot(line)) / d.sigma;
-      // Cauchy's, with a scale that keeps what is a fifth off in the beginning.
+      // Cauchy's weight; its scale keeps disparities in the fit that are a fifth off at first.
       const double weight = 1 / (1 + residual * residual / 9);
       information += weight / (d.sigma * d.sigma) * row * row.transpose();
       right_side += weight / (d.sigma * d.sigma) * d.measured * row;
@@ -172,7 +175,7 @@ Status check_baseline(const std::vector<Disparity>& disparities) {
   }
   const double variance = std::max(1.0, squares / static_cast<double>(disparities.size() - 2));
   const double sigma = std::sqrt(variance * information.inverse()(0, 0));
-  if (!(line[0] > 0.1)) return {};  // they have nothing to do with each other
+  if (!(line[0] > 0.1)) return {};  // measured and expected disparities are unrelated
   const double log_scale = std::log(line[0]);
   if (!(std::abs(log_scale) > std::max(kMaxLogBaseline, kSigmas * sigma / line[0]))) return {};
   return {Reason::WRONG_CALIBRATION, "a baseline " + percent(line[0] - 1) + (line[0] > 1 ? " longer" : " shorter")};
@@ -212,7 +215,7 @@ Status check_camera(std::span<const Correspondence> correspondences, const Stere
     const StereoPixel expected = camera.project(p);
     if ((expected - c.pixel).head<2>().norm() > options.gate_sigmas * c.sigma) continue;
     const double disparity = expected.x() - expected.z();
-    // What is known badly of a point's depth is so of its disparity, too.
+    // An uncertain depth makes the expected disparity uncertain, too.
     const double depth_sigma =
         std::sqrt((T_camera_reference.R * c.point_covariance * T_camera_reference.R.transpose())(2, 2));
     disparities.push_back({disparity, c.pixel.x() - c.pixel.z(), std::hypot(c.sigma, disparity * depth_sigma / p.z())});

@@ -1,5 +1,5 @@
-// Whether a picture was taken by the camera that is named for it. What it shows of a place whose shape is known tells:
-// pose and lens are estimated together, and the lens is compared.
+// Checks whether a picture was taken by the camera that is named for it: pose and lens are estimated together from
+// points of known position, and the lens is compared with the named camera.
 #pragma once
 
 #include <span>
@@ -11,12 +11,15 @@
 
 namespace relmap::vision {
 
-// Of correspondences that were found without the camera (by what they look like), and the pose that was found with it.
-// WRONG_CALIBRATION, whose message is what would fit: "a focal length 5 % longer". Found are a focal length more than
-// about 4 % off, a principal point 1.5 to 2 % of the longer side off, a distortion that is left in and moves the
-// picture's corners by 6 % of their distance from the centre (a picture that was not rectified, or was with another
-// calibration), a baseline 13 % off. Ok: all is well, or what is seen does not tell (few correspondences, a wall seen
-// from the front). `camera`: rectified, f known; baseline 0: mono. `map_camera`: that saw the place, with a baseline.
+// WRONG_CALIBRATION if the correspondences contradict `camera`; the message says what would fit, as in "a focal length
+// 5 % longer". Ok if they agree, or cannot tell (few correspondences, a wall seen from the front). It detects a focal
+// length that is more than about 4 % off, a principal point off by 1.5 to 2 % of the longer side, remaining distortion
+// that moves the picture's corners by 6 % of their distance from the centre (a picture that was not rectified, or was
+// rectified with another calibration), and a baseline that is 13 % off.
+//
+// `correspondences` must have been found without the camera, by appearance. `camera` is rectified and has a known f; a
+// baseline of 0 means mono. `T_reference_camera` is the pose that was estimated with `camera`. `map_camera` is the
+// stereo camera that saw the place.
 Status check_camera(std::span<const Correspondence> correspondences, const StereoCamera& camera,
                     const SE3& T_reference_camera, const StereoCamera& map_camera, const MotionOptions& options = {});
 

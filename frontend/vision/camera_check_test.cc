@@ -53,7 +53,7 @@ Status check(const std::vector<Correspondence>& seen, const StereoCamera& camera
   return motion.ok() ? check_camera(seen, camera, motion->T_reference_camera, kCamera) : motion.status();
 }
 
-// Of ten scenes: in how many the camera is found to be another one.
+// In how many of ten scenes check_camera() contradicts the camera.
 int contradicted(const Scene& scene, const StereoCamera& camera) {
   int count = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
@@ -72,7 +72,7 @@ StereoCamera one_eye(StereoCamera camera) {
   return camera;
 }
 
-TEST(CameraCheck, PicturesThatWereStretchedAreContradicted) {
+TEST(CameraCheck, StretchedPicturesAreFound) {
   Scene scene;
   for (const double aspect : {0.85, 1.06, 1.17}) {
     scene.lens.aspect = aspect;
@@ -92,7 +92,7 @@ TEST(CameraCheck, TheRightCameraPasses) {
     }
 }
 
-TEST(CameraCheck, ACameraAsGoodAsCalibrationsArePasses) {
+TEST(CameraCheck, ACameraWithUsualCalibrationErrorsPasses) {
   Scene scene;
   scene.lens.f *= 1.01;
   scene.lens.cx += 2;
@@ -152,7 +152,7 @@ TEST(CameraCheck, AnOffsetOfAllDisparitiesIsNoBaseline) {
 }
 
 // From the front a wall looks the same from near with a wide lens and from far with a long one.
-TEST(CameraCheck, WhatDoesNotTellIsNoContradiction) {
+TEST(CameraCheck, ViewsThatCannotTellPass) {
   Scene wall;
   wall.wall = true;
   for (const double slope : {0.0, 0.3})
@@ -173,8 +173,8 @@ TEST(CameraCheck, WhatDoesNotTellIsNoContradiction) {
   EXPECT_TRUE(check_camera({}, kCamera, {}, kCamera).ok());
 }
 
-// Correspondences of chance alone are no camera's.
-TEST(CameraCheck, ChanceIsNoContradiction) {
+// Correspondences of chance do not contradict a camera.
+TEST(CameraCheck, CorrespondencesOfChancePass) {
   Scene chance;
   chance.wrong = 1;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {

@@ -14,11 +14,11 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr std::size_t kMaxCorners = 4000;  // of a picture, that others are compared with
-constexpr float kApart = 8;                // pixels between corners that are looked for
+constexpr std::size_t kMaxCorners = 4000;  // candidates in a picture
+constexpr float kApart = 8;                // pixels between corners to match, at least
 constexpr int kSamePlace = 2;              // pixels
 constexpr int kSurroundings = 12;          // pixels to each side
-constexpr double kMinAround = 0.6;         // of their correlation: what is slanted or partly hidden differs
+constexpr double kMinAround = 0.6;  // correlation of the surroundings; slanted or partly hidden ones differ somewhat
 
 struct Eye {
   Image picture;
@@ -40,25 +40,25 @@ bool near(const Corner& a, const Corner& b, int columns, int rows) {
   return std::abs(a.x - b.x) <= columns && std::abs(a.y - b.y) <= rows;
 }
 
-// The corner of `to` that looks like `corner` of `from`, where no other does.
+// The only corner of `to` that looks like `corner` of `from`; null if there is none, or if several do.
 const Corner* find(const Corner& corner, const Eye& from, const Eye& to, int columns, int rows, float uniqueness) {
   const SadPatch patch(from.picture, corner.x, corner.y);
   const Corner* best = nullptr;
-  int least = std::numeric_limits<int>::max(), second = least;
+  int min_sad = std::numeric_limits<int>::max(), second = min_sad;
   for (const Corner& candidate : to.corners) {
     if (!near(candidate, corner, columns, rows)) continue;
     const int sad = patch.compare(to.picture, candidate.x, candidate.y);
-    if (sad < least) {
-      if (best && !near(*best, candidate, kSamePlace, kSamePlace)) second = least;
-      best = &candidate, least = sad;
+    if (sad < min_sad) {
+      if (best && !near(*best, candidate, kSamePlace, kSamePlace)) second = min_sad;
+      best = &candidate, min_sad = sad;
     } else if (sad < second && !near(*best, candidate, kSamePlace, kSamePlace)) {
       second = sad;
     }
   }
-  return static_cast<float>(least) < uniqueness * static_cast<float>(second) ? best : nullptr;
+  return static_cast<float>(min_sad) < uniqueness * static_cast<float>(second) ? best : nullptr;
 }
 
-// Normalised, of what surrounds the two places: patches that look alike by chance stand in other surroundings.
+// Normalised correlation of the surroundings of two places: patches that look alike by chance have different ones.
 double correlation_around(const Image& left, const Corner& corner, const Image& right, float x, float y) {
   double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
   for (int dy = -kSurroundings; dy <= kSurroundings; ++dy)

@@ -30,7 +30,7 @@ TEST(CornerMatch, FindsAShiftInAnyDirection) {
   }
 }
 
-TEST(CornerMatch, KeepsToWhatIsSearched) {
+TEST(CornerMatch, SearchesOnlyWithinItsRange) {
   std::mt19937 random(3);
   const auto [left, right] = seen_twice(Waves(4, 6, 60), random, 320, 240, -30, 12);
   EXPECT_LE(match_corners(left, right, {.rows = 0.04F}).size(), 10u);     // 9 rows

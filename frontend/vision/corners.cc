@@ -18,12 +18,12 @@ std::vector<cv::KeyPoint> fast(ImageView image, int threshold) {
   return keypoints;
 }
 
-// In most pictures the number of corners falls about as the inverse square of the threshold, in some much faster: steps
-// small enough not to overshoot in those.
+// In most pictures the number of corners falls about as the inverse square of the threshold, in some much faster. Steps
+// are small enough not to overshoot in those.
 int steered(int threshold, std::size_t found, int wanted, const CornerOptions& options) {
   const double ratio = std::cbrt((static_cast<double>(found) + 1) / (wanted + 1.0));
   const int next = static_cast<int>(std::lround(threshold * std::clamp(ratio, 0.7, 1.3)));
-  return std::clamp(next, options.lowest_threshold, options.highest_threshold);
+  return std::clamp(next, options.min_threshold, options.max_threshold);
 }
 
 }  // namespace
@@ -50,7 +50,7 @@ float harris_score(ImageView image, int x, int y) {
 
 CornerDetector::CornerDetector(const CornerOptions& options) : options_(options) {
   options_.border = std::max(options_.border, 4);
-  thresholds_.fill(std::clamp(kStartThreshold, options_.lowest_threshold, options_.highest_threshold));
+  thresholds_.fill(std::clamp(kStartThreshold, options_.min_threshold, options_.max_threshold));
 }
 
 std::vector<std::vector<Corner>> CornerDetector::detect(const Pyramid& pyramid) {
@@ -61,7 +61,7 @@ std::vector<std::vector<Corner>> CornerDetector::detect(const Pyramid& pyramid) 
         thresholds_[static_cast<std::size_t>(std::min<int>(level, static_cast<int>(thresholds_.size()) - 1))];
     const int wanted = std::max(20, options_.wanted >> level);
     auto keypoints = fast(image, threshold);
-    // A dark or blurred picture must not be left without corners for the time that steering takes.
+    // A dark or blurred picture must give corners at once, not only after the threshold has adapted.
     for (int attempt = 0; attempt < 2 && static_cast<int>(keypoints.size()) < wanted / 2; ++attempt) {
       const int lower = steered(threshold, keypoints.size(), wanted, options_);
       if (lower >= threshold) break;

@@ -13,11 +13,10 @@ namespace relmap::vision {
 namespace {
 
 constexpr int kMinCorners = 30;
-constexpr double kMinShare = 0.3;   // of the corners, that agree
-constexpr double kMaxStartYaw = 3;  // degrees of yaw to either side, from which the search begins
-constexpr int kStarts = 12;         // to either side
-constexpr double kFirstTolerance = 30,
-                 kLastTolerance = 0.5;  // pixels: what counts as agreement, at the beginning and at least
+constexpr double kMinShare = 0.3;   // of the corners must agree
+constexpr double kMaxStartYaw = 3;  // degrees; searches start from yaws up to this to either side
+constexpr int kStarts = 12;         // starts to either side
+constexpr double kFirstTolerance = 30, kLastTolerance = 0.5;  // pixels of residual, first and last scale of the kernel
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
@@ -33,7 +32,7 @@ class Fit {
  public:
   Fit(const std::vector<MovedCorner>& corners, const StereoCamera& camera) : corners_(corners), camera_(camera) {}
 
-  // Two residuals and their derivatives by turn, T and zero. False: behind the camera.
+  // Two residuals and their derivatives by rotation, T and zero. False if the point is behind the camera.
   bool linearise(const MovedCorner& c, const Motion& motion, Eigen::Vector2d& residual,
                  Eigen::Matrix<double, 2, 7>& J) const {
     const Vector3 ray((c.u - camera_.cx) / camera_.f, (c.v - camera_.cy) / camera_.f, 1);
@@ -51,7 +50,7 @@ class Fit {
     return true;
   }
 
-  // Geman and McClure's, pixels^2: bounded, so that what moves by itself counts no more than what was mismatched.
+  // Geman-McClure cost. It is bounded, so that things that move by themselves count no more than mismatches.
   double cost(const Motion& motion, double scale) const {
     double sum = 0;
     Eigen::Vector2d r;
@@ -61,7 +60,8 @@ class Fit {
     return sum;
   }
 
-  // By Gauss and Newton, `unknowns` 6 (zero stays) or 7. The information of what is found, per pixel^2.
+  // Gauss-Newton over `unknowns` parameters: 6 (zero is held) or 7. The scale of the kernel falls from `from` to `to`.
+  // Returns the information matrix for residuals of one pixel.
   Matrix7 refine(Motion& motion, int unknowns, double from, double to, int rounds) const {
     Matrix7 A = Matrix7::Zero();
     for (int round = 0; round < rounds; ++round) {
@@ -85,14 +85,15 @@ class Fit {
     return A;
   }
 
-  // Of the corners that agree, their mean squared residual a coordinate.
-  int agreeing(const Motion& motion, double most, double& variance) const {
+  // Counts the corners whose residual is at most `max_residual`; `variance` is their mean squared residual a
+  // coordinate.
+  int agreeing(const Motion& motion, double max_residual, double& variance) const {
     int count = 0;
     double sum = 0;
     Eigen::Vector2d r;
     Eigen::Matrix<double, 2, 7> J;
     for (const MovedCorner& c : corners_) {
-      if (!linearise(c, motion, r, J) || r.norm() > most) continue;
+      if (!linearise(c, motion, r, J) || r.norm() > max_residual) continue;
       ++count;
       sum += r.squaredNorm() / 2;
     }
@@ -112,14 +113,14 @@ std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corn
   const Fit fit(corners, camera);
   const double step = camera.f * std::tan(kMaxStartYaw * M_PI / 180) / kStarts;
   std::optional<Motion> best;
-  double least = 0;
+  double min_cost = 0;
   for (int start = -kStarts; start <= kStarts; ++start) {
     Motion motion;
     motion.zero = start * step;
     fit.refine(motion, 6, kFirstTolerance, 2, 8);
     fit.refine(motion, 7, 2, 2, 4);
     const double cost = fit.cost(motion, 2);
-    if (!best || cost < least) best = motion, least = cost;
+    if (!best || cost < min_cost) best = motion, min_cost = cost;
   }
   Matrix7 information = fit.refine(*best, 7, 1, kLastTolerance, 6);
   double variance = 0;

@@ -1,8 +1,9 @@
-// Which disparity far things have, by motion: 0 of a calibrated camera.
+// The disparity of points at infinity, measured from motion. It is 0 for a calibrated camera.
 //
-// While the camera moves, a thing moves in the picture, apart from the camera's turn, in proportion to its inverse
-// depth, and so to its true disparity. The disparity at which the motion vanishes is that of things infinitely far
-// away. A yaw of one eye shifts all disparities by f tan(yaw), which no single pair shows where nothing is far away.
+// When the camera moves, a point's motion in the picture, less the effect of the camera's rotation, is proportional to
+// its inverse depth and so to its true disparity. The measured disparity at which that motion vanishes belongs to
+// points at infinity. A yaw of one eye shifts all disparities by f tan(yaw), which a single pair cannot show unless it
+// sees something far away.
 #pragma once
 
 #include <optional>
@@ -12,19 +13,19 @@
 
 namespace relmap::vision {
 
-// What the left eye saw at (u, v) with disparity u_left - u_right, and sees a moment later at (u_later, v_later).
-// Pixels of rectified pictures.
+// A corner that the left eye saw at (u, v) with disparity u_left - u_right, and a moment later at (u_later, v_later),
+// in pixels of rectified pictures.
 struct MovedCorner {
   double u = 0, v = 0, disparity = 0, u_later = 0, v_later = 0;
 };
 
 struct DisparityZero {
-  double pixels = 0, sigma = 0;
-  int corners = 0;  // that agree
+  double pixels = 0, sigma = 0;  // the disparity and its standard deviation, in pixels
+  int corners = 0;               // corners that agree with the motion
 };
 
-// From one motion. Nothing: fewer than 30 corners agree, or the motion tells less than to kMaxZeroSigma: the camera
-// stood, only turned, or everything is equally far away.
+// Measures the disparity of points at infinity from one motion. Nothing if fewer than 30 corners agree, or if sigma
+// would exceed kMaxZeroSigma: the camera stood still or only turned, or everything is equally far away.
 inline constexpr double kMaxZeroSigma = 1.5;  // pixels
 std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corners, const StereoCamera& camera);
 

@@ -12,15 +12,15 @@ namespace {
 const StereoCamera kCamera{400, 320, 240, 0.12, 640, 480};
 
 struct Scene {
-  SE3 T_before_later;                 // of the left eye
-  double off = 0;                     // pixels, of all disparities
-  double astray = 0;                  // share of the corners that move by themselves
-  double nearest = 3, farthest = 20;  // metres
+  SE3 T_before_later;                    // of the left eye
+  double off = 0;                        // pixels, added to all disparities
+  double astray = 0;                     // share of the corners that move by themselves
+  double min_depth = 3, max_depth = 20;  // metres
 };
 
 std::vector<MovedCorner> seen(const Scene& scene, unsigned seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<double> u(20, 620), v(20, 460), inverse(1 / scene.farthest, 1 / scene.nearest),
+  std::uniform_real_distribution<double> u(20, 620), v(20, 460), inverse(1 / scene.max_depth, 1 / scene.min_depth),
       share(0, 1), far(-20, 20);
   std::normal_distribution<double> noise(0, 0.15);
   std::vector<MovedCorner> corners;
@@ -66,7 +66,7 @@ TEST(DisparityZero, TellsNothingWithoutATranslation) {
 
 TEST(DisparityZero, TellsNothingWhereAllIsEquallyFarAway) {
   Scene wall{ahead(0.02)};
-  wall.nearest = 19.9;
+  wall.min_depth = 19.9;
   EXPECT_FALSE(disparity_zero(seen(wall, 1), kCamera));
 }
 

@@ -18,7 +18,7 @@ cv::Mat borrowed(ImageView picture) {
           static_cast<std::size_t>(picture.stride)};
 }
 
-// At the first of the qualities that makes it small enough; empty if none does.
+// Encodes at the first of the qualities that makes the JPEG small enough; empty if none does.
 Bytes encode(const cv::Mat& picture, std::initializer_list<int> qualities, std::size_t max_bytes) {
   for (const int quality : qualities) {
     Bytes bytes;

@@ -1,4 +1,5 @@
-// Pictures made small enough to travel: with a keyframe, to be measured in, and in answers, to be looked at.
+// Pictures encoded small enough for transport: those of keyframes, in which features are measured, and thumbnails for
+// people to look at.
 #pragma once
 
 #include "frontend/vision/image.h"
@@ -10,18 +11,18 @@ namespace relmap::vision {
 inline constexpr std::size_t kMaxThumbnailBytes = 4096;
 inline constexpr int kThumbnailWidth = 160;
 
-// A JPEG of at most `max_bytes`, of quality 60 to 30; halved, twice at most, where that is too much or it has more
-// than half a megapixel. Empty if that is not enough.
+// Returns a JPEG of at most `max_bytes`, of quality 60 to 30. The picture is halved, at most twice, while it does not
+// fit or has more than half a megapixel. Empty if it does not fit then.
 inline constexpr std::size_t kKeyframePictureBytes = 32 * 1024;
 static_assert(kKeyframePictureBytes <= kMaxKeyframePictureBytes);
 inline constexpr int kMaxHalvings = 2;
-inline constexpr double kMaxKeyframePixels = 1e6;  // of a picture that is decoded at all
+inline constexpr double kMaxKeyframePixels = 1e6;  // larger pictures are not decoded
 Bytes encode_picture(ImageView picture, std::size_t max_bytes = kKeyframePictureBytes);
 
-// A JPEG of at most kMaxThumbnailBytes and 160 pixels across; empty where that cannot be had.
+// Returns a JPEG of at most kMaxThumbnailBytes, at most kThumbnailWidth pixels wide; empty if it does not fit.
 Bytes make_thumbnail(ImageView picture);
-// The same of a keyframe's picture, which is given back as it is if it is no larger; empty if it cannot be decoded, or
-// has more than kMaxKeyframePixels.
+// The thumbnail of a keyframe's picture; a picture of at most kMaxThumbnailBytes is returned unchanged. Empty if it
+// cannot be decoded or has more than kMaxKeyframePixels.
 Bytes thumbnail_of(ByteSpan jpeg);
 
 }  // namespace relmap::vision

@@ -38,7 +38,7 @@ TEST(EncodedPicture, IsWholeAndNearlyTheSame) {
   EXPECT_LT(mean_difference(picture, back), 3);
 }
 
-TEST(EncodedPicture, WhatIsTooMuchIsHalved) {
+TEST(EncodedPicture, PicturesThatAreTooLargeAreHalved) {
   const Image large = decode_jpeg(encode_picture(waves(1000, 760)), 1).or_throw();
   EXPECT_EQ(large.width(), 500);
   EXPECT_EQ(large.height(), 380);

@@ -30,8 +30,8 @@ Exposure measure_exposure(ImageView picture) {
 
 Image standardise(ImageView picture, const Exposure& exposure) {
   const double gain = std::clamp(kDeviation / std::max(exposure.deviation, 1e-3), 1 / kMaxGain, kMaxGain);
-  // x gain + shift in fixed point that stays within 16 bits, so that compilers make vectors of it: x in 1/64, the gain
-  // in 1/4096, their product in quarters.
+  // gain * x + shift in 16-bit fixed point, so that compilers vectorise it: x in units of 1/64, the gain in 1/4096,
+  // their product in 1/4.
   const auto factor = static_cast<std::uint16_t>(std::lround(gain * 4096));
   const auto shift = static_cast<std::int16_t>(std::lround(4 * (kMean - exposure.mean * gain)) + 2);
   Image image(picture.width, picture.height);

@@ -1,5 +1,5 @@
-// Brightness and contrast of a picture, and pictures brought to the same: the two eyes expose apart, and each exposes
-// anew from picture to picture.
+// Measures and normalises brightness and contrast of pictures. The two eyes expose independently of each other, and the
+// exposure of each changes from picture to picture.
 #pragma once
 
 #include "frontend/vision/image.h"
@@ -9,13 +9,13 @@ namespace relmap::vision {
 struct Exposure {
   double mean = 0, deviation = 0;  // grey levels, over every second pixel of every second row
 
-  // Nothing to see: covered, black, or white all over.
+  // There is nothing to see: the lens is covered, or the picture is black or white all over.
   bool blind() const { return deviation < 4; }
 };
 Exposure measure_exposure(ImageView picture);
 
-// `picture`, exposed as `exposure` says, with mean 112 and deviation 48, cut to 0..255. Contrast grows or shrinks by no
-// more than four times.
+// Scales `picture` to mean 112 and deviation 48, clamped to 0..255. `exposure` is that of `picture`. The contrast
+// changes by a factor of four at most.
 Image standardise(ImageView picture, const Exposure& exposure);
 
 }  // namespace relmap::vision

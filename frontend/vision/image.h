@@ -7,7 +7,7 @@
 
 namespace relmap::vision {
 
-// Borrowed pixels; rows `stride` bytes apart.
+// Borrowed pixels, in rows `stride` bytes apart. The owner must outlive the view.
 struct ImageView {
   const std::uint8_t* data = nullptr;
   int width = 0, height = 0, stride = 0;
@@ -42,7 +42,8 @@ inline Image copy_of(ImageView picture) {
   return image;
 }
 
-// Byte for byte: two exposures differ by their noise at least.
+// Compares byte for byte. Two exposures of one scene are never the same picture, since their noise differs. False for
+// empty pictures.
 inline bool same_picture(ImageView a, ImageView b) {
   if (a.width != b.width || a.height != b.height || a.empty()) return false;
   for (int y = 0; y < a.height; ++y)
@@ -50,7 +51,7 @@ inline bool same_picture(ImageView a, ImageView b) {
   return true;
 }
 
-// Bilinear; (x, y) and its neighbours to the right and below must lie in the picture.
+// Bilinear interpolation; (x, y) and its neighbours to the right and below must lie in the picture.
 inline float sample(ImageView image, float x, float y) {
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);

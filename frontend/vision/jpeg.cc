@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <memory>
 
-// They take FILE and size_t for granted.
+// These headers need FILE and size_t to be declared before.
 #include <jerror.h>
 #include <jpeglib.h>
 
@@ -24,7 +24,7 @@ struct Errors : jpeg_error_mgr {
   std::longjmp(errors.escape, 1);
 }
 
-// Of level -1: what libjpeg would make the best of.
+// Level -1 marks warnings: damage that libjpeg would decode around.
 void on_message(j_common_ptr info, int level) {
   const int code = info->err->msg_code;
   // Many cameras pad the end of their pictures; versions and colours say nothing about grey.
@@ -32,7 +32,7 @@ void on_message(j_common_ptr info, int level) {
   if (level < 0 && !harmless) give_up(info);
 }
 
-// False: errors.message says why. Has no object of its own with a destructor that a jump could pass over.
+// Returns false if errors.message says why not. It owns no object with a destructor, since longjmp would skip it.
 bool decode(ByteSpan file, int reduction, jpeg_decompress_struct& info, Errors& errors, Image& grey) {
   if (setjmp(errors.escape) != 0) return false;
   jpeg_create_decompress(&info);

@@ -1,5 +1,5 @@
-// JPEG decoded by libjpeg itself: OpenCV hides that libjpeg met damage, and lets it complain on standard error, where
-// nobody knows of which file.
+// Decodes JPEGs with libjpeg directly: OpenCV hides that libjpeg found damage, and lets it write to standard error
+// without the file's name.
 #pragma once
 
 #include "frontend/vision/image.h"
@@ -8,8 +8,8 @@
 
 namespace relmap::vision {
 
-// Grey; `reduction` 1, 2, 4 or 8 in each direction. What cameras write wrong without harm to a pixel is passed over.
-// PICTURE_DAMAGED, with libjpeg's words; UNSUPPORTED: CMYK.
+// Decodes to grey, smaller by `reduction` (1, 2, 4 or 8) in each direction. Mistakes that cameras make and that harm no
+// pixel are ignored. PICTURE_DAMAGED, with libjpeg's message; UNSUPPORTED for CMYK.
 Result<Image> decode_jpeg(ByteSpan file, int reduction);
 
 }  // namespace relmap::vision

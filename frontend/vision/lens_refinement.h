@@ -1,5 +1,5 @@
-// Pose and lens of a camera together, from points that it sees: what is known of the lens beforehand is a prior.
-// Internal to frontend/vision.
+// Estimates pose and lens of a camera together, from points that it sees and a prior of the lens. Internal to
+// frontend/vision.
 #pragma once
 
 #include <algorithm>
@@ -18,22 +18,24 @@
 
 namespace relmap::vision {
 
-// Independent Gaussians; an inverse sigma of 0: nothing is supposed of that parameter.
+// Independent Gaussian priors of the parameters. An inverse sigma of 0 means that a parameter has no prior.
 struct LensPrior {
   Lens mean;
   Lens::Parameters inverse_sigma = Lens::Parameters::Zero();
 };
 
-// Of the picture's corners: the square of their distance from the centre, normalised by f.
+// The squared distance of the picture's corners from its centre, normalised by f.
 inline double corner_r2(const StereoCamera& picture, double f) {
   return Vector2(0.5 * (picture.width - 1), 0.5 * (picture.height - 1)).squaredNorm() / (f * f);
 }
 
-// Standard deviations of the lens's parameters: of log f, of what k1 and k2 move the picture's corners by as a share of
-// their distance from the centre, of the principal point in longer sides, and of log aspect.
+// Standard deviations of a lens's parameters, in units that do not depend on the picture's size. `k1` and `k2` are
+// given by how far they move the picture's corners, as a share of the corners' distance from the centre; `centre`, of
+// the principal point, is a share of the longer side.
 struct LensSigmas {
   double log_f, k1, k2, centre, log_aspect;
 };
+// The same in the units of Lens::Parameters, for a picture of that size and a focal length of f pixels.
 inline Lens::Parameters lens_sigmas(const LensSigmas& of, const StereoCamera& picture, double f) {
   const double side = std::max(picture.width, picture.height);
   const double r2 = corner_r2(picture, f);
@@ -44,13 +46,13 @@ inline Lens::Parameters lens_sigmas(const LensSigmas& of, const StereoCamera& pi
 
 inline Lens lens_of(const StereoCamera& camera) { return {camera.f, camera.cx, camera.cy, 0, 0}; }
 
-// How well calibrations are known at all.
+// The errors that even a good calibration may have.
 inline constexpr LensSigmas kTolerable{.log_f = 0.015, .k1 = 0.02, .k2 = 0.02, .centre = 0.005, .log_aspect = 0.003};
-// And disparities of a map, all alike, pixels: they make what is seen from further on look as if by another focal
-// length.
+// The error that all disparities of a map may have in common, in pixels. Seen from another distance, it looks like
+// another focal length.
 inline constexpr double kTolerableDisparity = 1;
 
-// Without their right pixels, and what cannot be used left out; `original`, if given, gets the indices.
+// Returns the usable correspondences without their right pixels. `original`, if given, receives their indices.
 inline std::vector<Correspondence> left_only(std::span<const Correspondence> correspondences,
                                              std::vector<std::uint32_t>* original = nullptr) {
   std::vector<Correspondence> left;
@@ -66,7 +68,7 @@ inline std::vector<Correspondence> left_only(std::span<const Correspondence> cor
 
 class LensProblem {
  public:
-  // `picture`: its size. What is given must outlive it.
+  // Only the size of `picture` is used. The arguments must outlive the problem.
   LensProblem(std::span<const Correspondence> mono, const StereoCamera& picture, const LensPrior& prior,
               const MotionOptions& options)
       : all_(mono), picture_(picture), prior_(prior), options_(options) {}
@@ -106,8 +108,9 @@ class LensProblem {
     return r;
   }
 
-  // Indices, ascending. A point that would be seen far outside of the picture agrees with nothing: before the eye its
-  // direction is so uncertain that it may, and then it bends the lens as no other does.
+  // Indices of the inliers, ascending. A point that is predicted far outside of the picture is none: a point just
+  // before the eye has so uncertain a direction that it could pass the gate there, and would distort the lens like no
+  // other.
   std::vector<std::uint32_t> inliers(const State& state) const {
     const SE3 inverse = state.T.inverse();
     std::vector<std::uint32_t> result;
@@ -119,18 +122,19 @@ class LensProblem {
     return result;
   }
 
-  // Squared residuals in sigmas of all, each cut off at `most`; so much for what is behind the camera.
-  double cost(const State& state, double most) const {
+  // Sum of the squared residuals in sigmas over all correspondences, each cut off at `max_cost`. A point behind the
+  // camera costs `max_cost`.
+  double cost(const State& state, double max_cost) const {
     const SE3 inverse = state.T.inverse();
     double sum = 0;
     for (const Correspondence& c : all_) {
       const Residual r = residual(inverse, state.lens, c, false);
-      sum += r.rows == 0 ? most : std::min(most, r.value.dot(r.covariance.ldlt().solve(r.value)));
+      sum += r.rows == 0 ? max_cost : std::min(max_cost, r.value.dot(r.covariance.ldlt().solve(r.value)));
     }
     return sum;
   }
 
-  // What the lens departs from the prior's mean, in its standard deviations.
+  // The difference of the lens from the prior's mean, in the prior's standard deviations.
   Lens::Parameters departure(const Lens& lens) const {
     return lens.minus(prior_.mean).cwiseProduct(prior_.inverse_sigma);
   }
@@ -138,7 +142,7 @@ class LensProblem {
 
  private:
   static constexpr double kMinDepth = 1e-3;  // metres; nothing nearer can be seen
-  static constexpr double kMargin = 0.1;     // of the picture's width, around it
+  static constexpr double kMargin = 0.1;     // around the picture, as a share of its width
 
   bool about_in_picture(const Vector3& pixel) const {
     const double margin = kMargin * picture_.width;
@@ -172,7 +176,7 @@ class LensModel {
   State plus(const State& state, const Perturbation& x) const {
     return {state.T * SE3::exp(x.head<6>()), state.lens.plus(x.tail<Lens::kParameters>())};
   }
-  State settle(const State& state) const { return {state.T.normalized(), state.lens}; }
+  State normalized(const State& state) const { return {state.T.normalized(), state.lens}; }
   double prior_cost(const State& state) const { return problem_.departure(state.lens).squaredNorm(); }
   void add_prior(const State& state, Information& A, Perturbation& b) const {
     const Lens::Parameters& inverse = problem_.inverse_sigma();
@@ -185,14 +189,14 @@ class LensModel {
   const std::vector<std::uint32_t>& active_;
 };
 
-struct SettledLens {
-  Refined<LensModel> refined;
+struct RefinedLens {
+  Refined<LensModel> fit;
   std::vector<std::uint32_t> inliers;  // indices, ascending
 };
 
-// Refines over the inliers and counts anew who agrees, until that is settled. NO_CALIBRATION: what is seen does not
-// tell a pose and a lens. TOO_FEW_INLIERS.
-inline Result<SettledLens> settle_lens(const LensProblem& problem, LensProblem::State state,
+// Refines pose and lens over the inliers and determines the inliers again, until they no longer change (or after 12
+// rounds). NO_CALIBRATION if the correspondences do not determine a pose and a lens; TOO_FEW_INLIERS.
+inline Result<RefinedLens> refine_lens(const LensProblem& problem, LensProblem::State state,
                                        std::vector<std::uint32_t> inliers, std::size_t min_inliers) {
   constexpr int kRounds = 12;
   constexpr int kIterations = 10;
@@ -202,29 +206,29 @@ inline Result<SettledLens> settle_lens(const LensProblem& problem, LensProblem::
     if (!refined) return Status(Reason::NO_CALIBRATION, "no pose is the best one");
     state = refined->state;
     auto again = problem.inliers(state);
-    const bool settled = again == inliers;
+    const bool unchanged = again == inliers;
     inliers = std::move(again);
     if (inliers.size() < min_inliers)
       return Status(Reason::TOO_FEW_INLIERS, std::to_string(inliers.size()) + " of " + std::to_string(problem.size()) +
                                                  " correspondences agree on a pose and a lens");
-    if (settled) break;
+    if (unchanged) break;
   }
-  return SettledLens{*std::move(refined), std::move(inliers)};
+  return RefinedLens{*std::move(refined), std::move(inliers)};
 }
 
-// The motion whatever the lens is. `covariance`: the marginal one, which the caller has from the joint one. `original`:
-// of the problem's correspondences, the indices by which the caller knows them.
-inline Motion marginal_motion(const LensProblem& problem, const SettledLens& settled, const Matrix6& covariance,
+// The motion alone, without the lens. `covariance` is the marginal covariance of the pose, computed by the caller;
+// `original` holds the caller's indices of the problem's correspondences.
+inline Motion marginal_motion(const LensProblem& problem, const RefinedLens& refined_lens, const Matrix6& covariance,
                               std::span<const std::uint32_t> original) {
-  const auto& [refined, inliers] = settled;
+  const auto& [fit, inliers] = refined_lens;
   Motion motion;
-  motion.T_reference_camera = refined.state.T;
-  motion.variance_factor = refined.variance_factor();
+  motion.T_reference_camera = fit.state.T;
+  motion.variance_factor = fit.variance_factor();
   motion.covariance = covariance;
   double squares = 0;
-  const SE3 inverse = refined.state.T.inverse();
+  const SE3 inverse = fit.state.T.inverse();
   for (const std::uint32_t i : inliers) {
-    squares += problem.residual(inverse, refined.state.lens, problem[i], false).value.squaredNorm();
+    squares += problem.residual(inverse, fit.state.lens, problem[i], false).value.squaredNorm();
     motion.inliers.push_back(original[i]);
   }
   motion.rms_px = std::sqrt(squares / std::max<double>(1, 2.0 * static_cast<double>(inliers.size())));

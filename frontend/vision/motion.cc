@@ -21,7 +21,7 @@ constexpr double kMinDepth = 1e-3;  // metres; nothing nearer can be seen
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
 
-// By the right perturbation of T_reference_camera; the covariance is widened by the point's own.
+// The derivative is by the right perturbation of T_reference_camera; the covariance includes the point's own.
 using Residual = CorrespondenceResidual<6>;
 
 class Problem {
@@ -64,36 +64,36 @@ class Problem {
 
   bool passes(const Residual& r) const { return agrees(r, options_.gate_sigmas, camera_.width); }
 
-  // Truncated squared error over all (MSAC), and how many are inside the gate. What is known badly lies inside the gate
-  // of many poses and says little for any of them: its error counts for less.
+  // Truncated squared error over all correspondences (MSAC), and the number of inliers. An uncertain point passes the
+  // gate of many poses and supports none of them much, so it counts for less.
   struct Score {
     double cost = std::numeric_limits<double>::infinity();
     std::size_t inliers = 0;
-    double share = 0;  // of what all might say for a pose, what the inliers do
+    double share = 0;  // weight of the inliers / weight of all
   };
   Score score(const SE3& T_reference_camera) const {
     const SE3 inverse = T_reference_camera.inverse();
-    const double most = options_.gate_sigmas * options_.gate_sigmas;
+    const double max_cost = options_.gate_sigmas * options_.gate_sigmas;
     Score result{0, 0, 0};
-    double all = 0, for_it = 0;
+    double all_weight = 0, inlier_weight = 0;
     for (const Correspondence& c : all_) {
       const Residual r = residual(inverse, c, false);
-      const double says = weight(r, c.sigma);
-      all += says;
-      result.cost += most;
+      const double w = weight(r, c.sigma);
+      all_weight += w;
+      result.cost += max_cost;
       if (!passes(r)) continue;
       double worst = 0;
       for (int k = 0; k < r.rows; ++k) worst = std::max(worst, r.value[k] * r.value[k] / r.covariance(k, k));
-      result.cost -= says * (most - worst);
-      for_it += says;
+      result.cost -= w * (max_cost - worst);
+      inlier_weight += w;
       ++result.inliers;
     }
-    if (all > 0) result.share = for_it / all;
+    if (all_weight > 0) result.share = inlier_weight / all_weight;
     return result;
   }
 
-  // How much an inlier says for a pose, against one whose point is exact: by how much likelier it is there than
-  // anywhere in the picture, in logarithms (MLESAC; Torr and Zisserman, CVIU 2000).
+  // How much an inlier supports a pose, relative to one whose point is exact: the log-likelihood ratio of its residual
+  // against a uniform distribution over the picture (MLESAC; Torr and Zisserman, CVIU 2000).
   double weight(const Residual& r, double sigma) const {
     const double variance = sigma * sigma, spread = std::sqrt(r.covariance(0, 0) * r.covariance(1, 1));
     if (r.rows == 0 || spread == variance) return 1;
@@ -130,7 +130,7 @@ class PoseModel {
     };
   }
   SE3 plus(const SE3& T, const Vector6& xi) const { return T * SE3::exp(xi); }
-  SE3 settle(const SE3& T) const { return T.normalized(); }
+  SE3 normalized(const SE3& T) const { return T.normalized(); }
   double prior_cost(const SE3&) const { return 0; }
   void add_prior(const SE3&, Matrix6&, Vector6&) const {}
 
@@ -160,9 +160,9 @@ class Random {  // splitmix64
   std::uint64_t state_;
 };
 
-// Samples of three. Of ordered correspondences by PROSAC: the t-th comes from the first n(t) correspondences and holds
-// the n(t)-th, where n(t) grows so that after as many trials as are allowed, samples have been drawn from every first n
-// as often as uniform ones would be.
+// Draws samples of three. For ordered correspondences it does so by PROSAC: sample t comes from the first n(t)
+// correspondences and contains the n(t)-th. n(t) grows so that after the maximum number of trials, as many samples have
+// been drawn from the first n correspondences, for each n, as uniform sampling would draw from them.
 class ProgressiveSampler {
  public:
   ProgressiveSampler(std::size_t count, const MotionOptions& options)
@@ -205,7 +205,7 @@ class ProgressiveSampler {
   double expected_, allowed_ = 1, trial_ = 0;
 };
 
-// Poses from three points and their left pixels (Ke and Roumeliotis, CVPR 2017): up to four.
+// Up to four poses from three points and their left pixels (Ke and Roumeliotis, CVPR 2017).
 std::vector<SE3> three_point(const Problem& problem, const std::array<std::size_t, 3>& sample) {
   std::vector<SE3> poses;
   std::array<cv::Point3d, 3> points;
@@ -233,12 +233,12 @@ std::vector<SE3> three_point(const Problem& problem, const std::array<std::size_
   return poses;
 }
 
-std::size_t trials_needed(double inlier_ratio, int most) {
+std::size_t trials_needed(double inlier_ratio, int max_trials) {
   const double good = inlier_ratio * inlier_ratio * inlier_ratio;
   if (good >= 1) return 1;
-  if (good < 1e-12) return static_cast<std::size_t>(most);
+  if (good < 1e-12) return static_cast<std::size_t>(max_trials);
   const double trials = std::log(1 - kConfidence) / std::log(1 - good);
-  return static_cast<std::size_t>(std::clamp(std::ceil(trials), 1.0, static_cast<double>(most)));
+  return static_cast<std::size_t>(std::clamp(std::ceil(trials), 1.0, static_cast<double>(max_trials)));
 }
 
 struct Best {
@@ -255,7 +255,7 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
     best = {T, score};
     return true;
   };
-  // A new best is polished on its own inliers at once, so that few trials suffice (Chum et al., DAGM 2003).
+  // A new best pose is refined on its own inliers at once, so that few trials suffice (Chum et al., DAGM 2003).
   const auto polish = [&] {
     for (int round = 0; round < 2 && best.score.inliers >= 6; ++round) {
       const auto refined = refine(problem, problem.inliers(best.T), best.T, 3);
@@ -290,25 +290,26 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
       original.push_back(static_cast<std::uint32_t>(i));
       good.push_back(correspondences[i]);
     }
-  const auto least = std::max(kSample, static_cast<std::size_t>(std::max(0, options.min_inliers)));
-  if (good.size() < least) return too_few(0, good.size());
+  const auto min_inliers = std::max(kSample, static_cast<std::size_t>(std::max(0, options.min_inliers)));
+  if (good.size() < min_inliers) return too_few(0, good.size());
 
   const Problem problem(good, camera, options);
   Best best = search(problem, options, guess);
   auto inliers = problem.inliers(best.T);
 
-  // They are counted once they are settled: the first step of a refinement may lose some that the next ones find again.
+  // The inliers are counted once they no longer change: the first step of a refinement may lose some that the next ones
+  // find again.
   std::optional<Refined<PoseModel>> refined;
   for (int round = 0; round < 4 && inliers.size() >= kSample; ++round) {
     refined = refine(problem, inliers, best.T, 10);
     if (!refined) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
     best.T = refined->state;
     auto again = problem.inliers(best.T);
-    const bool settled = again == inliers;
+    const bool unchanged = again == inliers;
     inliers = std::move(again);
-    if (settled) break;
+    if (unchanged) break;
   }
-  if (!refined || inliers.size() < least) return too_few(inliers.size(), good.size());
+  if (!refined || inliers.size() < min_inliers) return too_few(inliers.size(), good.size());
   if (options.limits && !options.limits->allow(best.T)) return too_few(0, good.size());
 
   Motion motion;

@@ -1,5 +1,5 @@
-// The motion of a camera from points it knows and where it sees them now: three-point RANSAC, then a robust refinement
-// on all inliers. Used by tracking (frame to frame) and by the server (a picture against a place).
+// The pose of a camera from 3D-2D correspondences: three-point RANSAC, then a robust refinement over all inliers. Used
+// by tracking (frame to frame) and by the server (a picture against a place).
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ namespace relmap::vision {
 
 struct Correspondence {
   Vector3 point;      // in the reference frame, metres
-  StereoPixel pixel;  // where the moved camera sees it; u_right NaN: mono
-  double sigma = 1;   // pixels, of each coordinate of `pixel`
-  // Covariance of `point` in the reference frame, or zero to take it as exact; widens the gate and the weights.
+  StereoPixel pixel;  // where the moved camera sees it; u_right is NaN for mono
+  double sigma = 1;   // of each coordinate of `pixel`, in pixels
+  // Covariance of `point` in the reference frame; zero if the point is exact. It widens the gate and lowers the weight.
   Matrix3 point_covariance = Matrix3::Zero();
 };
 
-// What motions are possible at all: those within `metres` and `radians` of T_reference_camera.
+// Limits the motion to poses within `metres` and `radians` of T_reference_camera.
 struct MotionLimits {
   SE3 T_reference_camera;
   double metres = 0, radians = 0;
@@ -34,29 +34,31 @@ struct MotionLimits {
 
 struct MotionOptions {
   std::uint64_t seed = 1;    // the same seed and input give the same answer
-  int max_trials = 400;      // fewer when the inlier ratio allows: bounded at 99.9 % confidence
-  double gate_sigmas = 3.0;  // inlier: each coordinate within this many sigmas
+  int max_trials = 400;      // fewer are drawn once the inlier ratio gives 99.9 % confidence
+  double gate_sigmas = 3.0;  // each coordinate of an inlier is within this many sigmas of its prediction
   int min_inliers = 10;
-  // A guess that this share agrees with is taken without trials: nothing that disagrees with it can gather more.
+  // A guess with at least this share of inliers is accepted without trials: no pose that contradicts it can have more.
+  // Uncertain correspondences count for less in the share.
   double enough = 0.7;
-  // The correspondences come likeliest first: samples are drawn from the first few, then from more and more (PROSAC;
-  // Chum and Matas, CVPR 2005).
+  // The correspondences are ordered, likeliest first. Samples are drawn from the first few, then from more and more
+  // (PROSAC; Chum and Matas, CVPR 2005).
   bool ordered = false;
-  // What many agree on may be a lorry that passes: without it, they would carry the camera along.
+  // Without limits, a vehicle that passes and fills the picture would be taken for a motion of the camera.
   std::optional<MotionLimits> limits;
 };
 
 struct Motion {
   SE3 T_reference_camera;              // pose of the moved camera in the reference frame
-  Matrix6 covariance;                  // of T_reference_camera Exp(xi)
+  Matrix6 covariance;                  // of xi in T_reference_camera Exp(xi)
   std::vector<std::uint32_t> inliers;  // indices, ascending
-  double rms_px = 0;                   // of the inliers, per coordinate
-  // Mean square of the inliers' residuals over what their sigmas promise. Where it is above 1, `covariance` has it in.
+  double rms_px = 0;                   // reprojection error of the inliers, per coordinate
+  // Variance of unit weight of the inliers' residuals: about 1 if they are as large as their sigmas say. If it is above
+  // 1, `covariance` has been multiplied by it.
   double variance_factor = 1;
 };
 
-// TOO_FEW_INLIERS (also with fewer than 3 correspondences, and where only motions beyond the limits explain them).
-// `guess`, if given, is tried first.
+// Estimates the pose of `camera`. `guess`, if given, is tried first. TOO_FEW_INLIERS, also with fewer than 3
+// correspondences, and if only motions beyond the limits explain them.
 Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
                                const MotionOptions& options = {}, const SE3* guess = nullptr);
 

@@ -61,8 +61,8 @@ TEST(Motion, IsExactWithoutNoise) {
   }
 }
 
-// On the way to the pose some may agree that do not at its end, and the other way round: few points, badly known.
-TEST(Motion, WhatAgreesIsCountedAtTheEnd) {
+// With few uncertain points, the inliers may change while the pose is refined.
+TEST(Motion, InliersAreCountedAfterTheRefinement) {
   for (unsigned seed = 1; seed <= 300; ++seed) {
     Scene scene = make_scene(seed, 36, 0.35, 0.3, 1);
     std::mt19937_64 random(seed);
@@ -83,7 +83,7 @@ TEST(Motion, WhatAgreesIsCountedAtTheEnd) {
   }
 }
 
-TEST(Motion, FindsItsWayThroughHalfOutliers) {
+TEST(Motion, ToleratesHalfOutliers) {
   for (const double mono : {0.0, 0.5, 1.0})
     for (unsigned seed = 1; seed <= 20; ++seed) {
       const Scene scene = make_scene(seed, 150, 0.5, mono, 0.5);
@@ -133,7 +133,7 @@ TEST(Motion, UncertainPointsWidenTheGateAndTheCovariance) {
   ASSERT_FALSE(narrow.ok() && narrow->inliers.size() > 60);
 }
 
-TEST(Motion, APointThatMightBeAnywhereAgreesWithNothing) {
+TEST(Motion, APointOfUnboundedUncertaintyIsNoInlier) {
   Scene scene = make_scene(4, 80, 0, 0, 0.3);
   Correspondence before_the_eye = scene.all.front();
   before_the_eye.point = scene.truth * Vector3(-0.002, 0.003, 0.0011);
@@ -146,8 +146,8 @@ TEST(Motion, APointThatMightBeAnywhereAgreesWithNothing) {
 }
 
 // Thirty points of a wall whose distance is hardly known agree with many poses; twenty that are known to a pixel agree
-// with one. (Of a flight's closures some were metres off otherwise.)
-TEST(Motion, FewThatAreKnownWellOutvoteMoreThatAreKnownBadly) {
+// with one. (Without their weights, some closures of a flight were metres off.)
+TEST(Motion, FewCertainPointsOutweighManyUncertainOnes) {
   int right = 0;
   for (unsigned seed = 1; seed <= 50; ++seed) {
     Scene scene = make_scene(seed, 20, 0, 0.3, 0.5);
@@ -183,7 +183,7 @@ TEST(Motion, SameSeedSameAnswer) {
   EXPECT_EQ(a->covariance, b->covariance);
 }
 
-TEST(Motion, AGoodGuessSparesTheTrials) {
+TEST(Motion, AGoodGuessNeedsNoTrials) {
   const Scene scene = make_scene(4, 150, 0.3, 0.5, 0.5);
   MotionOptions none;
   none.max_trials = 0;
@@ -196,7 +196,7 @@ TEST(Motion, AGoodGuessSparesTheTrials) {
   EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05);
 }
 
-TEST(Motion, AGuessThatEnoughAgreeWithIsTaken) {
+TEST(Motion, AGuessWithEnoughInliersIsTakenWithoutTrials) {
   MotionOptions no_trials;
   no_trials.max_trials = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
@@ -214,7 +214,7 @@ TEST(Motion, AGuessThatEnoughAgreeWithIsTaken) {
   }
 }
 
-TEST(Motion, AGuessThatFewAgreeWithIsNot) {
+TEST(Motion, AGuessWithFewInliersIsNot) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Scene scene = make_scene(seed, 150, 0.2, 0.3, 0.5);
     Vector6 off;
@@ -226,8 +226,8 @@ TEST(Motion, AGuessThatFewAgreeWithIsNot) {
   }
 }
 
-// 70 % are wrong, most of them in the second half: who begins with the first needs few trials.
-TEST(Motion, LikeliestFirstFindsItsWayInFewTrials) {
+// 70 % are wrong, most of them in the second half, so sampling from the first ones needs few trials.
+TEST(Motion, OrderedCorrespondencesNeedFewTrials) {
   constexpr unsigned kScenes = 30;
   const auto found = [](bool in_order, int trials) {
     int right = 0;

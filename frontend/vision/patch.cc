@@ -19,7 +19,7 @@ int rounded_mean_shift(int difference) {
 }
 
 #if defined(__SSE4_1__)
-// Nine pixels, the other lanes zero. `Wide`: sixteen may be read.
+// Loads nine pixels; the other lanes are zero. `Wide`: sixteen bytes may be read.
 template <bool Wide>
 __m128i load_row(const std::uint8_t* p) {
   if constexpr (!Wide) return _mm_insert_epi8(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)), p[8], 8);
@@ -72,7 +72,7 @@ void SadPatch::finish() {
 int SadPatch::compare(ImageView image, int x, int y) const {
   const std::uint8_t* corner = image.row(y - kPatchRadius) + x - kPatchRadius;
 #if defined(__SSE4_1__)
-  // Sixteen pixels from there stay in the row.
+  // The wide load must not read beyond the row.
   return x - kPatchRadius + 16 <= image.width ? compare_rows<true>(rows_, sum_, corner, image.stride)
                                               : compare_rows<false>(rows_, sum_, corner, image.stride);
 #else

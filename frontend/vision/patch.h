@@ -1,4 +1,4 @@
-// 9 x 9 patches, compared by the sum of absolute differences after a shift to the same mean.
+// 9 x 9 patches, compared by the sum of absolute differences (SAD) after shifting one of them to the other's mean.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ inline bool patch_fits(ImageView image, int x, int y, int margin = 0) {
   return x >= r && y >= r && x < image.width - r && y < image.height - r;
 }
 
-// A patch made ready to be compared with many. `compare` gives the sum over the 81 pixels of |a + shift - b|, `shift`
-// the rounded difference of means, a + shift cut to 0..255.
+// A patch a, prepared for comparison with many. compare() returns the sum over the 81 pixels of |a + shift - b|, where
+// `shift` is the rounded difference of the means, and a + shift is clamped to 0..255.
 class SadPatch {
  public:
   SadPatch(ImageView image, int x, int y);  // the patch must fit

@@ -50,8 +50,8 @@ Result<PictureSize> png_size(ByteSpan file) {
   return refuse_if_large({static_cast<int>(width), static_cast<int>(height), true});
 }
 
-// Walks the markers of a JPEG (ITU T.81, B) from end to end: its size, and whether it ends and what its decoding will
-// cost.
+// Walks the markers of a JPEG (ITU T.81, B): finds its size, whether it is complete, and how much memory decoding
+// takes.
 class JpegWalk {
  public:
   explicit JpegWalk(ByteSpan file) : file_(file) {}
@@ -72,7 +72,7 @@ class JpegWalk {
  private:
   static Status damaged(const char* what) { return {Reason::PICTURE_DAMAGED, what}; }
 
-  // Next marker at or after `at`, which is left behind it; 0 at the end of the file.
+  // Returns the next marker at or after at_ and moves at_ behind it; 0 at the end of the file.
   int next_marker() {
     while (at_ + 1 < file_.size()) {
       const int code = file_[at_ + 1];
@@ -122,15 +122,15 @@ class JpegWalk {
     components_ = body[5];
     if (components_ == 0 || body.size() < 6 + 3u * static_cast<unsigned>(components_))
       return damaged("JPEG with a short frame header");
-    int most = 1;
+    int max_area = 1;
     double samples = 0;
     for (int i = 0; i < components_; ++i) {
       const int factors = body[7 + 3 * static_cast<std::size_t>(i)];
       const int area = std::max(1, factors >> 4) * std::max(1, factors & 15);
-      most = std::max(most, area);
+      max_area = std::max(max_area, area);
       samples += area;
     }
-    coefficient_bytes_ = 2.0 * width_ * height_ * samples / most;
+    coefficient_bytes_ = 2.0 * width_ * height_ * samples / max_area;
     several_scans_ = code == 0xc2 || code == 0xc6 || code == 0xca || code == 0xce;
     return {};
   }
@@ -224,7 +224,7 @@ StereoCalibration reduced(const StereoCalibration& calibration, int width, int h
   for (RawCamera* eye : {&result.left, &result.right}) {
     if (*eye == RawCamera{}) continue;
     eye->fx *= sx;
-    eye->fy *= calibration.rectified ? sx : sy;  // square pixels stay so
+    eye->fy *= calibration.rectified ? sx : sy;  // keeps square pixels square
     eye->cx = (eye->cx + 0.5) * sx - 0.5;
     eye->cy = (eye->cy + 0.5) * sy - 0.5;
   }

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kCornersOnLevelZero = 80;  // half as many on each level above: 150 in all, a keyframe's tracks
 constexpr float kApart = 5;              // pixels of the level
-constexpr int kThresholdRounds = 5;      // until the detector's thresholds have settled on the picture
+constexpr int kThresholdRounds = 5;      // until the detector's thresholds have adapted to the picture
 
 }  // namespace
 

@@ -46,7 +46,7 @@ TEST(PictureAppearance, TheSamePictureGivesTheSameAnswer) {
   }
 }
 
-TEST(PictureAppearance, NothingIsSeenInNothing) {
+TEST(PictureAppearance, IsEmptyForPicturesWithoutTexture) {
   EXPECT_TRUE(picture_appearance({}).empty());
   EXPECT_TRUE(picture_appearance(Image(10, 10)).empty());
   EXPECT_TRUE(picture_appearance(Image(200, 200)).empty());

@@ -100,7 +100,7 @@ TEST(Picture, RefusesWhatIsNoPicture) {
   EXPECT_EQ(decode_picture(Bytes(1000, 0)).reason(), Reason::NOT_A_PICTURE);
 }
 
-TEST(Picture, RefusesGigapixelsUnopened) {
+TEST(Picture, RefusesGigapixelsByTheHeaderAlone) {
   EXPECT_EQ(decode_picture(png_declaring(40000, 30000)).reason(), Reason::PICTURE_TOO_LARGE);
   EXPECT_EQ(decode_picture(png_declaring(0xffffffff, 0xffffffff)).reason(), Reason::PICTURE_TOO_LARGE);
   EXPECT_EQ(decode_picture(jpeg_declaring(65500, 65500)).reason(), Reason::PICTURE_TOO_LARGE);
@@ -110,7 +110,7 @@ TEST(Picture, RefusesGigapixelsUnopened) {
 }
 
 // libjpeg would hold its 42 megapixels of coefficients all at once.
-TEST(Picture, RefusesProgressiveOnesThatNeedTheirWholeSelfInMemory) {
+TEST(Picture, RefusesProgressiveJpegsThatNeedTooMuchMemory) {
   Bytes baseline = jpeg_declaring(6500, 6500);
   for (std::size_t i = 2; i + 1 < baseline.size(); ++i)
     if (baseline[i] == 0xff && baseline[i + 1] == 0xc0) {
@@ -128,7 +128,7 @@ TEST(Picture, RefusesProgressiveOnesThatNeedTheirWholeSelfInMemory) {
   EXPECT_EQ(decode_picture(larger).reason(), Reason::PICTURE_TOO_LARGE);
 }
 
-TEST(Picture, RefusesEveryCutOfAFile) {
+TEST(Picture, RefusesTruncatedFiles) {
   for (const char* extension : {".jpg", ".png"}) {
     const Bytes whole = encode(scene(40, 30), extension);
     for (std::size_t size = 8; size < whole.size(); size += 1 + size / 16) {
@@ -139,7 +139,7 @@ TEST(Picture, RefusesEveryCutOfAFile) {
   }
 }
 
-// OpenCV would give the rest of the picture grey, and say nothing.
+// OpenCV would return the rest of the picture grey, without an error.
 TEST(Picture, RefusesAJpegThatLacksAPartOfItsPixels) {
   Bytes file = encode(scene(320, 200), ".jpg");
   file.erase(file.end() - 302, file.end() - 2);
@@ -148,7 +148,7 @@ TEST(Picture, RefusesAJpegThatLacksAPartOfItsPixels) {
   EXPECT_NE(picture.status().message().find("premature end"), std::string::npos) << picture.status().to_string();
 }
 
-TEST(Picture, TakesAJpegThatIsPaddedBeforeItsEnd) {
+TEST(Picture, AcceptsAJpegThatIsPaddedBeforeItsEnd) {
   const Bytes file = encode(scene(320, 200), ".jpg");
   Bytes padded = file;
   padded.insert(padded.end() - 2, 5, 0);
@@ -157,7 +157,7 @@ TEST(Picture, TakesAJpegThatIsPaddedBeforeItsEnd) {
   EXPECT_TRUE(std::equal(plain->grey.row(0), plain->grey.row(200), with_padding->grey.row(0)));
 }
 
-TEST(Picture, SeesEveryFlippedByteOfAPng) {
+TEST(Picture, DetectsEveryFlippedByteOfAPng) {
   Bytes file = encode(scene(24, 16), ".png");
   for (std::size_t i = 8; i < file.size(); ++i) {
     file[i] ^= 0x5a;
@@ -182,8 +182,8 @@ TEST(Picture, DecodesJpegsToTheSamePixelsAsOpenCv) {
     }
 }
 
-// Whoever names the file says what is wrong; libraries' own words on standard error would name none.
-TEST(Picture, SurvivesEveryFlippedByteInSilence) {
+// The caller reports what is wrong with which file; what libraries write to standard error does not name the file.
+TEST(Picture, FlippedBytesWriteNothingToStandardError) {
   ::testing::internal::CaptureStderr();
   for (const char* extension : {".jpg", ".png"}) {
     Bytes file = encode(scene(24, 16), extension);

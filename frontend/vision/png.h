@@ -1,5 +1,5 @@
-// Whether a PNG is whole, before it is decoded: OpenCV lets libpng complain on standard error, where nobody knows of
-// which file.
+// Checks that a PNG is complete before it is decoded: OpenCV lets libpng write to standard error without the file's
+// name.
 #pragma once
 
 #include "proto/base/bytes.h"
@@ -7,8 +7,8 @@
 
 namespace relmap::vision {
 
-// Of bytes that begin with the signature: chunks up to IEND, each as long as it says and with the CRC that it names.
-// PICTURE_DAMAGED.
+// Checks the chunks up to IEND: each must have the length and the CRC that it states. `file` begins with the signature
+// of a PNG. PICTURE_DAMAGED otherwise.
 Status check_png(ByteSpan file);
 
 }  // namespace relmap::vision

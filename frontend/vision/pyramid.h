@@ -12,7 +12,7 @@ inline constexpr int kPyramidLevels = 4;
 class Pyramid {
  public:
   Pyramid() = default;
-  // Fewer levels where a side would fall below 32 pixels; at least one.
+  // Makes at most `max_levels`, fewer if a side would fall below 32 pixels, but at least one.
   explicit Pyramid(Image picture, int max_levels = kPyramidLevels);
   explicit Pyramid(ImageView picture, int max_levels = kPyramidLevels) : Pyramid(copy_of(picture), max_levels) {}
 

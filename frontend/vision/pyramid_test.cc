@@ -19,7 +19,7 @@ TEST(Pyramid, HalvesUntilAPictureIsSmall) {
   EXPECT_EQ(Pyramid(picture, 2).levels(), 2);
 }
 
-TEST(Pyramid, CoordinatesMeetOnEveryLevel) {
+TEST(Pyramid, LevelCoordinatesPointAtTheSamePlaceOfThePicture) {
   // A ramp has at every place of every level the value of that place in the picture.
   const Image picture = paint(256, 256, [](int x, int) { return x; });
   const Pyramid pyramid(picture);

@@ -22,7 +22,7 @@ namespace {
 cv::Matx33d intrinsics(const RawCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
 cv::Vec<double, 5> distortion(const RawCamera& c) { return {c.k1, c.k2, c.p1, c.p2, c.k3}; }
 
-// Directions of pixels all over the raw picture, after rectification, one a column.
+// Rectified directions of a grid of pixels of the raw picture, one per column.
 Eigen::Matrix3Xd directions(const cv::Matx33d& K, const cv::Vec<double, 5>& D, const cv::Matx33d& R, cv::Size size) {
   constexpr int kColumns = 16, kRows = 12;
   std::vector<cv::Point2d> pixels, normalised;
@@ -102,7 +102,7 @@ Status Rectifier::apply(ImageView raw, int eye, Image& out) const {
   }
   const cv::Mat in(raw.height, raw.width, CV_8UC1, const_cast<std::uint8_t*>(raw.data),
                    static_cast<std::size_t>(raw.stride));
-  // remap() writes where it is told if that is of the right size and type.
+  // remap() writes into the memory it is given if size and type are right.
   cv::Mat into(out.height(), out.width(), CV_8UC1, out.row(0));
   cv::remap(in, into, maps_->whole[i], maps_->fraction[i], cv::INTER_LINEAR);
   return {};

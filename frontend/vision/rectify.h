@@ -1,4 +1,4 @@
-// Raw stereo pictures to those of a rectified StereoCamera.
+// Rectifies raw stereo pictures: turns them into those of a rectified StereoCamera.
 #pragma once
 
 #include <memory>
@@ -10,31 +10,31 @@
 
 namespace relmap::vision {
 
-// Maps are made once; left() and right() may be called from several threads. Bouguet's rectification as OpenCV's
-// stereoRectify does it, scaled so that every rectified pixel is seen, principal points at the same place in both
-// pictures. Pictures that are rectified already pass through.
+// Bouguet's rectification, as OpenCV's stereoRectify does it, scaled so that every rectified pixel is seen and with
+// principal points at the same place in both pictures. Pictures that are rectified already pass through. The look-up
+// tables are made once; left() and right() may be called from several threads.
 class Rectifier {
  public:
-  // `width` and `height` are those of the pictures: they give the size that a calibration may lack, and must agree
-  // with the one it has. IMPLAUSIBLE_CALIBRATION, BAD_SIZE.
+  // `width` and `height` are those of the pictures. They must agree with the calibration's, or complete a calibration
+  // that has none. IMPLAUSIBLE_CALIBRATION, BAD_SIZE.
   static Result<Rectifier> make(const StereoCalibration& calibration, int width, int height);
 
   const StereoCamera& camera() const { return camera_; }
   bool passes_through() const { return maps_ == nullptr; }
-  // T_rectified_raw of the left eye: a rotation. Keyframe frames are rectified left cameras.
+  // R_rectified_raw of the left eye. The coordinate frame of a keyframe is that of its rectified left camera.
   const Matrix3& left_rotation() const { return left_rotation_; }
-  // By how much directions change in a picture of the right eye that is rectified as the left one's: the rotation
-  // (vector, radians) that fits best over the whole picture, since two eyes' lenses and directions differ by degrees
-  // before they are rectified. Zero for one camera, and where pictures pass through.
+  // The rotation (vector, radians) by which directions change if a picture of the right eye is rectified as if it were
+  // the left eye's; lenses and directions of two eyes differ by degrees before rectification. It is the best fit over
+  // the whole picture. Zero for one camera, and if pictures pass through.
   const Vector3& eye_turn() const { return eye_turn_; }
 
-  // Into `out`, whose memory is used again if it is of that size; it must not be the memory of `raw`. A caller who owns
-  // `raw` may take it as it is where passes_through(). BAD_SIZE if the picture is not of the calibration's size;
-  // NOT_STEREO from right() if the calibration is of one camera. After an error `out` is as it was.
+  // Rectify `raw` into `out`, whose memory is reused if it has the right size and must not overlap `raw`. If
+  // passes_through(), a caller may use `raw` itself instead. BAD_SIZE if the picture is not of the calibration's size;
+  // NOT_STEREO from right() if the calibration is of one camera. After an error `out` is unchanged.
   Status left(ImageView raw, Image& out) const;
   Status right(ImageView raw, Image& out) const;
 
-  // Into a new picture.
+  // The same into a new picture.
   Result<Image> left(ImageView raw) const;
   Result<Image> right(ImageView raw) const;
 

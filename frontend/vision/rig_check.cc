@@ -21,19 +21,19 @@ constexpr int kMinSide = 64;  // pixels
 constexpr int kSaturated = 250, kBlack = 5;
 constexpr std::size_t kMinMatches = 50;
 constexpr double kMaxRowError = 1;  // pixels
-constexpr double kParallel = 1;     // pixels of disparity that tell no side
-constexpr double kExchanged = 0.1;  // share of positive disparities, at most; of good eyes the share is above 0.99
-constexpr double kMaxNegativeUnrectified = 0.5;  // the same where the pictures may not be rectified
-constexpr double kMaxNegative = 0.05;            // share of negative disparities: chance likenesses
-constexpr double kMaxYawByRows = 0.75;           // degrees; good cameras have up to 0.56
-constexpr double kMaxYawByMotion = 0.5;          // degrees; good cameras have up to 0.2
+constexpr double kParallel = 1;     // pixels; the sign of a smaller disparity means nothing
+constexpr double kExchanged = 0.1;  // eyes are exchanged below this share of positive disparities; good ones: over 0.99
+constexpr double kExchangedUnrectified = 0.5;  // the same if the pictures may not be rectified
+constexpr double kMaxNegative = 0.05;          // share of negative disparities that mismatches explain
+constexpr double kMaxYawByRows = 0.75;         // degrees; good cameras have up to 0.56
+constexpr double kMaxYawByMotion = 0.5;        // degrees; good cameras have up to 0.2
 constexpr std::size_t kMinMotions = 3;
-constexpr double kMaxRowsOfMotion = 4;  // pixels from the median row error; beyond: a chance likeness
+constexpr double kMaxRowsOfMotion = 4;  // pixels from the median row error; beyond that it is a mismatch
 constexpr double kSigmas = 3;
 constexpr double kDegrees = 180 / M_PI;
-constexpr double kMaxEdge = 4.5;    // pixels; what is in focus has 2 to 3
-constexpr double kSoftEdge = 3;     // pixels, from which on it matters that the other eye is
-constexpr double kWiderEdge = 1.4;  // times sharper
+constexpr double kMaxEdge = 4.5;  // pixels; edges in focus have 2 to 3
+// An eye with wider edges than this (pixels) is out of focus if the other eye is sharper by this factor.
+constexpr double kSoftEdge = 3, kWiderEdge = 1.4;
 
 template <typename... Parts>
 Status finding(Reason reason, const Parts&... parts) {
@@ -51,13 +51,13 @@ double share_of(ImageView picture, int from, int to) {
   return static_cast<double>(count) / (static_cast<double>(picture.width) * picture.height);
 }
 
-// Row errors over the picture, -0.5..0.5 along each side: a plane and a twist.
+// Row errors as a function of the position in the picture (-0.5..0.5 along each side): a plane and a twist.
 struct RowTrend {
-  Eigen::Vector4d shape = Eigen::Vector4d::Zero();  // offset, slopes; growth from two opposite corners to the others
+  Eigen::Vector4d shape = Eigen::Vector4d::Zero();  // offset, two slopes, twist
   double twist_sigma = 0;
   int width = 0, height = 0;
 
-  // The twist is one of the right picture: what a turned eye sees moves by where it sees it.
+  // The twist is a function of the position in the right picture, since it comes from the yaw of the right eye.
   Eigen::Vector4d at(const CornerMatch& match) const {
     const double x = match.u_left / width - 0.5, y = match.v_left / height - 0.5;
     return {1, x, y, (match.u_right / width - 0.5) * y};
@@ -65,14 +65,14 @@ struct RowTrend {
   double residual(const CornerMatch& match) const { return match.v_right - match.v_left - shape.dot(at(match)); }
 };
 
-// Of those that agree: three robust standard deviations.
+// The largest residual of a match that agrees: three robust standard deviations, but at least a pixel.
 double max_residual(const std::vector<CornerMatch>& matches, const RowTrend& trend) {
   std::vector<double> sizes;
   for (const CornerMatch& match : matches) sizes.push_back(std::abs(trend.residual(match)));
   return std::max(1.0, 3 * 1.48 * quantile(std::move(sizes), 0.5));
 }
 
-// Fitted to the matches that agree with it; the others, chance likenesses, are taken out of `matches`.
+// Fits the trend to the matches that agree with it, and removes the others (mismatches) from `matches`.
 RowTrend fit_rows(std::vector<CornerMatch>& matches, int width, int height) {
   RowTrend trend;
   trend.width = width, trend.height = height;
@@ -81,19 +81,19 @@ RowTrend fit_rows(std::vector<CornerMatch>& matches, int width, int height) {
   trend.shape[0] = quantile(errors, 0.5);
   Eigen::Matrix4d normal = Eigen::Matrix4d::Identity();
   for (int round = 0; round < 5; ++round) {
-    const double most = max_residual(matches, trend);
+    const double limit = max_residual(matches, trend);
     normal = Eigen::Matrix4d::Identity() * 1e-6;
     Eigen::Vector4d right_side = Eigen::Vector4d::Zero();
     for (const CornerMatch& match : matches) {
-      if (std::abs(trend.residual(match)) > most) continue;
+      if (std::abs(trend.residual(match)) > limit) continue;
       const Eigen::Vector4d row = trend.at(match);
       normal += row * row.transpose();
       right_side += row * (match.v_right - match.v_left);
     }
     trend.shape = normal.ldlt().solve(right_side);
   }
-  const double most = max_residual(matches, trend);
-  std::erase_if(matches, [&](const CornerMatch& match) { return std::abs(trend.residual(match)) > most; });
+  const double limit = max_residual(matches, trend);
+  std::erase_if(matches, [&](const CornerMatch& match) { return std::abs(trend.residual(match)) > limit; });
   double squares = 0;
   for (const CornerMatch& match : matches) squares += std::pow(trend.residual(match), 2);
   const double variance = matches.empty() ? 0 : squares / static_cast<double>(matches.size());
@@ -114,8 +114,8 @@ void measure_disparities(const std::vector<CornerMatch>& matches, RigReport& rep
   report.negative_disparity = static_cast<double>(left) / static_cast<double>(matches.size());
 }
 
-// Turned about its vertical axis by an angle, an eye of focal length f sees what lies at (x, y) from its middle angle *
-// x y / f higher or lower. Nothing where that is not known to a third of what would be too much.
+// An eye of focal length f that is turned about its vertical axis by an angle sees a point at (x, y) from the principal
+// point shifted by angle * x y / f rows. Nothing if three sigmas of the yaw exceed the largest tolerable yaw.
 std::optional<double> yaw_by_rows(const RowTrend& trend, const StereoCamera& camera) {
   const double degrees = kDegrees * camera.f / (static_cast<double>(trend.width) * trend.height);
   if (kSigmas * trend.twist_sigma * degrees > kMaxYawByRows) return {};
@@ -153,7 +153,8 @@ bool soft(const EyeReport& eye, const EyeReport& other) {
   return other.edge_width && *eye.edge_width > kSoftEdge && *eye.edge_width > kWiderEdge * *other.edge_width;
 }
 
-// The yaw, if it is too much. What motion says is a matter of the yaw alone, and goes before what rows say.
+// The yaw, if it is too large. The yaw by motion takes precedence, since other errors of a calibration do not affect
+// it.
 std::optional<double> turned(const RigReport& report) {
   const std::optional<double>& yaw = report.yaw_by_motion ? report.yaw_by_motion : report.yaw_by_rows;
   if (yaw && std::abs(*yaw) > (report.yaw_by_motion ? kMaxYawByMotion : kMaxYawByRows)) return yaw;
@@ -205,7 +206,7 @@ EyeReport RigCheck::Eye::report() const {
   }
   report.saturated = saturated / pairs;
   report.black = black / pairs;
-  // Motion blurs, too: the sharper pairs tell the focus.
+  // Motion blurs some pairs; the sharper ones show the focus.
   if (!edge_widths.empty()) report.edge_width = quantile(edge_widths, 0.25);
   return report;
 }
@@ -236,7 +237,7 @@ Status RigCheck::add(ImageView left, ImageView right, ImageView later) {
 
 void RigCheck::add_motion(const std::vector<CornerMatch>& matches, ImageView left, ImageView later) {
   if (measure_exposure(later).blind() || same_picture(left, later)) return;
-  // Both matches begin with the same corners of the left picture.
+  // match_corners() chooses the same corners of the left picture both times.
   std::map<std::pair<float, float>, const CornerMatch*> stereo;
   for (const CornerMatch& match : matches) stereo[{match.u_left, match.v_left}] = &match;
   std::vector<double> errors;
@@ -271,7 +272,7 @@ RigReport RigCheck::report() const {
   if (camera_) report.yaw_by_motion = yaw_by_motion(zeros_, *camera_);
 
   auto& findings = report.findings;
-  // With an eye that shows nothing of its own, the numbers above mean nothing.
+  // If an eye shows nothing, or both show the same, the numbers above mean nothing.
   const auto mostly = [&](int pairs) { return 2 * pairs > pairs_; };
   const auto look = [&](const char* name, const Eye& eye, const EyeReport& seen, const Eye& other) {
     if (mostly(eye.blind))
@@ -308,7 +309,7 @@ RigReport RigCheck::report() const {
   if (no_disparity(matches))
     findings.push_back(
         finding(Reason::NOT_STEREO, "no disparity anywhere: both eyes show the same, or there is nothing near"));
-  else if (report.positive_disparity < (camera_ ? kExchanged : kMaxNegativeUnrectified))
+  else if (report.positive_disparity < (camera_ ? kExchanged : kExchangedUnrectified))
     wrong(finding(Reason::NOT_STEREO, "the eyes are exchanged: only ", 100 * report.positive_disparity,
                   " % of the disparities are positive, ", report.disparity, " px in the median"));
   else if (const auto yaw = apart ? std::nullopt : turned(report))

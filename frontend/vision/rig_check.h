@@ -1,4 +1,4 @@
-// Whether a stereo camera sees as its calibration says: measured on its rectified pictures, whatever they show.
+// Checks whether a stereo camera agrees with its calibration. It measures rectified pictures of any scene.
 #pragma once
 
 #include <optional>
@@ -16,53 +16,54 @@ namespace relmap::vision {
 
 struct EyeReport {
   double mean = 0, deviation = 0;   // grey levels
-  double saturated = 0, black = 0;  // shares of the pixels: 250 and above, 5 and below
-  // Pixels, as edge_width(): of the sharper quarter of the pairs, since the others may have moved.
+  double saturated = 0, black = 0;  // share of the pixels with a grey level of 250 and above, of 5 and below
+  // edge_width() in pixels: the lower quartile over the pairs, since motion may have blurred the others.
   std::optional<double> edge_width;
 };
 
 struct RigReport {
   int pairs = 0;
-  int matches = 0;  // corners that both eyes see, of all pairs; what follows is of them, and 0 below 50
-  // v_right - v_left, pixels: the median and the 90th percentile of its size, and its trend over the left picture.
+  int matches = 0;  // corners that both eyes see, over all pairs; the row and disparity values below are 0 if under 50
+  // Row errors v_right - v_left in pixels: the median and the 90th percentile of their absolute values, and their trend
+  // over the left picture.
   double row_error = 0, row_error_90 = 0;
   double row_offset = 0;                    // in the middle of the picture
-  double row_slope_x = 0, row_slope_y = 0;  // from the left edge to the right one, and from the top to the bottom
-  // u_left - u_right, pixels.
+  double row_slope_x = 0, row_slope_y = 0;  // change from the left edge to the right, and from the top to the bottom
+  // Disparities u_left - u_right in pixels.
   double disparity = 0;           // median
-  double positive_disparity = 0;  // share of those of more than a pixel to either side
-  double negative_disparity = 0;  // share of all that are below -1
-  // How far the right eye is turned about its vertical axis against the calibration, degrees; positive: towards the
-  // left one, which makes disparities too small. Nothing: it cannot be told, or the camera is not known. By rows: they
-  // spread towards two opposite corners of the picture. Other errors of a calibration look like it: 0.6 degrees were
-  // measured on good cameras.
+  double positive_disparity = 0;  // share of positive ones among those whose absolute value is above 1
+  double negative_disparity = 0;  // share of those below -1 among all
+  // The yaw of the right eye against the calibration, in degrees. It is positive towards the left eye, which makes
+  // disparities too small. Nothing if it cannot be determined or the camera is not known. `yaw_by_rows` comes from row
+  // errors that grow towards two opposite corners of the picture. Other errors of a calibration look similar: 0.6
+  // degrees were measured on good cameras.
   std::optional<double> yaw_by_rows;
-  std::optional<double> yaw_by_motion;  // by the disparity that far things have: disparity_zero.h
-  int motions = 0;                      // that told it
+  std::optional<double> yaw_by_motion;  // from the disparity of points at infinity (disparity_zero.h)
+  int motions = 0;                      // motions that measured it
   EyeReport left, right;
-  std::vector<Status> findings;  // what is wrong, the cause before what follows from it; none: all is well
-  // One of them is no matter of what stands before the camera: no metres are to be had of it.
+  std::vector<Status> findings;  // what is wrong, causes before their consequences; empty if all is well
+  // At least one finding is a fault of the camera or its calibration and not of the scene: its depths are not usable.
   bool wrong = false;
-  // That one, the first of several; ok: none.
+  // The first finding of that kind; ok if there is none.
   Status what_is_wrong() const;
 };
 
-// Findings: EYE_DEAD (covered, constant, or the same at all times while the other changes), NOT_STEREO (both eyes show
-// the same, or are exchanged, or one is turned to the side against the calibration), OUT_OF_FOCUS, TOO_FEW_FEATURES
-// (nothing with texture, or not seen by both), ROWS_APART (more than a pixel: it is not this camera's calibration, or
-// no longer).
+// Collects pairs and reports on them. Findings: EYE_DEAD (an eye is covered or constant, or repeats one picture while
+// the other changes), NOT_STEREO (both eyes show the same, or are exchanged, or one has a yaw against the calibration),
+// OUT_OF_FOCUS, TOO_FEW_FEATURES (no texture, or none that both eyes see), ROWS_APART (by more than a pixel: the
+// calibration is another camera's, or outdated).
 class RigCheck {
  public:
-  // `camera`: of the rectified pictures. Without one nothing is said of angles.
+  // `camera` is that of the rectified pictures. Without it no angles are reported.
   explicit RigCheck(const std::optional<StereoCamera>& camera = {}) : camera_(camera) {}
 
-  // BAD_SIZE: the eyes' pictures differ in size, or from those before, or have a side below 64 pixels. A dozen pairs of
-  // a scene that moves are plenty.
-  // `later`: what the left eye saw a tenth of a second or so after; empty: it is not known.
+  // Adds a rectified pair. `later` is what the left eye saw about a tenth of a second after it; empty if it is not
+  // known. A dozen pairs of a scene that moves are plenty. BAD_SIZE if the two pictures differ in size from each other
+  // or from those before, or have a side below 64 pixels.
   Status add(ImageView left, ImageView right, ImageView later = {});
 
-  int matches() const { return static_cast<int>(matches_.size()); }  // so far, chance likenesses among them
-  int motions() const { return static_cast<int>(zeros_.size()); }    // so far, that tell the yaw
+  int matches() const { return static_cast<int>(matches_.size()); }  // so far, mismatches included
+  int motions() const { return static_cast<int>(zeros_.size()); }    // so far, of those that measured the yaw
 
   RigReport report() const;
 
@@ -80,14 +81,14 @@ class RigCheck {
 
   std::optional<StereoCamera> camera_;
   Eye left_, right_;
-  std::vector<double> zeros_;  // pixels, one a motion
+  std::vector<double> zeros_;  // disparity of points at infinity in pixels, one per motion
   int pairs_ = 0, same_ = 0;
   std::vector<CornerMatch> matches_;
 };
 
-// What to do about a finding: "calibrate anew". Empty: nothing is known that helps.
+// What to do about a finding, as in "calibrate anew"; empty if there is no advice.
 std::string rig_advice(Reason finding);
-// The finding, whose message goes on with "; what helps: calibrate anew, ...".
+// The finding with "; what helps: calibrate anew, ..." appended to its message.
 Status with_advice(const Status& finding);
 
 }  // namespace relmap::vision

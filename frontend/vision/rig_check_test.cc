@@ -76,7 +76,7 @@ TEST(RigCheck, AGoodOnePasses) {
   EXPECT_NEAR(*report.right.edge_width, *report.left.edge_width, 0.2);
 }
 
-TEST(RigCheck, NothingLookedAtIsNothingFound) {
+TEST(RigCheck, NoPairsGiveNoFindings) {
   const RigReport report = RigCheck().report();
   EXPECT_EQ(report.pairs, 0);
   EXPECT_TRUE(report.findings.empty());
@@ -97,7 +97,7 @@ TEST(RigCheck, LessThanAPixelIsNotApart) {
   EXPECT_NEAR(report.row_error, 0.7, 0.1);
 }
 
-TEST(RigCheck, RowsThreePixelsApartAreNotTakenForAWantOfFeatures) {
+TEST(RigCheck, RowsThreePixelsApartAreNotTakenForTooFewFeatures) {
   EXPECT_EQ(reasons(report_of_rows([](double, double) { return 3; })), only(Reason::ROWS_APART));
   EXPECT_EQ(reasons(report_of_rows([](double, double) { return -3; })), only(Reason::ROWS_APART));
 }
@@ -133,7 +133,7 @@ TEST(RigCheck, AnEyeTurnedToTheSideShowsInTheRowsOfTheCorners) {
   EXPECT_FALSE(report_of_yaw(1, {}).yaw_by_rows) << "of no known camera";
 }
 
-TEST(RigCheck, DisparitiesOfASignThatCannotBe) {
+TEST(RigCheck, NegativeDisparitiesAreFound) {
   // 12 pixels less than there should be: less than none in one part of the picture.
   const auto shift = [](Image& eye) {
     const Image as_it_was = copy_of(eye);
@@ -227,7 +227,7 @@ TEST(RigCheck, ADarkEyeIsDead) {
   EXPECT_EQ(white.left.saturated, 1);
 }
 
-TEST(RigCheck, AnEyeThatStandsStillIsDead) {
+TEST(RigCheck, AnEyeThatRepeatsItsPictureIsDead) {
   const Image stuck = look(1).first;
   const RigReport report = report_of([&](auto& pair) { pair.first = copy_of(stuck); });
   EXPECT_EQ(reasons(report), only(Reason::EYE_DEAD));

@@ -1,5 +1,6 @@
-// Levenberg-Marquardt on Huber's cost over correspondences whose covariances are fixed at the beginning: if they went
-// with the state, a state that sees everything uncertainly would cost the least. Internal to frontend/vision.
+// Levenberg-Marquardt on Huber's cost over correspondences. Their covariances are computed once, at the initial state:
+// if they followed the state, a state at which everything is uncertain would have the lowest cost. Internal to
+// frontend/vision.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -15,24 +16,24 @@
 
 namespace relmap::vision {
 
-// One correspondence at a state with N parameters: what was measured less what is predicted, its derivative by the
-// state's perturbation, and its covariance. Of a row that is not used all is zero, and the covariance one.
+// One correspondence at a state with N parameters: measurement minus prediction, its derivative by the perturbation of
+// the state, and its covariance. An unused row is zero, with a variance of one.
 template <int N>
 struct CorrespondenceResidual {
-  int rows = 0;  // 2 or 3; 0: nothing is predicted (the point is behind the camera)
+  int rows = 0;  // 2 or 3; 0 if there is no prediction (the point is behind the camera)
   Vector3 value = Vector3::Zero();
   Eigen::Matrix<double, 3, N> jacobian;
   Matrix3 covariance;
 };
 
-// Finite, and with a sigma.
+// All values are finite (a right pixel may be NaN, for mono), and sigma is positive.
 inline bool usable(const Correspondence& c) {
   return c.point.allFinite() && std::isfinite(c.pixel.x()) && std::isfinite(c.pixel.y()) && !std::isinf(c.pixel.z()) &&
          std::isfinite(c.sigma) && c.sigma > 0 && c.point_covariance.allFinite();
 }
 
-// Each coordinate is within so many sigmas of its prediction. `max_sigma`, pixels: a point that might appear so far
-// off agrees with any pose, and one just before the eye has a covariance that has no inverse.
+// Each coordinate is within `gate_sigmas` of its prediction, and its sigma is at most `max_sigma` pixels: a point with
+// a larger one agrees with any pose, and the covariance of a point just before the eye has no inverse.
 template <int N>
 bool agrees(const CorrespondenceResidual<N>& r, double gate_sigmas, double max_sigma) {
   const double g2 = gate_sigmas * gate_sigmas;
@@ -44,7 +45,7 @@ bool agrees(const CorrespondenceResidual<N>& r, double gate_sigmas, double max_s
 
 namespace huber {
 
-inline constexpr double kThreshold = 1.5;  // of the Mahalanobis norm divided by the root of its dimension
+inline constexpr double kThreshold = 1.5;  // for the Mahalanobis norm divided by the square root of its dimension
 
 inline double weight(double squared, int rows) {
   const double norm = std::sqrt(squared / rows);
@@ -62,13 +63,13 @@ struct Refined {
   using Information = Eigen::Matrix<double, Model::kParameters, Model::kParameters>;
 
   typename Model::State state;
-  Information information = Information::Zero();  // the prior's included
-  double weighted_squares = 0;                    // of the whitened residuals
+  Information information = Information::Zero();  // includes the prior's
+  double weighted_squares = 0;                    // sum of the weighted squares of the whitened residuals
   int rows = 0;
 
-  // Mean square of the residuals over what their sigmas promise.
+  // Variance of unit weight: about 1 if the residuals are as large as their sigmas say.
   double variance_factor() const { return weighted_squares / std::max(1, rows - Model::kParameters); }
-  // Of the perturbation. Where the residuals are larger than their sigmas promise, so is the uncertainty.
+  // Covariance of the perturbation, scaled by variance_factor() if that is above 1.
   Information covariance() const {
     const Eigen::LDLT<Information> factor(information);
     const Information inverse = std::max(1.0, variance_factor()) * factor.solve(Information::Identity());
@@ -76,10 +77,12 @@ struct Refined {
   }
 };
 
-// A Model has: State; kParameters; size(), how many correspondences; at(state), which gives for (k, with_jacobian) the
-// k-th one's residual; plus(state, perturbation); settle(state), which takes rounding out of it; prior_cost(state) and
-// add_prior(state, A, b), which adds the prior's information and gradient. Nothing: where a point comes to lie behind
-// the camera, or the equations have no solution.
+// Refines `state` in at most `iterations` steps. Nothing if a point lies behind the camera at the initial state, or if
+// the normal equations have no solution.
+//
+// A Model has: State; kParameters; size(), the number of correspondences; at(state), which returns a function from
+// (k, with_jacobian) to the residual of correspondence k; plus(state, perturbation); normalized(state), which removes
+// rounding errors; prior_cost(state); and add_prior(state, A, b), which adds the prior's information and gradient.
 template <typename Model>
 std::optional<Refined<Model>> refine(const Model& model, typename Model::State state, int iterations) {
   using Information = typename Refined<Model>::Information;
@@ -134,7 +137,7 @@ std::optional<Refined<Model>> refine(const Model& model, typename Model::State s
       const double candidate_cost = cost_at(candidate);
       if (candidate_cost <= cost) {
         const bool converged = xi.norm() < 1e-7;
-        state = model.settle(candidate);
+        state = model.normalized(candidate);
         cost = candidate_cost;
         lambda = std::max(1e-9, lambda * 0.1);
         moved = true;
@@ -143,7 +146,7 @@ std::optional<Refined<Model>> refine(const Model& model, typename Model::State s
         lambda = std::max(1e-4, lambda * 10);
       }
     }
-    if (!moved) iteration = iterations - 1;  // as good as it gets: once more for the information
+    if (!moved) iteration = iterations - 1;  // no step helps: linearise once more for the information
   }
   return result;
 }

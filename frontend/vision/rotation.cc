@@ -12,12 +12,12 @@ namespace relmap::vision {
 namespace {
 
 constexpr int kAlignWidth = 96;   // pixels; the finest level used is not wider
-constexpr int kSearchWidth = 40;  // pixels; the search works on level after level until it is not wider
+constexpr int kSearchWidth = 40;  // pixels; levels are added until the coarsest, on which shifts are searched, fits
 constexpr double kSearchColumns = 0.4, kSearchRows = 0.3;
 constexpr int kIterations = 12;
-constexpr double kSettled = 2e-4;  // radians
+constexpr double kConverged = 2e-4;  // radians
 constexpr double kMinOverlap = 0.25;
-constexpr double kSearchBelow = 0.9;  // correlation at the coarsest level from the rotation expected
+constexpr double kSearchBelow = 0.9;  // correlation at the coarsest level, starting from the expected rotation
 
 // A small picture with the camera that took it.
 struct Small {
@@ -30,7 +30,7 @@ Small halved(ImageView image, double f, double cx, double cy) {
 }
 
 // The shift (columns, rows) at which `current` looks most like `reference`: reference (x, y) is seen at current
-// (x + columns, y + rows). By the mean of absolute differences over every pixel they share.
+// (x + columns, y + rows). Its measure is the mean absolute difference over the pixels they share.
 struct Shift {
   int columns = 0, rows = 0;
 };
@@ -38,7 +38,7 @@ Shift best_shift(ImageView reference, ImageView current) {
   const int max_columns = static_cast<int>(kSearchColumns * reference.width);
   const int max_rows = static_cast<int>(kSearchRows * reference.height);
   Shift best;
-  double least = std::numeric_limits<double>::infinity();
+  double min_cost = std::numeric_limits<double>::infinity();
   for (int rows = -max_rows; rows <= max_rows; ++rows)
     for (int columns = -max_columns; columns <= max_columns; ++columns) {
       const int x0 = std::max(0, -columns), x1 = std::min(reference.width, current.width - columns);
@@ -52,8 +52,8 @@ Shift best_shift(ImageView reference, ImageView current) {
       const double pixels = (x1 - x0) * (y1 - y0);
       const double share = pixels / (reference.width * reference.height);
       const double cost = total / pixels / std::sqrt(share);
-      if (cost < least) {
-        least = cost;
+      if (cost < min_cost) {
+        min_cost = cost;
         best = {columns, rows};
       }
     }
@@ -91,7 +91,7 @@ class Alignment {
  private:
   static constexpr float kOutside = -1;
 
-  // The current picture as the reference camera would see it.
+  // Warps the current picture into the reference camera.
   void warp(const Matrix3& R) {
     const ImageView image = current_.image;
     const Matrix3f H = (intrinsics(current_) * R * intrinsics(reference_).inverse()).cast<float>();
@@ -134,7 +134,7 @@ class Alignment {
     Step step;
     step.correlation = (ab / count - mean_a * mean_b) / std::sqrt(variance_a * variance_b);
     const auto gain = static_cast<float>(std::sqrt(variance_a / variance_b));
-    // What does not fit (near, moving) counts less: Huber, at the deviation of a fit.
+    // Pixels that do not fit (near or moving things) count less: Huber, with a knee at the robust deviation.
     const auto knee = static_cast<float>(
         std::max(2.0, 1.5 * std::sqrt(2 * variance_a * std::max(0.0, 1 - step.correlation)) * 0.6745));
 
@@ -155,7 +155,7 @@ class Alignment {
         // Gradients of both, per pixel, times f.
         const float gx = 0.25F * f * (here[x + 1] - here[x - 1] + gain * (w[x + 1] - w[x - 1]));
         const float gy = 0.25F * f * (below[x] - above[x] + gain * (w[x + width_] - w[x - width_]));
-        // A turn by omega moves the ray m = (mx, my, 1) by omega x m.
+        // A rotation by omega moves the ray m = (mx, my, 1) by omega x m.
         const float mx = (static_cast<float>(x) - static_cast<float>(reference_.cx)) / f;
         const float along = gx * mx + gy * my;
         const float j0 = -gy - along * my, j1 = gx + along * mx, j2 = gy * mx - gx * my;
@@ -205,11 +205,11 @@ std::optional<Aligned> align_level(const Small& reference, const Small& current,
   for (int i = 0; i < iterations; ++i) {
     const auto step = alignment.step(R);
     if (!step) break;
-    if (best && step->correlation < best->step.correlation - 0.02) break;  // it runs away
+    if (best && step->correlation < best->step.correlation - 0.02) break;  // it diverges
     best = Aligned{R, *step};
-    if (step->turn.norm() < kSettled) break;
-    const double longest = 0.15;  // radians a step
-    R = R * so3_exp(step->turn * std::min(1.0, longest / step->turn.norm()));
+    if (step->turn.norm() < kConverged) break;
+    const double max_step = 0.15;  // radians
+    R = R * so3_exp(step->turn * std::min(1.0, max_step / step->turn.norm()));
   }
   return best;
 }
@@ -219,7 +219,7 @@ std::optional<Aligned> align_level(const Small& reference, const Small& current,
 std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const Pyramid& current,
                                                const StereoCamera& camera, const Matrix3& expected) {
   if (reference.levels() == 0 || current.levels() == 0) return std::nullopt;
-  // From the finest level that is small enough to the coarsest.
+  // Levels from the finest one that is small enough to the coarsest.
   std::vector<std::pair<Small, Small>> levels;
   double f = camera.f, cx = camera.cx, cy = camera.cy;
   ImageView a = reference.level(0), b = current.level(0);

@@ -1,6 +1,7 @@
-// The rotation between two pictures of one camera from small versions of them, before any feature is matched: efficient
-// second-order minimisation over SO(3) (ESM; Malis, ICRA 2004; Mei et al., BMVC 2009, 3.1). What is near moves with the
-// camera's translation too, so the answer is a prediction, not a measurement; how much it may be trusted comes with it.
+// The rotation between two pictures of one camera, estimated from small versions of them before any feature is matched:
+// efficient second-order minimisation over SO(3) (ESM; Malis, ICRA 2004; Mei et al., BMVC 2009, 3.1). Near things also
+// move with the camera's translation, so the result is a prediction and not a measurement. `correlation` and `sigma`
+// say how far to trust it.
 #pragma once
 
 #include <optional>
@@ -13,13 +14,13 @@ namespace relmap::vision {
 
 struct RotationEstimate {
   Matrix3 R_reference_current = Matrix3::Identity();
-  double correlation = 0;  // of the pictures where they overlap, -1..1: below about 0.6 they show different things
-  double sigma = 0;        // radians, of each axis: what the residuals leave open were there no translation
+  double correlation = 0;  // of the pictures where they overlap, -1..1; below about 0.6 they show different things
+  double sigma = 0;        // standard deviation about each axis in radians, assuming that there is no translation
 };
 
-// Where `expected` does not lead to a likeness, the best shift of the coarsest level is searched, over 0.4 of the
-// picture's width and 0.3 of its height either way. Nothing if the pictures have no texture or overlap by less than a
-// quarter.
+// Starts from `expected` (R_reference_current). If the pictures do not correlate there, it searches the best shift on
+// the coarsest level, over 0.4 of the picture's width and 0.3 of its height either way. Nothing if the pictures have no
+// texture or overlap by less than a quarter.
 std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const Pyramid& current,
                                                const StereoCamera& camera,
                                                const Matrix3& expected = Matrix3::Identity());

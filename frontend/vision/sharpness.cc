@@ -20,10 +20,10 @@ struct Line {
   std::ptrdiff_t step;
   int length;
   int operator[](int i) const { return data[i * step]; }
-  int slope(int i) const { return (*this)[i + 1] - (*this)[i - 1]; }  // of two pixels
+  int slope(int i) const { return (*this)[i + 1] - (*this)[i - 1]; }  // grey levels over two pixels
 };
 
-// A quarter of the range that all but 2 % of the pixels at either end fill.
+// The contrast of a strong edge: a quarter of the range between the 2nd and the 98th percentile of grey levels.
 int strong_contrast(ImageView picture) {
   std::array<int, 256> histogram{};
   for (int y = 0; y < picture.height; ++y)
@@ -39,16 +39,17 @@ int strong_contrast(ImageView picture) {
 
 struct EdgeEnd {
   int value;
-  int steepest;  // slope on the way
+  int steepest;  // largest slope on the way
 };
 
-// Where the edge ends that rises from i in `direction` (falls, with sign -1): at the last extremum before it goes back
-// by more than noise does.
+// Follows the edge that rises (falls, with sign -1) from i in `direction` to its end: the last extremum before the
+// value goes back by more than noise (`tolerance`).
 EdgeEnd end_of_edge(const Line& line, int i, int direction, int sign, int tolerance) {
   int extremum = sign * line[i], steepest = 0, on_the_way = 0;
   for (int n = 0; n < kReach; ++n) {
     i += direction;
-    if (i < 1 || i >= line.length - 1) return {sign > 0 ? 255 : 0, 0};  // cut off by the border, as by white or black
+    if (i < 1 || i >= line.length - 1)
+      return {sign > 0 ? 255 : 0, 0};  // the border cuts it off, as white or black does
     const int value = sign * line[i];
     if (value < extremum - tolerance) break;
     on_the_way = std::max(on_the_way, std::abs(line.slope(i)));
@@ -61,14 +62,14 @@ void collect(const Line& line, int strong, std::vector<float>& widths) {
   const int tolerance = strong / 4;
   for (int i = 2; i < line.length - 2; ++i) {
     const int slope = std::abs(line.slope(i));
-    // A strong edge no wider than we reach is at least so steep.
+    // A strong edge that is no wider than kReach has at least this slope.
     if (slope * kReach < strong || slope < std::abs(line.slope(i - 1)) || slope <= std::abs(line.slope(i + 1)))
       continue;
     const int upward = line.slope(i) > 0 ? 1 : -1;
     const EdgeEnd high = end_of_edge(line, i, upward, 1, tolerance), low = end_of_edge(line, i, -upward, -1, tolerance);
     const int contrast = high.value - low.value;
     if (contrast < strong || high.value >= kWhite || low.value <= kBlack) continue;
-    if (std::max(high.steepest, low.steepest) > slope) continue;  // it counts where it is steepest
+    if (std::max(high.steepest, low.steepest) > slope) continue;  // it is counted where it is steepest
     widths.push_back(2 * static_cast<float>(contrast) / static_cast<float>(slope));
   }
 }

@@ -1,4 +1,4 @@
-// How sharp a picture is: the width of its edges.
+// Measures how sharp a picture is by the width of its edges.
 #pragma once
 
 #include <optional>
@@ -7,10 +7,13 @@
 
 namespace relmap::vision {
 
-// Pixels: the contrast of an edge by its steepest slope, which no exposure changes; of a step blurred by a Gaussian of
-// s pixels sqrt(2 pi) s, and 2 for a step from one pixel to the next. That of the sharpest fifth of the strong edges,
-// along rows and columns, since every scene has soft ones besides, and motion blurs in one direction. Edges that reach
-// white or black, where they are cut off, do not count. Nothing where fewer than 50 strong edges are.
+// Returns the 20th percentile of the widths of the strong edges along rows and columns, in pixels. It is a low
+// percentile since every scene also has soft edges, and motion blurs in one direction.
+//
+// The width of an edge is its contrast divided by its steepest slope, which does not depend on the exposure. For a step
+// blurred by a Gaussian of s pixels it is sqrt(2 pi) s, and for a step from one pixel to the next it is 2. Edges that
+// reach white or black do not count, since clipping makes them look sharper. Nothing if there are fewer than 50 strong
+// edges.
 std::optional<double> edge_width(ImageView picture);
 
 }  // namespace relmap::vision

@@ -39,7 +39,7 @@ TEST(EdgeWidth, DoesNotDependOnTheExposure) {
   EXPECT_NEAR(*edge_width(tiles(2, 60, 200, 1.5)), width, 0.1 * width);  // noise
 }
 
-TEST(EdgeWidth, IsNotThatOfEdgesThatAreCutOff) {  // they look three times as sharp
+TEST(EdgeWidth, IgnoresClippedEdges) {  // they look three times as sharp
   const double width = *edge_width(tiles(3));
   EXPECT_GT(edge_width(tiles(3, 60, 600)).value_or(width), 0.9 * width);
   EXPECT_GT(edge_width(tiles(3, -400, 200)).value_or(width), 0.9 * width);

@@ -50,8 +50,8 @@ class QuadTree {
 
   std::vector<std::uint32_t> chosen;
 
-  // Fills `cell` up to `wanted` points, `taken` included; returns how many it now holds. `open` lists its candidates by
-  // falling score, those used up removed on return.
+  // Fills `cell` up to `wanted` points, `taken` included, and returns how many it then holds. `open` lists its
+  // candidates by falling score; those that were used are removed from it.
   int fill(const Cell& cell, int wanted, const std::vector<PicturePoint>& taken, std::vector<std::uint32_t>& open) {
     int have = static_cast<int>(taken.size());
     if (wanted <= have || open.empty()) return have;
@@ -69,8 +69,8 @@ class QuadTree {
     for (const PicturePoint& p : taken) taken_in[quarter(p.x, p.y)].push_back(p);
     for (const std::uint32_t i : open) open_in[quarter(candidates_[i].x, candidates_[i].y)].push_back(i);
 
-    // Those with the most already go first, so that what they need no more goes to the others; then, what the poor
-    // could not give, to whoever still has candidates.
+    // Quarters with the most taken points go first, so that the share that they do not need goes to the others. What
+    // the quarters could not provide is then taken from all remaining candidates.
     std::array<std::size_t, 4> order{0, 1, 2, 3};
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return taken_in[a].size() > taken_in[b].size(); });

@@ -1,4 +1,4 @@
-// Which corners to start tracks at, so that tracks cover the picture evenly.
+// Chooses the corners at which tracks start, so that tracks cover the picture evenly.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,11 @@ struct PicturePoint {
   float x = 0, y = 0;
 };
 
-// A quad-tree over one level: each node asks its quarters for equal shares of the `wanted` points, counts those
-// `taken` already, fills up with the candidates of the highest scores, and hands on what a quarter cannot give to the
-// others. Returns indices into `candidates`, by falling score; never more than wanted - taken. Candidates nearer than
-// `distance` pixels to a taken point or to a chosen one are left out.
+// Chooses candidates by a quad-tree over one level of width x height pixels. Each node of the tree divides the `wanted`
+// points equally among its quarters; points that are `taken` already count. A quarter is filled with the candidates of
+// the highest scores, and what it lacks is given to the other quarters. Candidates nearer than `distance` pixels to a
+// taken or a chosen point are left out. Returns indices into `candidates`, by falling score; at most `wanted` less the
+// number of taken points.
 std::vector<std::uint32_t> choose_spread(std::span<const Corner> candidates, std::span<const PicturePoint> taken,
                                          int width, int height, int wanted, float distance);
 

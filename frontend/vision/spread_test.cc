@@ -34,7 +34,7 @@ TEST(ChooseSpread, GivesEachQuarterItsShare) {
   for (const int count : quarters(corners, chosen)) EXPECT_NEAR(count, 25, 1);
 }
 
-TEST(ChooseSpread, CountsWhatIsTaken) {
+TEST(ChooseSpread, CountsTakenPoints) {
   const auto corners = scatter(1000, 3, 10, 630, 10, 470);
   std::vector<PicturePoint> taken;
   for (int i = 0; i < 40; ++i) taken.push_back({20.0F + 7 * static_cast<float>(i), 100});
@@ -45,7 +45,7 @@ TEST(ChooseSpread, CountsWhatIsTaken) {
     for (const auto& p : taken) EXPECT_GE(std::hypot(corners[i].x - p.x, corners[i].y - p.y), 6);
 }
 
-TEST(ChooseSpread, HandsOnWhatAQuarterCannotGive) {
+TEST(ChooseSpread, GivesTheShortfallOfAQuarterToTheOthers) {
   const auto corners = scatter(500, 4, 10, 310, 10, 230);
   EXPECT_EQ(choose_spread(corners, {}, 640, 480, 100, 6).size(), 100u);
 }
@@ -65,7 +65,7 @@ TEST(ChooseSpread, KeepsADistanceAndPrefersScores) {
   EXPECT_GT(mean, 1.3 * all);
 }
 
-TEST(ChooseSpread, TakesNothingFromNothing) {
+TEST(ChooseSpread, ChoosesNothingWithoutCandidatesOrDemand) {
   EXPECT_TRUE(choose_spread({}, {}, 640, 480, 100, 6).empty());
   const auto corners = scatter(10, 6, 10, 630, 10, 470);
   EXPECT_TRUE(choose_spread(corners, {}, 640, 480, 0, 6).empty());

@@ -19,13 +19,13 @@ struct Found {
   bool unique = false;
 };
 
-// Best place for `patch` with its centre in x_from..x_to on the rows around y.
+// The best place for the centre of `patch`: in columns x_from..x_to, on rows y - rows..y + rows.
 Found search_rows(const SadPatch& patch, ImageView image, int y, int rows, int x_from, int x_to, float uniqueness) {
   Found best;
   x_from = std::max(x_from, kPatchRadius);
   x_to = std::min(x_to, image.width - kPatchRadius - 1);
   if (x_from > x_to) return best;
-  // The best of the rows for each column; a second best counts only away from the first.
+  // The best of the rows for each column; a second best counts only at a distance from the best.
   static thread_local std::vector<int> column_best;
   column_best.assign(static_cast<std::size_t>(x_to - x_from + 1), std::numeric_limits<int>::max());
   for (int row = y - rows; row <= y + rows; ++row) {
@@ -65,15 +65,15 @@ std::optional<StereoMatch> match_stereo(const Pyramid& left, const Pyramid& righ
   const auto patch = Template::from_image(left.level(level), x, y);
   if (!patch) return std::nullopt;
   const auto scale = static_cast<float>(1 << level);
-  const int nearest = static_cast<int>(std::ceil(options.max_disparity / scale));
-  const int furthest = static_cast<int>(std::floor(options.min_disparity / scale)) - 1;
+  const int max_shift = static_cast<int>(std::ceil(options.max_disparity / scale));
+  const int min_shift = static_cast<int>(std::floor(options.min_disparity / scale)) - 1;
   const SadPatch mine(left.level(level), xi, yi);
   const Found there =
-      search_rows(mine, right.level(level), yi, options.rows, xi - nearest, xi - furthest, options.uniqueness);
+      search_rows(mine, right.level(level), yi, options.rows, xi - max_shift, xi - min_shift, options.uniqueness);
   if (!there.unique) return std::nullopt;
   const SadPatch theirs(right.level(level), there.x, there.y);
   const Found back =
-      search_rows(theirs, left.level(level), there.y, options.rows, there.x + furthest, there.x + nearest, 1.0F);
+      search_rows(theirs, left.level(level), there.y, options.rows, there.x + min_shift, there.x + max_shift, 1.0F);
   if (std::abs(back.x - xi) > 1) return std::nullopt;
   return align(*patch, right, u, y, static_cast<float>(there.x) + x - static_cast<float>(xi),
                static_cast<float>(there.y) + y - static_cast<float>(yi), level, options);
@@ -85,7 +85,7 @@ std::optional<StereoMatch> refine_stereo(const Pyramid& left, const Pyramid& rig
   const float x = to_level(u, level), y = to_level(v, level);
   const auto patch = Template::from_image(left.level(level), x, y);
   if (!patch) return std::nullopt;
-  // A few whole pixels either way first: the guess may be off by more than the alignment bridges.
+  // First a search over a few whole pixels either way: the guess may be off by more than the alignment can correct.
   const ImageView image = right.level(level);
   const SadPatch mine = patch->sad();
   const float guess = to_level(u - disparity, level);

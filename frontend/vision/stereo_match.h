@@ -1,4 +1,4 @@
-// The right eye's view of a point of the left picture, along the row.
+// Finds a point of the left picture in the right one, along the row.
 #pragma once
 
 #include <optional>
@@ -10,9 +10,9 @@ namespace relmap::vision {
 struct StereoMatchOptions {
   float min_disparity = 0;       // pixels of the picture
   float max_disparity = 256;     // pixels of the picture
-  int rows = 1;                  // searched above and below, pixels of the level
-  float uniqueness = 0.85F;      // best / second best that is no neighbour of it, of the sums of absolute differences
-  float min_correlation = 0.8F;  // after the alignment
+  int rows = 1;                  // search range above and below, pixels of the level
+  float uniqueness = 0.85F;      // maximum of best / second best sum of absolute differences, neighbours excluded
+  float min_correlation = 0.8F;  // of the patches after the alignment
 };
 
 struct StereoMatch {
@@ -20,12 +20,13 @@ struct StereoMatch {
   float correlation = 0;  // of the two patches
 };
 
-// (u, v) in pixels of the left picture, matched on `level`. Nothing where no match is unique, confirmed from the right
-// picture back to the left, on the same row within a pixel of the level, and well correlated.
+// Matches the point at (u, v), in pixels of the left picture, on `level`. Nothing unless the match is unique, confirmed
+// from the right picture back to the left, on the same row within a pixel of the level, and well correlated.
 std::optional<StereoMatch> match_stereo(const Pyramid& left, const Pyramid& right, float u, float v, int level,
                                         const StereoMatchOptions& options = {});
 
-// The same from a good guess: aligned within a few pixels of it, without a search.
+// The same from a good guess of the disparity: only a few pixels around it are searched, and neither uniqueness nor the
+// way back is checked.
 std::optional<StereoMatch> refine_stereo(const Pyramid& left, const Pyramid& right, float u, float v, int level,
                                          float disparity, const StereoMatchOptions& options = {});
 

@@ -24,7 +24,7 @@ Lanes load_bytes(const std::uint8_t* p) {
 float sum(Lanes lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
 
 constexpr Lanes kWhole{1, 1, 1, 1}, kFirst{1, 0, 0, 0};
-// The ninth pixel of a row stands first in the third vector of it.
+// The ninth pixel of a row is the first lane of the row's third vector.
 constexpr Lanes used(int vector) { return vector < 2 ? kWhole : kFirst; }
 
 struct Hessian {
@@ -32,9 +32,9 @@ struct Hessian {
   float determinant() const { return xx * yy - xy * xy; }
 };
 
-// Normal equations of a shift (x, y) with brightness and contrast free: their columns, a one and the template t, are
-// projected out of the Jacobian. (A contrast 10 % off would else cost tenths of a pixel.) The residual is orthogonal to
-// both already. Lanes that are not used are zero in gx, gy and r.
+// Normal equations of a shift (x, y) with brightness and contrast free: the columns of these, a constant one and the
+// template t, are projected out of the Jacobian. (Otherwise a contrast that is 10 % off would cost tenths of a pixel.)
+// The residual is orthogonal to both already. Unused lanes are zero in gx, gy and r.
 struct Sums {
   Lanes xx{}, xy{}, yy{}, x1{}, y1{}, xt{}, yt{}, xr{}, yr{};
   void add(Lanes gx, Lanes gy, Lanes t, Lanes r) {
@@ -167,7 +167,7 @@ SadPatch Template::sad() const {
 
 std::optional<Template::Alignment> Template::align(ImageView image, float x, float y, float reach) const {
   constexpr int kIterations = 10;
-  constexpr float kSettled = 0.02F;  // pixels; the step after it would be a small part of that
+  constexpr float kConverged = 0.02F;  // pixels; the next step would be a small part of that
   const float start_x = x, start_y = y;
   Surroundings block{};
   for (int iteration = 0; iteration < kIterations; ++iteration) {
@@ -206,7 +206,7 @@ std::optional<Template::Alignment> Template::align(ImageView image, float x, flo
     x -= dx;
     y -= dy;
     if (!(std::abs(x - start_x) <= reach && std::abs(y - start_y) <= reach)) return std::nullopt;
-    if (dx * dx + dy * dy < kSettled * kSettled) {
+    if (dx * dx + dy * dy < kConverged * kConverged) {
       const float norm = std::sqrt((sum(squares) - kPatchPixels * mean * mean) * energy_);
       return Alignment{x, y, sum(error) / kPatchPixels, norm > 0 ? cross / norm : 0};
     }

@@ -1,4 +1,4 @@
-// Smooth random textures that can be sampled anywhere, for the tests of the front-end.
+// Smooth random textures that can be sampled at any position, for the tests of the front-end.
 #pragma once
 
 #include <cmath>
@@ -14,11 +14,11 @@ namespace relmap::vision::testing_textures {
 // A sum of plane waves of random direction, wavelength and phase: its value between pixels is known exactly.
 class Waves {
  public:
-  explicit Waves(unsigned seed, double shortest = 6, double longest = 40, int count = 24) {
+  explicit Waves(unsigned seed, double min_wavelength = 6, double max_wavelength = 40, int count = 24) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
     for (int i = 0; i < count; ++i) {
-      const double wavelength = shortest * std::pow(longest / shortest, unit(random));
+      const double wavelength = min_wavelength * std::pow(max_wavelength / min_wavelength, unit(random));
       const double direction = 2 * M_PI * unit(random);
       waves_.push_back({2 * M_PI / wavelength * std::cos(direction), 2 * M_PI / wavelength * std::sin(direction),
                         2 * M_PI * unit(random)});
@@ -37,7 +37,7 @@ class Waves {
   std::vector<Wave> waves_;
 };
 
-// value(x, y) for every pixel, rounded and cut to 0..255.
+// Fills a picture with value(x, y), rounded and clamped to 0..255.
 template <typename Value>
 Image paint(int width, int height, const Value& value) {
   Image image(width, height);
@@ -47,8 +47,8 @@ Image paint(int width, int height, const Value& value) {
   return image;
 }
 
-// Two pictures of the same waves, with noise of one grey level each; in the second they are brighter, of less contrast
-// and moved by (dx, dy).
+// Two pictures of the same waves, each with noise of one grey level. The second is brighter, has less contrast and is
+// shifted by (dx, dy).
 inline std::pair<Image, Image> seen_twice(const Waves& waves, std::mt19937& random, int width, int height, double dx,
                                           double dy) {
   std::normal_distribution<double> noise(0, 1);

@@ -10,11 +10,11 @@ namespace relmap::vision {
 
 namespace {
 
-// What the points of a place have wrong they have wrong together: what they say of a lens is worth less than as many
-// independent ones would say, by so many times in its standard deviation.
+// The errors of the points of a place are correlated, so they determine the lens less well than independent points
+// would: its standard deviations are multiplied by this factor.
 constexpr double kOverstated = 2;
 
-// The pose's covariance, with the lens known so much worse than the joint one has it.
+// The pose's covariance, with the standard deviations of the lens multiplied by kOverstated.
 Matrix6 marginal_covariance(const LensModel::Information& joint) {
   const auto with_lens = joint.topRightCorner<6, Lens::kParameters>();
   const auto lens = joint.bottomRightCorner<Lens::kParameters, Lens::kParameters>();
@@ -22,7 +22,7 @@ Matrix6 marginal_covariance(const LensModel::Information& joint) {
   return joint.topLeftCorner<6, 6>() + (kOverstated * kOverstated - 1) * of_lens;
 }
 
-// As they would be with so many pixels more of disparity in the frame that they are given in.
+// The points as they would be if their disparities in the reference frame were larger by `pixels`.
 std::vector<Correspondence> with_disparity(std::vector<Correspondence> correspondences, double pixels,
                                            const StereoCamera& map_camera) {
   for (Correspondence& c : correspondences)
@@ -41,14 +41,14 @@ Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspo
   prior.inverse_sigma = lens_sigmas(kTolerable, camera, camera.f).cwiseInverse();
   const LensProblem problem(left, camera, prior, options);
   const LensProblem::State named{start, prior.mean};
-  const auto settled =
-      settle_lens(problem, named, problem.inliers(named), static_cast<std::size_t>(std::max(3, options.min_inliers)));
-  if (!settled.ok()) return settled.status();
-  Motion motion = marginal_motion(problem, *settled, marginal_covariance(settled->refined.covariance()), original);
+  const auto refined =
+      refine_lens(problem, named, problem.inliers(named), static_cast<std::size_t>(std::max(3, options.min_inliers)));
+  if (!refined.ok()) return refined.status();
+  Motion motion = marginal_motion(problem, *refined, marginal_covariance(refined->fit.covariance()), original);
 
   const std::vector<Correspondence> nearer = with_disparity(left, kTolerableDisparity, map_camera);
   const LensProblem shifted(nearer, camera, prior, options);
-  const auto moved = refine(LensModel(shifted, settled->inliers), settled->refined.state, 10);
+  const auto moved = refine(LensModel(shifted, refined->inliers), refined->fit.state, 10);
   if (!moved) return Status(Reason::NO_CALIBRATION, "no pose is the best one");
   const Vector6 step = (motion.T_reference_camera.inverse() * moved->state.T).log();
   motion.covariance += step * step.transpose();

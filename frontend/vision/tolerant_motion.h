@@ -1,4 +1,4 @@
-// The pose of a camera whose calibration is another's word: right within what calibrations are.
+// The pose of a camera whose calibration comes from outside and has the errors that calibrations usually have.
 #pragma once
 
 #include <span>
@@ -9,15 +9,15 @@
 
 namespace relmap::vision {
 
-// From `start`, the pose that `camera` as it is named found (T_reference_camera, metres), pose and lens are refined
-// together. The prior of the lens is the named one: its focal length within 1.5 %, its principal
-// point within 0.5 % of the longer side, and a distortion that moves the picture's corners by 2 % of their distance
-// from the centre (one standard deviation each). A focal length 2 % off moves the pose of a camera that is taken as
-// exact by 2 % of the distance of what it sees, which no covariance of pixels knows of. Nor does it know of what all
-// disparities of the map have wrong alike, which a free lens takes for its own: the covariance holds a pixel of that.
+// Refines pose and lens together, from `start`: the pose that was estimated with `camera` taken as exact
+// (T_reference_camera, metres). `camera` is rectified; `map_camera` is the stereo camera that saw the place.
+// Disparities of the camera are not used, since they depend on its baseline, too. NO_CALIBRATION, TOO_FEW_INLIERS.
 //
-// Disparities of the camera are not used: they depend on its baseline, too. NO_CALIBRATION, TOO_FEW_INLIERS. `camera`:
-// rectified. `map_camera`: that saw the place, with a baseline.
+// The prior of the lens is `camera`, with standard deviations of 1.5 % of the focal length, 0.5 % of the longer side
+// for the principal point, and a distortion that moves the picture's corners by 2 % of their distance from the centre.
+// If a camera is taken as exact, a focal length that is 2 % off moves its pose by 2 % of the distance to what it sees,
+// and a covariance from pixel noise does not contain that error. Nor does it contain the error that all disparities of
+// the map have in common, which a free lens would absorb; the covariance returned allows for one pixel of it.
 Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
                                         const StereoCamera& map_camera, const SE3& start,
                                         const MotionOptions& options = {});

@@ -42,7 +42,7 @@ struct Errors {
   Errors mean() const { return {nees / count, metres / count, sigma / count, count}; }
 };
 
-// Over lenses that depart from the named one as calibrations do, or by `log_f` in the focal length alone.
+// Mean errors over lenses that differ from the named one as calibrations do, or only by `log_f` in the focal length.
 struct Both {
   Errors exact, tolerant;
 };
@@ -68,7 +68,7 @@ Both errors(std::optional<double> log_f) {
   return {sum.exact.mean(), sum.tolerant.mean()};
 }
 
-TEST(TolerantMotion, ItsCovarianceHoldsForAllThatCalibrationsAre) {
+TEST(TolerantMotion, ItsCovarianceCoversUsualCalibrationErrors) {
   const Both both = errors(std::nullopt);
   EXPECT_EQ(both.tolerant.count, 40);
   EXPECT_GT(both.exact.nees, 30) << "taken as exact";
@@ -77,7 +77,7 @@ TEST(TolerantMotion, ItsCovarianceHoldsForAllThatCalibrationsAre) {
   EXPECT_LT(both.tolerant.metres, 0.6 * both.exact.metres);
 }
 
-TEST(TolerantMotion, AFocalLengthThatIsSlightlyOffIsFoundAndTold) {
+TEST(TolerantMotion, AFocalLengthThatIsSlightlyOffIsCorrectedAndInTheCovariance) {
   for (const double log_f : {-0.03, -0.02, 0.02, 0.03}) {
     const Both both = errors(log_f);
     EXPECT_GT(both.exact.metres, 3 * both.exact.sigma) << log_f;

@@ -15,14 +15,14 @@ namespace relmap::vision {
 namespace {
 
 constexpr double kMinFocal = 0.4, kMaxFocal = 4;  // longer sides
-constexpr int kTried = 14;                        // each a fifth longer than the one before
-constexpr int kTrials = 300;                      // of three points, for each of them
+constexpr int kTried = 14;                        // focal lengths, each a fifth longer than the one before
+constexpr int kTrials = 300;                      // samples of three points for each of them
 constexpr double kMaxSigma = 0.35;                // of log f
-// What k1 may move the picture's corners by, as a share of their distance from the centre: wide lenses bend most, long
-// ones hardly. One standard deviation.
+// How far k1 moves the picture's corners, as a share of their distance from the centre (one standard deviation): wide
+// lenses distort most, long ones hardly.
 double usual_share(const StereoCamera& picture, double f) { return std::min(0.2, 0.02 + 0.2 * corner_r2(picture, f)); }
 
-// Lenses as cameras have them, and as they become in pictures that were stretched or cropped. Of f nothing is supposed.
+// Priors of unedited pictures, and of pictures that were stretched or cropped. f has no prior.
 LensSigmas usual(const StereoCamera& picture, double f) {
   const double share = usual_share(picture, f);
   return {.log_f = 1, .k1 = share, .k2 = 0.5 * share, .centre = 0.02, .log_aspect = 0.005};
@@ -33,16 +33,16 @@ LensSigmas edited(const StereoCamera& picture, double f) {
   sigmas.log_aspect = 0.3;
   return sigmas;
 }
-// A picture was edited if the lens that explains it best is so far from a usual one, and either so many sigmas or such
-// a gain says so. (Of pictures as cameras took them the gain was 5.7 once, else 3.4 at most; of parts of pictures that
-// the sigmas alone did not give away it was 13.9 and more.)
+// A picture was edited if the lens that explains it best differs from a usual one by kMaxLogAspect or kMaxOffCentre,
+// and by kSigmas, or with a gain in cost of kTelling. (For unedited pictures the gain was 5.7 once, otherwise 3.4 at
+// most; for cropped pictures that kSigmas did not detect it was 13.9 and more.)
 constexpr double kMaxLogAspect = 0.02, kMaxOffCentre = 0.06, kSigmas = 6, kTelling = 9;
 constexpr double kTriedOffCentre[] = {0, -0.25, 0.25};
-constexpr double kTriedShares[] = {0, -1};  // of usual_share(): none, and a barrel
+constexpr double kTriedShares[] = {0, -1};  // of usual_share(): no distortion, and a barrel
 
 Vector2 centre_of(const StereoCamera& picture) { return {0.5 * (picture.width - 1), 0.5 * (picture.height - 1)}; }
 
-// Of a camera whose picture is so large and whose focal length is about f.
+// The prior of a camera with the picture's size and a focal length of about f.
 LensPrior prior_of(const LensSigmas& sigmas, const StereoCamera& picture, double f) {
   const Vector2 centre = centre_of(picture);
   LensPrior prior{{f, centre.x(), centre.y(), 0, 0}};
@@ -51,21 +51,22 @@ LensPrior prior_of(const LensSigmas& sigmas, const StereoCamera& picture, double
   return prior;
 }
 
-// Where residuals are cut off: at the gate.
+// Squared residuals are cut off at the gate.
 double max_cost(const MotionOptions& options) { return options.gate_sigmas * options.gate_sigmas; }
 
-// The pose and the lens if the picture may have been stretched, or be part of a larger one.
+// The pose and the lens under the assumption that the picture was stretched or cropped.
 struct Edited {
   LensPrior prior;
-  SettledLens settled;
+  RefinedLens refined;
   double cost = 0;
 };
 std::optional<Edited> if_edited(std::span<const Correspondence> mono, const StereoCamera& picture,
-                                const MotionOptions& options, const SettledLens& found) {
-  const LensProblem::State& state = found.refined.state;
+                                const MotionOptions& options, const RefinedLens& found) {
+  const LensProblem::State& state = found.fit.state;
   const LensPrior prior = prior_of(edited(picture, state.lens.f), picture, state.lens.f);
   const LensProblem problem(mono, picture, prior, options);
-  // From the lens that was found, and from others that look past the middle of the picture, where they see the same.
+  // The search starts from the lens that was found, and from lenses with the principal point off centre that are turned
+  // so that they see the same.
   std::optional<Edited> best;
   for (const double right : kTriedOffCentre)
     for (const double down : kTriedOffCentre) {
@@ -73,39 +74,39 @@ std::optional<Edited> if_edited(std::span<const Correspondence> mono, const Ster
       start.lens.cx += right * picture.width;
       start.lens.cy += down * picture.height;
       start.T.R = state.T.R * so3_exp({down * picture.height / state.lens.f, -right * picture.width / state.lens.f, 0});
-      auto settled = settle_lens(problem, start, found.inliers, found.inliers.size() / 2);
-      if (!settled.ok()) continue;
-      const double cost = problem.cost(settled->refined.state, max_cost(options));
-      if (!best || cost < best->cost) best = Edited{prior, std::move(*settled), cost};
+      auto refined = refine_lens(problem, start, found.inliers, found.inliers.size() / 2);
+      if (!refined.ok()) continue;
+      const double cost = problem.cost(refined->fit.state, max_cost(options));
+      if (!best || cost < best->cost) best = Edited{prior, std::move(*refined), cost};
     }
   return best;
 }
 
-// Stretched pictures, and parts of pictures, fit a usual lens somewhere else in the world, and say that they fit well.
-// `gain`: by how much the usual lens costs more.
+// Stretched and cropped pictures also fit a usual lens at a wrong pose, and fit it well, so they must be refused.
+// `gain` is by how much more the usual lens costs.
 Status check_unedited(const Edited& edited, double gain, const StereoCamera& picture) {
-  const Lens& lens = edited.settled.refined.state.lens;
+  const Lens& lens = edited.refined.fit.state.lens;
   const Lens::Parameters off = lens.minus(edited.prior.mean);
   const Lens::Parameters sigma =
-      edited.settled.refined.covariance().diagonal().tail<Lens::kParameters>().cwiseMax(0).cwiseSqrt();
-  const auto beyond = [&](Lens::Parameter parameter, double most) {
+      edited.refined.fit.covariance().diagonal().tail<Lens::kParameters>().cwiseMax(0).cwiseSqrt();
+  const auto beyond = [&](Lens::Parameter parameter, double limit) {
     const double by = std::abs(off[parameter]);
-    return by > most && (by > kSigmas * sigma[parameter] || gain > kTelling);
+    return by > limit && (by > kSigmas * sigma[parameter] || gain > kTelling);
   };
   if (beyond(Lens::kLogAspect, kMaxLogAspect))
     return {Reason::NO_CALIBRATION, "the picture seems to have been stretched in " +
                                         std::string(off[Lens::kLogAspect] > 0 ? "height" : "width") + " by " +
                                         number_text(100 * std::expm1(std::abs(off[Lens::kLogAspect]))) +
                                         " %: ask with one as the camera took it, or name its camera"};
-  const double most = kMaxOffCentre * std::max(picture.width, picture.height);
-  if (beyond(Lens::kCx, most) || beyond(Lens::kCy, most))
+  const double max_off_centre = kMaxOffCentre * std::max(picture.width, picture.height);
+  if (beyond(Lens::kCx, max_off_centre) || beyond(Lens::kCy, max_off_centre))
     return {Reason::NO_CALIBRATION, "the picture seems to be part of a larger one, whose centre is at (" +
                                         number_text(lens.cx) + ", " + number_text(lens.cy) +
                                         ") of it: ask with one as the camera took it, or name its camera"};
   return {};
 }
 
-// As a camera without distortion sees them; what is beyond the lens's turning point is left out.
+// The correspondences as a camera without distortion sees them. Those beyond the lens's turning point are left out.
 struct Undistorted {
   std::vector<Correspondence> correspondences;
   std::vector<std::uint32_t> original;
@@ -129,7 +130,7 @@ struct Start {
   Lens lens;
 };
 
-// The lens that most agree with.
+// The lens with the most inliers.
 Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& picture, const MotionOptions& options) {
   const double side = std::max(picture.width, picture.height);
   const double log_step = std::log(kMaxFocal / kMinFocal) / (kTried - 1);
@@ -173,22 +174,22 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   const auto unknown = [](const std::string& why) {
     return Status(Reason::NO_CALIBRATION, "what is seen does not tell the lens (" + why + "): name the camera");
   };
-  auto settled = settle_lens(problem, {start->motion.T_reference_camera, start->lens}, std::move(start->motion.inliers),
+  auto refined = refine_lens(problem, {start->motion.T_reference_camera, start->lens}, std::move(start->motion.inliers),
                              static_cast<std::size_t>(std::max(3, options.min_inliers)));
-  if (!settled.ok())
-    return settled.reason() == Reason::NO_CALIBRATION ? unknown(settled.status().message()) : settled.status();
-  const LensModel::State& state = settled->refined.state;
+  if (!refined.ok())
+    return refined.reason() == Reason::NO_CALIBRATION ? unknown(refined.status().message()) : refined.status();
+  const LensModel::State& state = refined->fit.state;
   const double side = std::max(picture.width, picture.height);
   if (!(state.lens.f > kMinFocal * side && state.lens.f < kMaxFocal * side))
     return unknown("its focal length would be " + number_text(state.lens.f / side) + " times the longer side");
 
-  const LensModel::Information covariance = settled->refined.covariance();
+  const LensModel::Information covariance = refined->fit.covariance();
   const double variance = covariance(6, 6);
   if (!covariance.allFinite() || !(variance >= 0 && variance < kMaxSigma * kMaxSigma))
     return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
-  MotionAndLens result{marginal_motion(problem, *settled, covariance.topLeftCorner<6, 6>(), original), state.lens,
+  MotionAndLens result{marginal_motion(problem, *refined, covariance.topLeftCorner<6, 6>(), original), state.lens,
                        std::sqrt(variance)};
-  if (const auto edited = if_edited(mono, picture, options, *settled)) {
+  if (const auto edited = if_edited(mono, picture, options, *refined)) {
     const double gain = problem.cost(state, max_cost(options)) - edited->cost;
     if (Status status = check_unedited(*edited, gain, picture); !status.ok()) return status;
   }

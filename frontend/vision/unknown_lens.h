@@ -1,4 +1,4 @@
-// The motion of a camera that nobody has calibrated: a photograph from anywhere against points of the map.
+// The pose of an uncalibrated camera: a photograph of unknown origin against points of the map.
 #pragma once
 
 #include <span>
@@ -9,21 +9,24 @@
 namespace relmap::vision {
 
 struct MotionAndLens {
-  Motion motion;  // its covariance has the uncertainty of the lens in it
+  Motion motion;  // its covariance includes the uncertainty of the lens
   Lens lens;
   double sigma_log_f = 0;  // standard deviation of log f
 };
 
-// As estimate_motion(), for a camera of which only the picture's size is known: the rest of `camera` is not read, and
-// disparities are not used. Focal lengths of 0.4 to 4 longer sides are tried, without distortion and with a wide
-// lens's; from what most correspondences agree with, pose and lens are refined together, and more correspondences agree
-// as the lens becomes known. What lenses are like is a prior: k1 and k2 move the picture's corners by 0 within 20 % and
-// 10 % of their distance from the centre (less where the lens is longer: a corner that is seen under the angle a to the
-// middle by 2 % and tan^2(a) / 5), the principal point is the centre within 2 % of the longer side, and pixels are
-// square within 0.5 % (one standard deviation each); of the focal length nothing is supposed. The covariance is the
-// marginal one, over all lenses. TOO_FEW_INLIERS; NO_CALIBRATION: what is seen does not tell the focal length within
-// 35 % (a wall seen from the front shows the same from near with a wide lens and from far with a long one), or it tells
-// that the picture was stretched, or is part of a larger one.
+// Like estimate_motion(), for a camera of which only the picture's size is known: nothing else of `camera` is read, and
+// disparities are not used. It tries focal lengths of 0.4 to 4 times the longer side, without distortion and with that
+// of a wide lens. From the one with the most inliers, pose and lens are refined together; the number of inliers grows
+// as the lens becomes known. The covariance is the marginal one of the pose.
+//
+// The prior of the lens, in standard deviations: k1 moves the picture's corners by a share s of their distance from the
+// centre, and k2 by s / 2, where s is 2 % + tan^2(a) / 5, but at most 20 %, for a corner at the angle a from the
+// optical axis (long lenses distort less); the principal point is 2 % of the longer side from the centre; pixels are
+// square within 0.5 %. The focal length has no prior.
+//
+// TOO_FEW_INLIERS. NO_CALIBRATION if the focal length cannot be determined within 35 % (a wall seen from the front
+// looks the same from near with a wide lens and from far with a long one), or if the picture was stretched or cropped
+// off centre.
 Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> correspondences,
                                                const StereoCamera& camera, const MotionOptions& options = {});
 

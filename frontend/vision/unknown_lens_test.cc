@@ -57,7 +57,7 @@ TEST(UnknownLens, IsFoundWithThePoseAmongWrongMatches) {
   }
 }
 
-TEST(UnknownLens, TheCovarianceHoldsItsUncertainty) {
+TEST(UnknownLens, TheCovarianceIncludesTheUncertaintyOfTheLens) {
   double nees = 0;
   constexpr int kTrials = 30;
   for (int i = 0; i < kTrials; ++i) {
@@ -143,7 +143,7 @@ Answers answers(const Lens& lens) {
   return answers;
 }
 
-TEST(UnknownLens, AStretchedPictureIsNotAnswered) {
+TEST(UnknownLens, AStretchedPictureIsRefused) {
   for (const double aspect : {0.85, 0.94, 1.06, 1.17}) {
     const Answers stretched = answers({700, 319.5, 239.5, 0, 0, aspect});
     EXPECT_EQ(stretched.given, 0) << aspect;
@@ -155,7 +155,7 @@ TEST(UnknownLens, AStretchedPictureIsNotAnswered) {
   EXPECT_EQ(answers({460, 319.5, 239.5, -0.28, 0.07, 1.17}).given, 0);
 }
 
-TEST(UnknownLens, APartOfAPictureIsNotAnswered) {
+TEST(UnknownLens, ACroppedPictureIsRefused) {
   for (const Lens& lens : {Lens{460, 213, 239.5, -0.28, 0.07}, Lens{700, 319.5, 350}}) {
     const Answers part = answers(lens);
     EXPECT_EQ(part.given, 0) << lens.f;
@@ -166,7 +166,7 @@ TEST(UnknownLens, APartOfAPictureIsNotAnswered) {
     EXPECT_EQ(answers(lens).given, 0) << lens.f << ' ' << lens.cx;
 }
 
-TEST(UnknownLens, PicturesAsCamerasTakeThemAreAnswered) {
+TEST(UnknownLens, UneditedPicturesAreAnswered) {
   for (const Lens& lens :
        {Lens{460, 312, 247, -0.28, 0.07}, Lens{700, 330, 230, 0, 0, 1.004}, Lens{1900, 319.5, 239.5}})
     EXPECT_EQ(answers(lens).given, 10) << lens.f;
@@ -177,7 +177,7 @@ TEST(UnknownLens, CannotBeToldFromAWallSeenFromTheFront) {
   EXPECT_EQ(found.reason(), Reason::NO_CALIBRATION) << found.status().to_string();
 }
 
-TEST(UnknownLens, WhatAgreesWithNoneIsRefused) {
+TEST(UnknownLens, CorrespondencesOfChanceAreRefused) {
   EXPECT_EQ(estimate_motion_and_lens(scene(4, plain(700), 120, 120, 1), kCamera, options()).reason(),
             Reason::TOO_FEW_INLIERS);
   EXPECT_EQ(estimate_motion_and_lens({}, kCamera, options()).reason(), Reason::TOO_FEW_INLIERS);

@@ -120,8 +120,8 @@ TEST_F(IidcUsb, ReadsWhatTheCameraCan) {
   ASSERT_TRUE(states.contains(Feature::kShutter) && states.contains(Feature::kGain) &&
               states.contains(Feature::kTrigger) && states.contains(Feature::kFrameRate));
   EXPECT_TRUE(states[Feature::kShutter].absolute);
-  EXPECT_NEAR(states[Feature::kShutter].absolute_most, 0.06, 1e-6);
-  EXPECT_EQ(states[Feature::kBrightness].most, 255u);
+  EXPECT_NEAR(states[Feature::kShutter].absolute_max, 0.06, 1e-6);
+  EXPECT_EQ(states[Feature::kBrightness].max, 255u);
   EXPECT_FALSE(states[Feature::kBrightness].can_be_auto);
 }
 

@@ -20,9 +20,9 @@ std::string number(double value) {
 
 std::string range_text(const FeatureState& state) {
   if (state.feature == Feature::kTrigger) return "";
-  std::string text = std::to_string(state.least) + " .. " + std::to_string(state.most);
+  std::string text = std::to_string(state.min) + " .. " + std::to_string(state.max);
   if (state.absolute)
-    text += " (" + number(state.absolute_least) + " .. " + number(state.absolute_most) + ' ' +
+    text += " (" + number(state.absolute_min) + " .. " + number(state.absolute_max) + ' ' +
             std::string(iidc::feature_unit(state.feature)) + ')';
   return text;
 }
@@ -62,12 +62,12 @@ Json json_of(const FeatureState& state) {
       .add("on", state.on)
       .add("auto", state.automatic)
       .add("value", std::uint64_t{state.value})
-      .add("least", std::uint64_t{state.least})
-      .add("most", std::uint64_t{state.most});
+      .add("least", std::uint64_t{state.min})
+      .add("most", std::uint64_t{state.max});
   if (state.absolute)
     json.add("absolute", double{state.absolute_value})
-        .add("absolute_least", double{state.absolute_least})
-        .add("absolute_most", double{state.absolute_most})
+        .add("absolute_least", double{state.absolute_min})
+        .add("absolute_most", double{state.absolute_max})
         .add("unit", iidc::feature_unit(state.feature));
   return json;
 }

@@ -1,4 +1,4 @@
-// The buses that programs look for cameras on.
+// Opens the buses on which programs look for cameras.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace relmap::iidc {
 
-// "usb", "1394", or "auto": both, as far as they can be had. UNSUPPORTED: none can.
+// `which` is "usb", "1394", or "auto" for both as far as they are available. UNSUPPORTED if none is.
 Result<std::vector<std::shared_ptr<iidc::CameraBus>>> open_camera_buses(const std::string& which);
 
 }  // namespace relmap::iidc

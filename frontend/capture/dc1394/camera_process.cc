@@ -24,7 +24,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kRegisterPatience{2000};  // libdc1394 gives up a register within one second
-constexpr milliseconds kPatience{5000};          // of what takes many registers
+constexpr milliseconds kPatience{5000};          // for requests that access many registers
 constexpr milliseconds kEndPatience{2000};
 
 std::string seconds(milliseconds time) { return std::to_string(time.count() / 1000) + " s"; }
@@ -33,7 +33,7 @@ Status gone(const std::string& how) {
   return {Reason::CAMERA_GONE, "the process that serves IEEE 1394 has ended (" + how + ")"};
 }
 
-// Nothing of this process goes with it but its socket, standard error and the environment.
+// The new process inherits only its socket, standard error and the environment.
 Result<pid_t> spawn(const std::string& program, const std::vector<std::string>& arguments, int socket) {
   std::vector<char*> argv = {const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
@@ -62,7 +62,7 @@ Result<pid_t> spawn(const std::string& program, const std::vector<std::string>& 
   return process;
 }
 
-// Whether it ended within that time; it is still to be waited for.
+// Whether the process ended within that time; it must still be reaped.
 bool ends_within(pid_t process, milliseconds patience) {
   const FileHandle handle(static_cast<int>(::syscall(SYS_pidfd_open, process, 0)));
   pollfd file{handle.get(), POLLIN, 0};
@@ -162,7 +162,7 @@ void CameraProcess::run() {
   if (!on_purpose) events_.ended(gone_);
 }
 
-// Until the socket is closed, at either end. What came that no sane process sends, if something did.
+// Receives until the socket is closed at either end. Returns an error if an invalid message arrived.
 Status CameraProcess::receive() {
   std::array<std::uint8_t, sizeof(Message)> buffer;
   for (;;) {

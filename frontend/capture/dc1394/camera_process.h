@@ -1,5 +1,5 @@
-// The process that serves a camera on IEEE 1394, from outside: it is started, asked, and ended; when it crashes or
-// hangs, that is an answer like others.
+// Controls the process that serves a camera on IEEE 1394: starts it, sends it requests, and ends it. A crash or hang is
+// reported like other errors.
 #pragma once
 
 #include <sys/types.h>
@@ -21,31 +21,33 @@
 
 namespace relmap::iidc::dc1394 {
 
-// What it does unasked; told by a thread of its own.
+// Receives unrequested messages of the process, on a thread of their own.
 class ProcessEvents {
  public:
   virtual ~ProcessEvents() = default;
-  // Frames and faults. Not OK: no sane process says that; it is killed.
+  // A frame or a fault. The process is killed if this does not return ok, since a working process does not send such a
+  // message.
   virtual Status told(const Message& message) = 0;
-  // By itself, or killed; it is not called where the process is ended on purpose. CAMERA_GONE.
+  // The process ended by itself or was killed; `why` is CAMERA_GONE. Not called if the process is ended on purpose.
   virtual void ended(const Status& why) = 0;
 };
 
 // Thread-safe.
 class CameraProcess {
  public:
-  // `events` must outlive it. UNSUPPORTED: there is no such program, or it is of another release; CAMERA_GONE: it ended
-  // or did not greet.
+  // Starts the program; `events` must outlive this object. UNSUPPORTED if there is no such program, or it is of another
+  // release; CAMERA_GONE if it ended or did not send its greeting.
   static Result<std::unique_ptr<CameraProcess>> start(const std::string& program,
                                                       const std::vector<std::string>& arguments, ProcessEvents& events);
-  // At the other end of a socket, whoever that is; `process`: to be killed and waited for, if it is one.
+  // Uses whatever is at the other end of a socket; if that is a process, `process` is killed and waited for.
   static Result<std::unique_ptr<CameraProcess>> at(FileHandle socket, std::optional<pid_t> process,
                                                    ProcessEvents& events);
-  // It ends with its socket; it is killed if that takes more than 2 s.
+  // Closes the socket, which ends the process; kills it after 2 s.
   ~CameraProcess();
 
-  // The answer where it is OK, else its status. CAMERA_GONE: the process has ended, or did not answer in time (2 s for
-  // registers, 5 s for the rest) and was killed. `file` goes with the request.
+  // Sends a request, with a file descriptor if `file` >= 0, and returns the answer if it is ok, or its status
+  // otherwise. CAMERA_GONE if the process has ended, or did not answer in time (2 s for registers, 5 s for the rest)
+  // and was killed.
   Result<Message> ask(Request request, int file = -1);
 
  private:
@@ -61,12 +63,12 @@ class CameraProcess {
   const std::optional<pid_t> process_;
   ProcessEvents& events_;
 
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the members below
   std::condition_variable news_;
-  std::optional<std::uint64_t> version_;                     // that it greeted with
-  std::map<std::uint32_t, std::optional<Message>> answers_;  // awaited
+  std::optional<std::uint64_t> version_;                     // from its greeting
+  std::map<std::uint32_t, std::optional<Message>> answers_;  // of pending requests, by number
   std::uint32_t last_number_ = 0;
-  std::string killed_for_;  // empty: it is not to be killed
+  std::string killed_for_;  // why it was killed; empty if it was not
   Status gone_;
   bool ending_ = false;
 

@@ -30,7 +30,7 @@ std::string program_of(const Dc1394Options& options) {
   return fs::read_symlink("/proc/self/exe", error).replace_filename("relmap-camera-1394");
 }
 
-// A process that is asked for the cameras and ended again.
+// A process that only lists the cameras.
 class Lister : private ProcessEvents {
  public:
   explicit Lister(RestartPause& pause) : pause_(pause) {}
@@ -86,10 +86,10 @@ class Dc1394Bus : public CameraBus {
   }
 
  private:
-  // As far as it is known without a process for each.
+  // The list as far as it is known without a process for each camera.
   Result<std::vector<CameraAddress>> there() {
     std::vector<CameraAddress> addresses;
-    if (!arguments_.empty()) {  // the kernel's list has not those on USB
+    if (!arguments_.empty()) {  // the kernel's list does not have cameras on USB
       if (Status status = pause_->allows_start(); !status.ok()) return status;
       const auto guids = Lister(*pause_).guids(program_, arguments_);
       if (!guids.ok()) return guids.status();
@@ -130,7 +130,7 @@ class Dc1394Bus : public CameraBus {
     return link;
   }
 
-  // A camera remains who it is: that is asked but once.
+  // The identity of a camera does not change, so it is read only once.
   void identify_once(CameraAddress& address) {
     {
       const std::lock_guard lock(mutex_);

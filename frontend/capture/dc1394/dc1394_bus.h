@@ -1,5 +1,5 @@
-// IIDC cameras on IEEE 1394. libdc1394 serves them, each in a process of its own, relmap-camera-1394: what it may not
-// survive (a crash of libdc1394, a hang) costs that camera a restart, and neither this process nor another camera.
+// IIDC cameras on IEEE 1394. libdc1394 serves each in a process of its own, relmap-camera-1394, so that a crash or hang
+// of libdc1394 costs that camera a restart, and affects neither this process nor other cameras.
 #pragma once
 
 #include <memory>
@@ -11,14 +11,14 @@
 namespace relmap::iidc {
 
 struct Dc1394Options {
-  std::string program;   // empty: $RELMAP_CAMERA_1394, else relmap-camera-1394 beside the running program
-  bool usb_too = false;  // cameras that libdc1394 reaches over USB, and not only those: for tests
-  std::string nodes;     // empty: /sys/bus/firewire/devices
+  std::string program;   // if empty, $RELMAP_CAMERA_1394, or else relmap-camera-1394 beside the running program
+  bool usb_too = false;  // also the cameras that libdc1394 reaches over USB; for tests
+  std::string nodes;     // if empty, /sys/bus/firewire/devices
 };
 
-// UNSUPPORTED: the program is not installed. Whether there is a bus, its cameras() tell. Nothing tells of cameras that
-// come and go: wait_for_change() only waits. Processes are started when cameras are opened, also to learn who they are;
-// after they crashed, at most every 2 s. open() and links may take up to 5 s where a process hangs.
+// UNSUPPORTED if the program is not installed; cameras() says whether there is a bus. Cameras that come and go are not
+// noticed: wait_for_change() only waits. A process is started whenever a camera is opened, also to identify it; after
+// crashes, at most every 2 s. If a process hangs, open() and links may take up to 5 s.
 Result<std::shared_ptr<CameraBus>> open_dc1394_bus(const Dc1394Options& options = {});
 
 }  // namespace relmap::iidc

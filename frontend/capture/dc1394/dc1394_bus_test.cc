@@ -51,7 +51,7 @@ class Iidc1394Bus : public ::testing::Test {
   static constexpr std::uint64_t kGuid = 0x00b0'9d01'00c0'ffee;
 };
 
-TEST_F(Iidc1394Bus, AProgramThatIsNotThereIsNamed) {
+TEST_F(Iidc1394Bus, AMissingProgramIsNamed) {
   EXPECT_EQ("UNSUPPORTED: IEEE 1394 is served by " + options_.program + ", which is not installed",
             open_dc1394_bus(options_).status().to_string());
   options_.program.clear();
@@ -73,7 +73,7 @@ TEST_F(Iidc1394Bus, WithoutABusNoProcessIsStarted) {
   EXPECT_FALSE(fs::exists(folder_ / "started"));
 }
 
-TEST_F(Iidc1394Bus, ACrashIsTold) {
+TEST_F(Iidc1394Bus, ACrashIsReported) {
   const auto bus = with_program("kill -SEGV $$");
   const auto cameras = bus->cameras();
   ASSERT_TRUE(cameras.ok()) << cameras.status().to_string();
@@ -101,7 +101,7 @@ TEST_F(Iidc1394Bus, AProcessThatCrashesIsNotStartedAgainAtOnce) {
   EXPECT_LE(fs::file_size(starts), 5u);
 }
 
-TEST_F(Iidc1394Bus, AProgramThatIsNoneLeavesNothingOpen) {
+TEST_F(Iidc1394Bus, AnInvalidProgramLeavesNoFilesOpen) {
   const auto bus = with_program("exit 0");
   (void)bus->open(kGuid);
   const std::size_t before = open_files();

@@ -8,7 +8,7 @@ namespace relmap::iidc::dc1394 {
 
 namespace {
 
-constexpr std::size_t kMaxArrivals = 512;  // of faults, that nobody asks for
+constexpr std::size_t kMaxArrivals = 512;  // bounds faults that are not taken
 
 }  // namespace
 
@@ -117,7 +117,7 @@ Status Dc1394Link::queue_frame(const Message& message) {
   return {};
 }
 
-// Nobody took it: it makes room for the next. Those behind it tell that it is missing.
+// Drops a frame that was not taken, to make room. The frame after it states the loss (RawFrame::overrun).
 void Dc1394Link::drop_oldest() {
   const auto is_frame = [](const Arrival& arrival) { return arrival.status.ok(); };
   const auto oldest = std::find_if(arrivals_.begin(), arrivals_.end(), is_frame);

@@ -1,4 +1,4 @@
-// A camera on IEEE 1394, behind a process of its own.
+// A camera on IEEE 1394, served by a process of its own.
 #pragma once
 
 #include <condition_variable>
@@ -22,9 +22,9 @@ class Dc1394Link : public CameraLink, private ProcessEvents {
  public:
   explicit Dc1394Link(std::shared_ptr<RestartPause> pause) : pause_(std::move(pause)) {}
 
-  // Before all else, once. CameraProcess::start()'s reasons, and CameraBus::open()'s.
+  // Must be called once, before all other functions. The reasons of CameraProcess::start() and CameraBus::open().
   Status open(const std::string& program, const std::vector<std::string>& arguments, std::uint64_t guid);
-  // The same with a process that runs already, for tests.
+  // The same with a process that is already running, for tests.
   Status open_at(FileHandle socket, std::uint64_t guid);
   const std::string& place() const { return place_; }
 
@@ -37,7 +37,7 @@ class Dc1394Link : public CameraLink, private ProcessEvents {
 
  private:
   struct Arrival {
-    Status status;  // of a frame that is lost; else:
+    Status status;  // not ok if the frame is lost; otherwise:
     RawFrame frame;
   };
 
@@ -50,15 +50,15 @@ class Dc1394Link : public CameraLink, private ProcessEvents {
   const std::shared_ptr<RestartPause> pause_;
   std::string place_;
 
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the members below
   std::condition_variable news_;
-  std::shared_ptr<FrameRing> ring_;  // of the stream that is received
+  std::shared_ptr<FrameRing> ring_;  // of the current stream
   std::size_t image_bytes_ = 0;
   std::deque<Arrival> arrivals_;
   std::uint64_t overrun_ = 0;  // since the last frame that was queued
   Status gone_;
 
-  std::unique_ptr<CameraProcess> process_;  // tells the rest what happens: it goes first
+  std::unique_ptr<CameraProcess> process_;  // last, so that it is destroyed first: it calls told() and ended()
 };
 
 }  // namespace relmap::iidc::dc1394

@@ -100,7 +100,7 @@ TEST_F(Iidc1394Link, FramesComeInOrder) {
   }
 }
 
-TEST_F(Iidc1394Link, TheOldestGoesWhereNobodyTakesThem) {
+TEST_F(Iidc1394Link, TheOldestFrameIsDroppedIfNoneIsTaken) {
   start(4);
   // The link makes room as soon as it comes to it.
   for (std::uint8_t i = 0; i < 20; ++i)
@@ -137,7 +137,7 @@ TEST_F(Iidc1394Link, LentFramesAreLeftAlone) {
   EXPECT_EQ(0, kept[0].data.get()[0]);
 }
 
-TEST_F(Iidc1394Link, FaultsAreTold) {
+TEST_F(Iidc1394Link, FaultsAreReported) {
   start();
   process.say(Message::fault({Reason::SHORT_FRAME, "half of one"}));
   EXPECT_EQ("SHORT_FRAME: half of one", link.next(seconds(2)).status().to_string());
@@ -161,7 +161,7 @@ TEST_F(Iidc1394Link, ARefusedStartLeavesItAsItWas) {
   EXPECT_EQ(Reason::BUDGET_EXCEEDED, Dc1394Link(pause).start({std::size_t{1} << 40, kFrame, 4}).reason());
 }
 
-TEST_F(Iidc1394Link, AnEndIsAnAnswerToAllThatWaits) {
+TEST_F(Iidc1394Link, TheEndOfTheProcessAnswersAllWaits) {
   process.answers = [this](const Request& request, Message&) {
     if (request.ask == Ask::kRead) process.end();
     return true;
@@ -178,7 +178,7 @@ TEST_F(Iidc1394Link, AnEndIsAnAnswerToAllThatWaits) {
   EXPECT_EQ(Reason::CAMERA_GONE, pause->allows_start().reason());
 }
 
-TEST_F(Iidc1394Link, AHangIsAnEnd) {
+TEST_F(Iidc1394Link, AHangCountsAsTheEndOfTheProcess) {
   process.answers = [](const Request& request, Message&) { return request.ask != Ask::kRead; };
   open();
   std::uint32_t quadlet = 0;
@@ -194,7 +194,7 @@ TEST_F(Iidc1394Link, AnotherReleaseIsRefused) {
             link.open_at(process.begin(), 1).to_string());
 }
 
-TEST_F(Iidc1394Link, RubbishEndsIt) {
+TEST_F(Iidc1394Link, InvalidMessagesEndTheProcess) {
   start();
   process.say(std::vector<std::uint8_t>(17, 1));
   EXPECT_EQ("the process that serves IEEE 1394 has ended (it spoke nonsense, a packet of 17 bytes instead of " +
@@ -202,13 +202,13 @@ TEST_F(Iidc1394Link, RubbishEndsIt) {
             end());
 }
 
-TEST_F(Iidc1394Link, TooLongAPacketEndsIt) {
+TEST_F(Iidc1394Link, TooLongAPacketEndsTheProcess) {
   start();
   process.say(std::vector<std::uint8_t>(5000, 1));
   EXPECT_NE(std::string::npos, end().find("a packet of 5000 bytes"));
 }
 
-TEST_F(Iidc1394Link, FramesNowhereEndIt) {
+TEST_F(Iidc1394Link, FramesInInvalidSlotsEndTheProcess) {
   for (const Message& mad : {Message::frame(4, kFrame, 0, 0), Message::frame(0xffff'ffff, kFrame, 0, 0),
                              Message::frame(0, kFrame + 1, 0, 0), Message::frame(0, kFrame - 101, 0, 0)}) {
     FakeProcess mad_process;
@@ -220,7 +220,7 @@ TEST_F(Iidc1394Link, FramesNowhereEndIt) {
   }
 }
 
-TEST_F(Iidc1394Link, AFrameTwiceInOneSlotEndsIt) {
+TEST_F(Iidc1394Link, AFrameTwiceInOneSlotEndsTheProcess) {
   start();
   process.say(Message::frame(1, kFrame, 0, 0));
   const auto kept = link.next(seconds(2));
@@ -229,7 +229,7 @@ TEST_F(Iidc1394Link, AFrameTwiceInOneSlotEndsIt) {
   EXPECT_NE(std::string::npos, end().find("a frame in slot 1, which it has not"));
 }
 
-TEST_F(Iidc1394Link, AFrameWithoutAStreamEndsIt) {
+TEST_F(Iidc1394Link, AFrameWithoutAStreamEndsTheProcess) {
   open();
   process.say(Message::frame(0, kFrame, 0, 0));
   std::uint32_t quadlet = 0;
@@ -238,13 +238,13 @@ TEST_F(Iidc1394Link, AFrameWithoutAStreamEndsIt) {
   EXPECT_NE(std::string::npos, status.message().find("a frame that nobody waits for"));
 }
 
-TEST_F(Iidc1394Link, AnAnswerToNothingEndsIt) {
+TEST_F(Iidc1394Link, AnUnrequestedAnswerEndsTheProcess) {
   start();
   process.say(Message::answer(1234, {}));
   EXPECT_NE(std::string::npos, end().find("an answer to request 1234, which is not open"));
 }
 
-TEST_F(Iidc1394Link, AnyBytesEndItOrNot) {
+TEST_F(Iidc1394Link, SurvivesAnyBytes) {
   std::mt19937 random(7);
   for (int round = 0; round < 100; ++round) {
     FakeProcess mad;

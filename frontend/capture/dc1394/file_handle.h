@@ -1,4 +1,4 @@
-// A file descriptor that is closed when it goes.
+// Owns a file descriptor.
 #pragma once
 
 #include <unistd.h>

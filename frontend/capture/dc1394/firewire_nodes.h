@@ -1,4 +1,4 @@
-// What hangs on this machine's IEEE 1394 buses, as the kernel tells.
+// Lists the devices on this machine's IEEE 1394 buses, from the kernel.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ inline constexpr const char* kFirewireNodes = "/sys/bus/firewire/devices";
 struct FirewireNode {
   std::uint64_t guid = 0;
   std::string file;           // "/dev/fw1"
-  std::string vendor, model;  // empty where it does not say
-  bool camera = false;        // it has a unit of IIDC
+  std::string vendor, model;  // empty if not stated
+  bool camera = false;        // it has an IIDC unit
 };
 
-// By their files. UNSUPPORTED: the machine has no adapter, or its kernel no driver for one.
+// Sorted by file. UNSUPPORTED if the machine has no adapter, or the kernel no driver for it.
 Result<std::vector<FirewireNode>> firewire_nodes(const std::string& folder = kFirewireNodes);
 
 }  // namespace relmap::iidc::dc1394

@@ -1,4 +1,4 @@
-// Packets over a Unix SOCK_SEQPACKET socket; a file may come with one.
+// Packets over a Unix SOCK_SEQPACKET socket, optionally with a file descriptor.
 #pragma once
 
 #include <cstddef>
@@ -11,17 +11,17 @@
 
 namespace relmap::iidc::dc1394 {
 
-// Both are closed on exec. IO_ERROR: no more files can be opened.
+// Both ends are closed on exec. IO_ERROR if no more files can be opened.
 Result<std::pair<FileHandle, FileHandle>> socket_pair();
 
-// Does not wait. IO_ERROR: the other end is closed, or does not read what it has.
+// Does not block. IO_ERROR if the other end is closed, or its buffer is full.
 Status send_packet(int socket, std::span<const std::uint8_t> bytes, int file = -1);
 
 struct Packet {
-  std::size_t size = 0;  // as it was sent: of a longer one than the buffer the rest is lost
+  std::size_t size = 0;  // as sent; what does not fit into the buffer is lost
   FileHandle file;
 };
-// Waits. IO_ERROR: the other end is closed, or this one is shut down.
+// Blocks. IO_ERROR if the other end is closed, or this one is shut down.
 Result<Packet> receive_packet(int socket, std::span<std::uint8_t> buffer);
 
 }  // namespace relmap::iidc::dc1394

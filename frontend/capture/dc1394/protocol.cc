@@ -20,7 +20,7 @@ Status copy(std::span<const std::uint8_t> bytes, Packet& packet) {
   return {};
 }
 
-// The field as a number: an enumeration that came as bytes may hold any.
+// The field as a number, since an enumeration that was received as bytes may have any value.
 template <typename Field>
 auto raw(const Field& field) {
   std::underlying_type_t<Field> number;
@@ -93,7 +93,7 @@ Result<Message> parse_message(std::span<const std::uint8_t> bytes) {
   if (message.tell == Tell::kFault && message.reason == Reason::OK)
     return {Reason::CORRUPT, "a fault without a reason"};
   message.text.back() = 0;
-  for (char& letter : message.text)  // it goes to people's terminals
+  for (char& letter : message.text)  // it is shown on terminals
     if (letter != 0 && (letter < ' ' || letter > '~')) letter = '?';
   return message;
 }

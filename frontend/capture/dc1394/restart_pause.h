@@ -1,4 +1,5 @@
-// How soon a process that crashes is started again: at once after the first time, later and later when it goes on.
+// Limits how soon a process that crashes is started again: at once after the first crash, with growing pauses if it
+// continues to crash.
 #pragma once
 
 #include <chrono>
@@ -13,10 +14,10 @@ class RestartPause {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kFirst{100}, kMax{2000};
-  static constexpr std::chrono::seconds kForgotten{10};  // without a crash
+  static constexpr std::chrono::seconds kForgotten{10};  // after this time without a crash the pause is reset
 
   void crashed(const Status& how, Clock::time_point now = Clock::now());
-  // CAMERA_GONE, with what it crashed by: not yet.
+  // CAMERA_GONE, with the cause of the crash, if the process must not be started yet.
   Status allows_start(Clock::time_point now = Clock::now()) const;
 
  private:

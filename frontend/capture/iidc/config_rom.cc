@@ -51,7 +51,8 @@ const Entry* find(const std::vector<Entry>& entries, Key key) {
   return nullptr;
 }
 
-// Of a leaf: its length, two quadlets of coding (0: ASCII), characters until the first 0. Printable ones alone.
+// The text of a leaf: its length, two quadlets of coding (0 for ASCII), characters up to the first 0. Only printable
+// characters are kept.
 std::string text(Quadlets rom, const Entry* leaf) {
   std::string found;
   if (!leaf || leaf->target >= rom.size()) return found;

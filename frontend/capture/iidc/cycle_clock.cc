@@ -8,13 +8,13 @@ namespace relmap::iidc {
 namespace {
 
 constexpr double kWrap = 128, kCycle = 125e-6, kTick = 1 / 24.576e6;
-constexpr double kWindow = 120;      // s, of readings
-constexpr double kDriftSpan = 10;    // s, below which the rate is taken for 1
-constexpr double kMinDoubt = 20e-6;  // s: what scheduling adds to any reading
-constexpr double kMisfit = 0.05;     // s beyond its own doubt: another clock
+constexpr double kWindow = 120;      // s; older readings are dropped
+constexpr double kDriftSpan = 10;    // s; with a shorter span of readings the rate is assumed to be 1
+constexpr double kMinDoubt = 20e-6;  // s; scheduling adds this to any reading
+constexpr double kMisfit = 0.05;     // s beyond its own doubt, for a reading to be of another clock
 constexpr double kMaxDrift = 1e-3;   // crystals keep 1e-4
 
-// The turn of `wrapped` (0 .. 128) that is nearest to `near`.
+// The unwrapped value of `wrapped` (0 .. 128) that is nearest to `near`.
 double unwrap(double wrapped, double near) { return wrapped + kWrap * std::round((near - wrapped) / kWrap); }
 
 }  // namespace
@@ -86,9 +86,9 @@ std::optional<double> CycleClock::drift_ppm() const {
 }
 
 double CycleClock::uncertainty_us() const {
-  double least = 0;
-  for (const Reading& r : readings_) least = least == 0 ? r.doubt_s : std::min(least, r.doubt_s);
-  return 1e6 * least;
+  double min_doubt = 0;
+  for (const Reading& r : readings_) min_doubt = min_doubt == 0 ? r.doubt_s : std::min(min_doubt, r.doubt_s);
+  return 1e6 * min_doubt;
 }
 
 }  // namespace relmap::iidc

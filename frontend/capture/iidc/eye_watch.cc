@@ -10,8 +10,8 @@ namespace relmap::iidc {
 namespace {
 
 constexpr int kStepX = 16, kStepY = 8;  // pixels of the grid
-constexpr int kBlank = 6;               // grey levels between the darkest and the brightest: noise alone has as many
-constexpr int kFrozen = 5;              // pairs; two exposures differ by their noise at least
+constexpr int kBlank = 6;               // grey levels between the darkest and the brightest pixel, as noise alone has
+constexpr int kFrozen = 5;              // pairs without any change; the noise of two exposures always differs
 
 struct Seen {
   std::vector<std::uint8_t> grid;

@@ -1,4 +1,4 @@
-// Notices that one eye of a camera is dead: dark, blank, or frozen while the other one sees.
+// Detects a dead eye of a camera: one that is dark, blank, or frozen while the other one sees.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace relmap::iidc {
 // Looks at a grid of pixels of each pair. Not thread-safe.
 class EyeWatch {
  public:
-  // EYE_DEAD, which one and why. Where both are blank it is dark, and no eye is dead.
+  // EYE_DEAD for a dead eye, with the cause. If both eyes are blank, it is dark, and neither is dead.
   struct Verdict {
     Status left, right;
   };
@@ -22,7 +22,7 @@ class EyeWatch {
  private:
   struct Eye {
     std::vector<std::uint8_t> grid;
-    int frozen = 0;  // pairs in a row in which it alone did not change
+    int frozen = 0;  // consecutive pairs in which only the other eye changed
   };
   std::array<Eye, 2> eyes_;
 };

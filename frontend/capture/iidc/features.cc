@@ -67,7 +67,7 @@ std::string number(double value) {
   return text;
 }
 
-// The whole of `text`.
+// All of `text` as a number.
 template <typename Number>
 std::optional<Number> parsed(std::string_view text) {
   Number value{};
@@ -76,7 +76,7 @@ std::optional<Number> parsed(std::string_view text) {
   return value;
 }
 
-// Up to the next comma, which goes as well.
+// Removes and returns the text up to the next comma, which is removed, too.
 std::string_view next_part(std::string_view& text) {
   const std::size_t comma = text.find(',');
   const std::string_view part = text.substr(0, comma);
@@ -113,18 +113,18 @@ Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature
   state.can_be_auto = *inquired & inquiry::kAuto;
   state.can_be_set = *inquired & inquiry::kManual;
   state.can_once = *inquired & inquiry::kOnePush;
-  // Their fields lie elsewhere than others': they are looked at only.
+  // The fields of these features are elsewhere than others', so they can only be read.
   if (feature == Feature::kTemperature || feature == Feature::kWhiteShading)
     state.can_be_set = state.can_be_auto = state.can_once = false;
   state.on = *now & control::kOn;
-  if (feature == Feature::kTrigger) {  // its inquiry tells sources and modes
+  if (feature == Feature::kTrigger) {  // its inquiry register lists sources and modes
     state.can_be_set = true;
     state.can_be_auto = state.can_once = false;
     state.value = (*now >> control::kSourceShift & 7) << 4 | (*now >> control::kModeShift & 15);
     return state;
   }
-  state.least = *inquired >> inquiry::kMinShift & control::kValue;
-  state.most = *inquired & control::kValue;
+  state.min = *inquired >> inquiry::kMinShift & control::kValue;
+  state.max = *inquired & control::kValue;
   state.automatic = *now & control::kAuto;
   state.by_absolute = *now & control::kAbsolute;
   state.value = *now & (feature == Feature::kWhiteBalance ? 0xff'ffffu : control::kValue);
@@ -132,14 +132,14 @@ Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature
   const auto values = registers.at(place.absolute);
   if (values.reason() == Reason::UNSUPPORTED) return state;
   if (!values.ok()) return values.status();
-  for (const auto& [offset, into] : {std::pair{absolute::kMin, &state.absolute_least},
-                                     {absolute::kMax, &state.absolute_most},
+  for (const auto& [offset, into] : {std::pair{absolute::kMin, &state.absolute_min},
+                                     {absolute::kMax, &state.absolute_max},
                                      {absolute::kValue, &state.absolute_value}}) {
     const auto bits = values->read(offset);
     if (!bits.ok()) return bits.status();
     *into = std::bit_cast<float>(*bits);
   }
-  state.absolute = std::isfinite(state.absolute_least) && std::isfinite(state.absolute_most);
+  state.absolute = std::isfinite(state.absolute_min) && std::isfinite(state.absolute_max);
   return state;
 }
 
@@ -196,7 +196,7 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
   const auto write = [&](std::uint32_t bits, std::uint32_t mask) {
     return registers.write_kept(place.control, control::kPresent | bits, mask, name);
   };
-  // Bits that mean nothing to this feature may read as they like.
+  // Bits that have no meaning for this feature may have any value.
   const std::uint32_t off_auto = (state->can_be_off ? control::kOn : 0) | (state->can_be_auto ? control::kAuto : 0);
   switch (setting.how) {
     case How::kTurnOff:
@@ -210,25 +210,25 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
     case How::kAuto:
       if (!state->can_be_auto) return lacks(feature, "automatic mode");
       return write(control::kOn | control::kAuto | state->value, off_auto);
-    case How::kOnce:  // the bit falls by itself when it is done
+    case How::kOnce:  // the camera clears the bit when it is done
       if (!state->can_once) return lacks(feature, "one-push mode");
       return write(control::kOn | control::kOnePush | state->value, off_auto);
     case How::kValue: {
       if (!state->can_be_set) return lacks(feature, "manual mode");
       const bool pair = feature == Feature::kWhiteBalance;
       const std::uint32_t high = pair ? setting.value >> 12 : setting.value, low = setting.value & control::kValue;
-      if (high < state->least || high > state->most || (pair && (low < state->least || low > state->most)))
-        return {Reason::INVALID_ARGUMENT, std::string(feature_name(feature)) + " takes " +
-                                              std::to_string(state->least) + " .. " + std::to_string(state->most) +
-                                              ", not " + std::to_string(setting.value)};
+      if (high < state->min || high > state->max || (pair && (low < state->min || low > state->max)))
+        return {Reason::INVALID_ARGUMENT, std::string(feature_name(feature)) + " takes " + std::to_string(state->min) +
+                                              " .. " + std::to_string(state->max) + ", not " +
+                                              std::to_string(setting.value)};
       return write(control::kOn | setting.value, off_auto | control::kAbsolute | (pair ? 0xff'ffffu : control::kValue));
     }
     case How::kAbsolute: {
       if (!state->absolute || !state->can_be_set) return lacks(feature, "value in units");
-      if (setting.absolute < state->absolute_least || setting.absolute > state->absolute_most)
-        return {Reason::INVALID_ARGUMENT, std::string(feature_name(feature)) + " takes " +
-                                              number(state->absolute_least) + " .. " + number(state->absolute_most) +
-                                              ' ' + known(feature).unit + ", not " + number(setting.absolute)};
+      if (setting.absolute < state->absolute_min || setting.absolute > state->absolute_max)
+        return {Reason::INVALID_ARGUMENT, std::string(feature_name(feature)) + " takes " + number(state->absolute_min) +
+                                              " .. " + number(state->absolute_max) + ' ' + known(feature).unit +
+                                              ", not " + number(setting.absolute)};
       if (Status status = write(control::kOn | control::kAbsolute | state->value, off_auto | control::kAbsolute);
           !status.ok())
         return status;
@@ -238,9 +238,9 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
         return status;
       const auto kept = values->read(absolute::kValue);
       if (!kept.ok()) return kept.status();
-      // A sensor has steps: a hundredth, or the step of the raw values.
-      const float got = std::bit_cast<float>(*kept), range = state->absolute_most - state->absolute_least;
-      const float step = range / static_cast<float>(std::max(1u, state->most - state->least));
+      // A sensor has discrete steps: tolerate a hundredth, or one step of the raw values.
+      const float got = std::bit_cast<float>(*kept), range = state->absolute_max - state->absolute_min;
+      const float step = range / static_cast<float>(std::max(1u, state->max - state->min));
       if (!(std::abs(got - setting.absolute) <= std::max(step, 0.01f * std::abs(setting.absolute))))
         return {Reason::REGISTER_REFUSED,
                 name + " holds " + number(got) + " after " + number(setting.absolute) + " was written"};

@@ -1,4 +1,4 @@
-// What can be set at a camera besides its video mode: exposure and its kind, the trigger, strobes.
+// The settings of a camera besides its video mode: exposure and other features, trigger, strobes.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace relmap::iidc {
 
-// In the order of their registers (FEATURE_HI_INQ, FEATURE_LO_INQ); the last four are of the low half.
+// In the order of their registers (FEATURE_HI_INQ, FEATURE_LO_INQ); the last four are in the low half.
 enum class Feature : std::uint8_t {
   kBrightness,
   kAutoExposure,
@@ -37,27 +37,27 @@ enum class Feature : std::uint8_t {
 };
 inline constexpr int kFeatures = 20;
 
-// "auto_exposure"; by that name, or nothing.
+// The name, as in "auto_exposure", and the feature of a name, if there is one.
 std::string_view feature_name(Feature feature);
 std::optional<Feature> feature_by_name(std::string_view name);
-// "s", "dB", "fps", ...; empty where it has no unit.
+// The unit of absolute values: "s", "dB", "fps", ...; empty if it has none.
 std::string_view feature_unit(Feature feature);
 
 struct FeatureState {
   Feature feature{};
   bool can_be_off = false, can_be_auto = false, can_be_set = false, can_once = false;
-  std::uint32_t least = 0, most = 0;
-  bool absolute = false;  // has values in units
-  float absolute_least = 0, absolute_most = 0;
-  // As it is.
+  std::uint32_t min = 0, max = 0;
+  bool absolute = false;  // it has absolute values, in feature_unit()
+  float absolute_min = 0, absolute_max = 0;
+  // The current state.
   bool on = false, automatic = false, by_absolute = false;
-  std::uint32_t value = 0;  // of white balance U/B << 12 | V/R; of the trigger its source << 4 | mode
+  std::uint32_t value = 0;  // white balance: U/B << 12 | V/R; trigger: source << 4 | mode
   float absolute_value = 0;
 };
 
-// Those that the camera has.
+// Reads all features that the camera has.
 Result<std::vector<FeatureState>> read_features(const RegisterFile& registers);
-// UNSUPPORTED: it has no such feature.
+// UNSUPPORTED if the camera does not have the feature.
 Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature);
 
 struct FeatureSetting {
@@ -67,37 +67,38 @@ struct FeatureSetting {
   std::uint32_t value = 0;
   float absolute = 0;
 
-  // "auto", "off", "on", "once" (set automatically now, then kept), "128" (raw), "abs 0.0125" (s, dB, ... as
-  // feature_unit()). INVALID_ARGUMENT: what is none of them, no such name, or not for the trigger (TriggerSetting).
+  // Parses "auto", "off", "on", "once" (set automatically now, then kept), "128" (raw), or "abs 0.0125" (in
+  // feature_unit()). INVALID_ARGUMENT for any other text, for an unknown name, and for the trigger, which has
+  // TriggerSetting.
   static Result<FeatureSetting> parse(std::string_view name, std::string_view text);
 };
 
-// Read back. UNSUPPORTED: the camera has not that feature, or cannot do that with it; INVALID_ARGUMENT: beyond its
-// range, which the message tells; REGISTER_REFUSED.
+// Sets a feature and reads it back. UNSUPPORTED if the camera does not have the feature or that mode of it;
+// INVALID_ARGUMENT if the value is out of range, which the message states; REGISTER_REFUSED.
 Status set_feature(const RegisterFile& registers, const FeatureSetting& setting);
 
 struct TriggerSetting {
   bool on = false;
-  int mode = 0;    // 0 edge starts the exposure, 1 level lasts as long as it, ... 15 (TRIGGER_MODE)
+  int mode = 0;    // 0 .. 15 (TRIGGER_MODE): 0 an edge starts the exposure, 1 the level lasts as long as the exposure
   int source = 0;  // 0 .. 3 pins, 7 software
   bool active_high = false;
 
-  // "off", or "MODE,SOURCE" with "high" or "low" behind: "0,7", "0,0,high". INVALID_ARGUMENT.
+  // Parses "off", or "MODE,SOURCE" optionally followed by "high" or "low": "0,7", "0,0,high". INVALID_ARGUMENT.
   static Result<TriggerSetting> parse(std::string_view text);
 };
-// As set_feature().
+// The reasons of set_feature().
 Status set_trigger(const RegisterFile& registers, const TriggerSetting& setting);
 
 struct StrobeSetting {
   int pin = 0;  // 0 .. 3
   bool on = false;
   bool active_high = false;
-  std::uint32_t delay = 0, duration = 0;  // raw, 12 bits; duration 0: as long as the exposure
+  std::uint32_t delay = 0, duration = 0;  // raw, 12 bits; a duration of 0 means as long as the exposure
 
-  // "PIN,off", "PIN,high,DELAY,DURATION". INVALID_ARGUMENT.
+  // Parses "PIN,off" or "PIN,high,DELAY,DURATION". INVALID_ARGUMENT.
   static Result<StrobeSetting> parse(std::string_view text);
 };
-// As set_feature().
+// The reasons of set_feature().
 Status set_strobe(const RegisterFile& registers, const StrobeSetting& setting);
 
 }  // namespace relmap::iidc

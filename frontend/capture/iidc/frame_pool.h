@@ -1,4 +1,4 @@
-// Memory of frames, used again and again: a stream's transfers fill it, and frames that are read lend it.
+// A pool of frame buffers: transfers of a stream fill them, and frames that are read borrow them.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace relmap::iidc {
 
-// Thread-safe. Buffers that are lent when the pool goes are freed with their last user.
+// Thread-safe. The pool lives until the last buffer that was lent has been returned.
 class FramePool : public std::enable_shared_from_this<FramePool> {
  public:
   using Buffer = std::unique_ptr<std::uint8_t[]>;
 
-  // Nothing: there is no memory for that.
+  // Null if there is not enough memory.
   static std::shared_ptr<FramePool> make(std::size_t buffers, std::size_t bytes) {
     auto pool = std::make_shared<FramePool>();
     for (std::size_t i = 0; i < buffers; ++i) {
@@ -25,7 +25,7 @@ class FramePool : public std::enable_shared_from_this<FramePool> {
     return pool;
   }
 
-  // Empty where all are in use.
+  // Null if all buffers are in use.
   Buffer take() {
     const std::lock_guard lock(mutex_);
     if (free_.empty()) return nullptr;
@@ -37,7 +37,7 @@ class FramePool : public std::enable_shared_from_this<FramePool> {
     const std::lock_guard lock(mutex_);
     free_.push_back(std::move(buffer));
   }
-  // It comes back by itself.
+  // Lends a buffer; it returns to the pool with the last copy of the pointer.
   std::shared_ptr<const std::uint8_t> lend(Buffer buffer) {
     return {buffer.release(), [pool = shared_from_this()](std::uint8_t* bytes) { pool->give(Buffer(bytes)); }};
   }

@@ -75,7 +75,7 @@ Result<FoundCamera> choose_camera(const std::vector<std::shared_ptr<CameraBus>>&
   if (chosen && !chosen->address.usable.ok())
     return {chosen->address.usable.reason(), described(chosen->address) + ": " + chosen->address.usable.message()};
   if (chosen) return *chosen;
-  // One whose number cannot be read may be it.
+  // A camera whose number cannot be read may be the one.
   for (const FoundCamera& camera : found)
     if (camera.address.guid == 0)
       return {camera.address.usable.reason(), described(camera.address) + ": " + camera.address.usable.message()};

@@ -1,4 +1,4 @@
-// Who a camera is.
+// Identifies cameras and finds them on several buses.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace relmap::iidc {
 
-// GUID, serial number and names into `address`, by its ROM; where that cannot be read, why, into `usable`. Nothing
-// then.
+// Reads the ROM of a camera and sets GUID, serial number and names of `address`. If the ROM cannot be read, sets
+// `usable` to the cause and returns nothing.
 std::optional<ConfigRom> identify(CameraLink& link, CameraAddress& address);
 
 struct FoundCamera {
@@ -22,16 +22,16 @@ struct FoundCamera {
   std::shared_ptr<CameraBus> bus;
 };
 
-// Of all buses, each camera once: the first bus that it can be used by serves it. What a bus cannot say goes to
-// `troubles`, if that is not null.
+// Lists the cameras of all buses, each camera once, with the first bus on which it is usable. Errors of buses are added
+// to `troubles`, if that is not null.
 std::vector<FoundCamera> find_cameras(const std::vector<std::shared_ptr<CameraBus>>& buses,
                                       std::vector<Status>* troubles = nullptr);
 
-// The one of that serial number or GUID; empty: the only one. NO_CAMERA, with those that there are; INVALID_ARGUMENT:
-// there are several; why it cannot be used, where it is there but cannot.
+// The camera of that serial number or GUID; an empty `serial` means the only one. NO_CAMERA, with a list of those that
+// exist; INVALID_ARGUMENT if there are several; the camera's own reason if it is not usable.
 Result<FoundCamera> choose_camera(const std::vector<std::shared_ptr<CameraBus>>& buses, const std::string& serial);
 
-// Once more, by its GUID, wherever it hangs now: NO_CAMERA while it is away.
+// Opens a camera again by its GUID, on whatever bus and port it is now. NO_CAMERA while it is absent.
 Result<std::unique_ptr<CameraLink>> reopen(const std::vector<std::shared_ptr<CameraBus>>& buses, std::uint64_t guid);
 
 std::string guid_text(std::uint64_t guid);  // 16 hexadecimal digits

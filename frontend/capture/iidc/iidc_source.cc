@@ -98,7 +98,7 @@ capture::StereoLayout stereo_layout(const iidc::StreamFormat& format, const capt
 
 Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> buses, const IidcOptions& options,
                                  const std::atomic<bool>& stop) {
-  // Its settings are known by the serial number, so it is chosen before it is opened.
+  // The settings depend on the serial number, so the camera is chosen before it is opened.
   const auto chosen = iidc::choose_camera(buses, options.serial);
   if (!chosen.ok()) return chosen.status();
   OpenedCamera camera;

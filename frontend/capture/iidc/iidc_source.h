@@ -14,42 +14,42 @@
 namespace relmap::iidc {
 
 struct IidcOptions {
-  std::string serial;         // or GUID; empty: the only camera there is
-  std::string camera_folder;  // camera_folder.h; empty: the default one
+  std::string serial;         // or GUID; empty if there is only one camera
+  std::string camera_folder;  // see camera_folder.h; empty for the default one
   std::string calibration;    // a file or folder for load_calibration(), instead of the camera folder's
-  double rate_hz = 0;         // of frames; 0: what the camera's settings say, else the fastest
+  double rate_hz = 0;         // of frames; 0 for that of the camera's settings, or otherwise the fastest
 };
 
-// What a camera's settings.yaml asks for. BAD_CONFIG: a mode that there is none of, or features that are none.
+// The options in a camera's settings.yaml. BAD_CONFIG if its mode or a feature does not exist.
 Result<iidc::LiveOptions> live_options(const capture::CameraSettings& settings);
 
-// How the two eyes lie in a camera's frames: as it says, or as its settings do.
+// How the two eyes are packed in a camera's frames, by its format and its settings.
 capture::StereoLayout stereo_layout(const iidc::StreamFormat& format, const capture::CameraSettings& settings);
 
-// A camera that streams with what its folder has for it.
+// A camera that streams, with its settings.
 struct OpenedCamera {
   std::unique_ptr<iidc::LiveCamera> live;
   capture::CameraSettings settings;
   capture::StereoLayout layout;
 };
 
-// Of options.calibration nothing. Reasons: LiveCamera::open()'s; BAD_CONFIG.
+// Opens a camera; options.calibration is ignored. The reasons of LiveCamera::open(), and BAD_CONFIG.
 Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> buses, const IidcOptions& options,
                                  const std::atomic<bool>& stop);
 
-// Its next frame, unpacked. As LiveCamera::next(); BAD_SIZE.
+// LiveCamera::next() with the frame unpacked; also BAD_SIZE.
 Result<std::optional<capture::StereoFrame>> next_pair(OpenedCamera& camera);
 
-// For pictures of the layout's size: the one that is named, or the camera folder's. NO_CALIBRATION, BAD_SIZE,
-// load_calibration()'s.
+// The calibration for pictures of the layout's size: that of the options, or otherwise the camera folder's.
+// NO_CALIBRATION, BAD_SIZE, and the reasons of load_calibration().
 Result<StereoCalibration> calibration_of(const OpenedCamera& camera, const IidcOptions& options);
 
-// A source that never ends but by `stop` (within a tenth of a second): count() is 0. next() gives LiveCamera::next()'s
-// gaps as its errors, and EYE_DEAD for the eye that is missing from a pair. skip_before() does nothing: what was is
-// over.
+// A source that ends only by `stop` (within a tenth of a second), so count() is 0. next() returns the gaps of
+// LiveCamera::next() as errors, and EYE_DEAD as the reason why an eye is missing from a pair. skip_before() does
+// nothing.
 class IidcSource : public capture::StereoSource {
  public:
-  // Reasons: open_camera()'s, calibration_of()'s, Rectifier::make()'s.
+  // The reasons of open_camera(), calibration_of() and Rectifier::make().
   static Result<std::unique_ptr<IidcSource>> open(std::vector<std::shared_ptr<iidc::CameraBus>> buses,
                                                   const IidcOptions& options, const std::atomic<bool>& stop);
   // Thread-safe.

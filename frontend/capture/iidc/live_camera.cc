@@ -16,15 +16,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kLook{100};                          // between looks at `stop`
-constexpr std::chrono::milliseconds kRetry{500}, kRetryAtMost{10'000};   // between attempts to have it back
-constexpr std::chrono::milliseconds kAppears{50};                        // after it was plugged in
-constexpr std::chrono::milliseconds kObstacle{1000};                     // what stands in the way for less is not told
-constexpr std::chrono::milliseconds kClock{1000}, kClockAtMost{60'000};  // between readings of its cycle timer
-constexpr std::chrono::milliseconds kClockDoubt{20};                     // an answer of longer is not believed
-constexpr std::chrono::milliseconds kFirst{500};                         // for the first frames after it was let send
-constexpr int kSilentIntervals = 5;  // until it counts as silent, where they are long
-constexpr int kFruitless = 2;        // times that a stream is begun anew, before the camera is opened anew
+constexpr std::chrono::milliseconds kLook{100};                       // between checks of `stop`
+constexpr std::chrono::milliseconds kRetry{500}, kMaxRetry{10'000};   // between attempts to open it again
+constexpr std::chrono::milliseconds kAppears{50};                     // wait after it was plugged in
+constexpr std::chrono::milliseconds kObstacle{1000};                  // obstacles that last less are not reported
+constexpr std::chrono::milliseconds kClock{1000}, kMaxClock{60'000};  // between readings of its cycle timer
+constexpr std::chrono::milliseconds kClockDoubt{20};                  // an answer that took longer is ignored
+constexpr std::chrono::milliseconds kFirst{500};                      // for the first frames after the start
+constexpr int kSilentIntervals = 5;                                   // without a frame, at low frame rates
+constexpr int kFruitless = 2;  // restarts of the stream before the camera is opened again
 constexpr int kBadHeads = 3, kGoodHeads = 10;
 constexpr std::int64_t kStep = 1'000'000;  // us
 
@@ -32,7 +32,7 @@ std::int64_t host_us(Clock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
 }
 
-// UTC less the host's clock, by the tightest of three readings.
+// UTC minus the host's clock, by the tightest of three readings.
 std::int64_t utc_of_host() {
   std::int64_t tightest = 0, found = 0;
   for (int i = 0; i < 3; ++i) {
@@ -42,11 +42,11 @@ std::int64_t utc_of_host() {
   return found;
 }
 
-// Of Point Grey's cameras: COLOR_FILTER_ID may be missing, or stand for nothing where the sensor is grey. And the order
-// of bytes is made the specification's, whatever the last program left.
+// Point Grey's cameras: COLOR_FILTER_ID may be missing, or meaningless if the sensor is grey. The byte order is set to
+// that of the specification, since another program may have changed it.
 Result<std::optional<capture::ColourFilter>> point_grey_filter(const RegisterFile& registers) {
   const Status order = registers.write_kept(pgr::kDataFormat, kOn | 1, 1, "IMAGE_DATA_FORMAT");
-  if (order.reason() == Reason::CAMERA_GONE) return order;  // some have not this register
+  if (order.reason() == Reason::CAMERA_GONE) return order;  // some do not have this register
   const auto tile = registers.read(pgr::kBayerTile);
   if (tile.reason() == Reason::IO_ERROR) return std::optional<capture::ColourFilter>();
   if (!tile.ok()) return tile.status();
@@ -89,7 +89,7 @@ Status LiveCamera::set_up() {
   CameraAddress address = camera_.address;
   const auto rom = identify(*link_, address);
   if (!rom) return address.usable;
-  // Whose stream is another program's is not touched.
+  // A camera whose stream another program uses is not touched.
   if (Status status = link_->claim(); !status.ok()) return status;
   registers_.emplace(*link_, rom->command_registers);
   const bool point_grey = rom->vendor_id == pgr::kVendor;
@@ -117,7 +117,7 @@ Status LiveCamera::set_up() {
   return begin();
 }
 
-// And what follows from it: how far apart frames may be.
+// Also sets interval_s_, which depends on the exposure.
 Status LiveCamera::set_up_exposure() {
   for (const FeatureSetting& feature : options_.features)
     if (Status status = set_feature(*registers_, feature); !status.ok()) return status;
@@ -161,13 +161,13 @@ std::optional<std::chrono::milliseconds> LiveCamera::help() {
   const auto patience =
       std::max(options_.silence, std::chrono::milliseconds(std::lround(1000 * kSilentIntervals * interval_s_)));
   if (Clock::now() < last_frame_ + patience) return std::nullopt;
-  if (waits_for_trigger_) {  // it may be silent as long as it likes, if it is there
+  if (waits_for_trigger_) {  // it may be silent for any time, as long as it is there
     last_frame_ = Clock::now();
     if (registers_->read(reg::kIsoEnable).ok()) return std::nullopt;
   }
   if (++fruitless_ > kFruitless || !begin_anew().ok()) {
     close();
-    next_try_ = Clock::now() + std::min(kRetry * fruitless_, kRetryAtMost);
+    next_try_ = Clock::now() + std::min(kRetry * fruitless_, kMaxRetry);
   }
   return patience;
 }
@@ -183,7 +183,7 @@ LiveCounts LiveCamera::counts() const {
   return counts_;
 }
 
-// The reading of a timer over a bus that is busy with pictures may take a while: it says so by itself.
+// On a bus that is busy with pictures, a reading of the timer may take long; CycleClock weighs it accordingly.
 void LiveCamera::read_clock() {
   if (!cycle_register_ || Clock::now() < clock_read_ + clock_pause_) return;
   utc_of_host_us_ = utc_of_host();
@@ -193,11 +193,11 @@ void LiveCamera::read_clock() {
   clock_read_ = Clock::now();
   // Frames must not wait for a register that does not answer.
   if (!status.ok() || !is_cycle_time(cycle)) {
-    clock_pause_ = std::min(2 * clock_pause_, kClockAtMost);
+    clock_pause_ = std::min(2 * clock_pause_, kMaxClock);
     return;
   }
   clock_pause_ = kClock;
-  // What took so long tells nothing; the next reading does.
+  // A reading that took so long is useless.
   if (clock_read_ - before > kClockDoubt) return;
   clock_.observe(cycle, host_us(before), host_us(clock_read_));
   const std::lock_guard lock(mutex_);
@@ -207,12 +207,12 @@ void LiveCamera::read_clock() {
 std::int64_t LiveCamera::time_of(const LiveFrame& frame) const {
   if (!frame.cycle || !clock_.ready()) return frame.raw.arrival_us;
   const std::int64_t time_us = clock_.host_us(*frame.cycle, host_us(frame.arrived)) + utc_of_host_us_;
-  // A frame is exposed before it comes, and not long before.
+  // The exposure is before the arrival, and not long before.
   const std::int64_t age_us = frame.raw.arrival_us - time_us;
   return age_us < -10'000 || age_us > 2'000'000 ? frame.raw.arrival_us : time_us;
 }
 
-// A frame as it is given out; `gap`: what is missing before it. Nothing: it is no frame, as `gap` says.
+// The frame to return, with `gap` set if frames are missing before it. Nothing if it is not valid; `gap` says why.
 std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   LiveFrame frame;
   frame.arrived = raw.arrived;
@@ -221,7 +221,7 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   const bool not_taken = missing > 0;
   if (embeds_) {
     const auto info = embedded_info(raw.bytes());
-    // Its counter may begin anew with its stream.
+    // The counter may restart with the stream.
     if (!info || (last_counter_ && !fresh_ && !follows(info->counter, *last_counter_))) {
       good_heads_ = 0;
       if (++bad_heads_ < kBadHeads) {
@@ -246,7 +246,7 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   frame.index = index_++;
   frame.raw = std::move(raw);
   frame.time_us = time_of(frame);
-  // A step of the host's clock is for StampFilter to see; what is less is ours.
+  // StampFilter must see a step of the host's clock; smaller differences are corrected here.
   if (frame.time_us <= last_time_us_ && last_time_us_ - frame.time_us < kStep) frame.time_us = last_time_us_ + 1;
   last_time_us_ = frame.time_us;
   {
@@ -254,7 +254,7 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
     ++counts_.frames;
     counts_.lost += missing;
   }
-  // What was lost while the stream was begun anew has been told.
+  // Frames lost while the stream was restarted have been reported.
   if (missing > std::exchange(told_, 0) && !fresh_)
     gap = {Reason::CAPTURE_FAILED, std::to_string(missing) + " frames before frame " + std::to_string(frame.index) +
                                        (not_taken ? " were not taken in time" : " did not come")};
@@ -267,7 +267,7 @@ std::optional<Status> LiveCamera::come_back() {
     const auto now = Clock::now();
     if (now < next_try_) {
       const auto wait = std::min(kLook, std::chrono::ceil<std::chrono::milliseconds>(next_try_ - now));
-      // The device's file comes, and becomes ours, a little after the device.
+      // The device's file appears, and becomes accessible, a little after the device.
       if (camera_.bus->wait_for_change(wait)) next_try_ = std::min(next_try_, Clock::now() + kAppears);
       continue;
     }
@@ -328,7 +328,7 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
     const bool silent = status.reason() == Reason::CAMERA_SILENT;
     if (!silent) {
       ++told_;
-      if (!embeds_) {  // else its counter tells
+      if (!embeds_) {  // otherwise its counter shows the gap
         ++index_;
         const std::lock_guard lock(mutex_);
         ++counts_.lost;

@@ -1,4 +1,4 @@
-// A camera that streams, and goes on streaming: whatever happens to it is named, counted and recovered from.
+// A camera that streams continuously: faults are named, counted and recovered from.
 #pragma once
 
 #include <atomic>
@@ -23,52 +23,52 @@
 namespace relmap::iidc {
 
 struct LiveOptions {
-  std::string serial;  // or GUID; empty: the only camera there is
+  std::string serial;  // or GUID; empty if there is only one camera
   StreamWish wish;
   std::vector<FeatureSetting> features;   // set whenever the camera is opened
-  std::optional<TriggerSetting> trigger;  // else as it is
+  std::optional<TriggerSetting> trigger;  // not changed if not set
   std::vector<StrobeSetting> strobes;
   std::size_t buffers = 8;
-  std::chrono::milliseconds silence{
-      1000};  // without a frame, before the stream is begun anew; rates below ask for more
+  // The stream is restarted after this time without a frame, or a longer one at low frame rates.
+  std::chrono::milliseconds silence{1000};
 };
 
 struct LiveFrame {
-  RawFrame raw;                        // without what fills its last packet
-  std::int64_t time_us = 0;            // UTC: of the exposure's beginning where the camera stamps its frames, else of
-                                       // the last byte's arrival
-  std::uint64_t index = 0;             // among the frames that the camera took, by its counter where it has one
+  RawFrame raw;  // without the padding of its last packet
+  // UTC: start of the exposure if the camera stamps its frames, otherwise arrival of the last byte.
+  std::int64_t time_us = 0;
+  std::uint64_t index = 0;             // among the frames that the camera took, by its counter if it has one
   std::optional<std::uint32_t> cycle;  // the camera's own stamp
   std::chrono::steady_clock::time_point arrived;
 };
 
 struct LiveCounts {
   std::uint64_t frames = 0;
-  std::uint64_t lost = 0;  // frames that the camera took and that never came, or came damaged
+  std::uint64_t lost = 0;  // frames that the camera took and that did not arrive, or arrived damaged
   std::map<Reason, std::uint64_t> faults;
-  std::uint64_t reopened = 0;       // after it had gone
-  std::uint64_t begun_anew = 0;     // the stream, the camera being there
-  std::optional<double> drift_ppm;  // of the camera's clock against the host's
+  std::uint64_t reopened = 0;       // times that the camera was opened again after it had gone
+  std::uint64_t begun_anew = 0;     // times that the stream was restarted while the camera was there
+  std::optional<double> drift_ppm;  // of the camera's clock relative to the host's
 };
 
-// Not thread-safe but for its counts.
+// Not thread-safe, except for counts().
 class LiveCamera {
  public:
-  // Finds it, sets it up and lets it send. `stop`, set by any thread, ends next() within a tenth of a second. Reasons:
-  // choose_camera()'s, set_stream()'s, set_feature()'s, CameraLink::start()'s.
+  // Finds a camera, sets it up and starts its stream. `stop`, set by any thread, ends next() within a tenth of a
+  // second. The reasons of choose_camera(), set_stream(), set_feature() and CameraLink::start().
   static Result<std::unique_ptr<LiveCamera>> open(std::vector<std::shared_ptr<CameraBus>> buses,
                                                   const LiveOptions& options, const std::atomic<bool>& stop);
   ~LiveCamera();
 
   const CameraAddress& address() const { return camera_.address; }
   const StreamFormat& format() const { return format_; }
-  bool stamped() const { return embeds_; }  // by the camera
+  bool stamped() const { return embeds_; }  // whether the camera stamps its frames
 
-  // Waits for the next frame; nothing: it is to stop. An error is a gap, of a frame or of as long as it lasts, and the
-  // call after it goes on: SHORT_FRAME, FRAME_DAMAGED, CAMERA_STALLED, CAMERA_SILENT; CAPTURE_FAILED: frames are
-  // missing (the message tells how many, and whether they were never sent or not taken in time); CAMERA_GONE: it is
-  // waited for, and what stands in the way when it is there again (CAMERA_BUSY, REGISTER_REFUSED, ...) is told when it
-  // changes.
+  // Waits for the next frame; nothing after `stop`. An error is a gap of one or more frames, and the next call
+  // continues: SHORT_FRAME, FRAME_DAMAGED, CAMERA_STALLED, CAMERA_SILENT; CAPTURE_FAILED if frames are missing (the
+  // message says how many, and whether they were never sent or not taken in time); CAMERA_GONE, after which the next
+  // calls wait for the camera. What prevents opening it again (CAMERA_BUSY, REGISTER_REFUSED, ...) is returned whenever
+  // it changes.
   Result<std::optional<LiveFrame>> next();
 
   LiveCounts counts() const;
@@ -77,14 +77,14 @@ class LiveCamera {
   LiveCamera(std::vector<std::shared_ptr<CameraBus>> buses, LiveOptions options, const std::atomic<bool>& stop)
       : buses_(std::move(buses)), options_(std::move(options)), stop_(stop) {}
 
-  Status set_up();  // the link is open
+  Status set_up();  // requires an open link
   Status set_up_exposure();
-  Status begin();  // lets it send
+  Status begin();  // starts the stream
   Status begin_anew();
-  // After a while without a good frame the stream is begun anew; where that does not help, the camera is opened anew.
-  // How long that was, if it was done.
+  // After some time without a good frame restarts the stream or, if that did not help, opens the camera again. Returns
+  // that time if it did so.
   std::optional<std::chrono::milliseconds> help();
-  std::optional<Status> come_back();  // nothing: it has, or it is to stop
+  std::optional<Status> come_back();  // waits for a camera that has gone; nothing if it is back, or after `stop`
   void close();
   Status fault(Status status);
   std::optional<LiveFrame> made(RawFrame raw, Status& gap);
@@ -99,25 +99,25 @@ class LiveCamera {
   std::optional<RegisterFile> registers_;
   StreamFormat format_;
   bool embeds_ = false;
-  int bad_heads_ = 0;   // frames whose stamps cannot be so, since ten good ones in a row
-  int good_heads_ = 0;  // in a row
+  int bad_heads_ = 0;   // frames with invalid stamps since ten consecutive good ones
+  int good_heads_ = 0;  // consecutive
   bool waits_for_trigger_ = false;
-  double interval_s_ = 0;                        // of frames, at most; 0: not known
-  std::optional<std::uint64_t> cycle_register_;  // address
+  double interval_s_ = 0;                        // maximum time between frames; 0 if not known
+  std::optional<std::uint64_t> cycle_register_;  // its address
   CycleClock clock_;
   std::chrono::milliseconds clock_pause_{};
   std::chrono::steady_clock::time_point clock_read_{}, last_frame_{}, next_try_{}, obstacle_since_{};
   std::int64_t utc_of_host_us_ = 0, last_time_us_ = 0;
-  int fruitless_ = 0;  // times that the stream was begun anew since the last good frame
-  bool fresh_ = true;  // no frame has come since it was begun
+  int fruitless_ = 0;  // times that the stream was restarted since the last good frame
+  bool fresh_ = true;  // no frame has arrived since the stream was started
   std::optional<std::uint32_t> last_counter_;
   std::uint64_t index_ = 0;
-  std::uint64_t told_ = 0;         // frames lost since the last one that came, each told as a fault of its own
-  std::optional<LiveFrame> kept_;  // the frame behind a gap that was just told
-  Reason obstacle_ = Reason::OK;   // that stands in the way now
+  std::uint64_t told_ = 0;         // frames lost since the last one that arrived, each reported as a fault of its own
+  std::optional<LiveFrame> kept_;  // the frame after a gap that was just reported
+  Reason obstacle_ = Reason::OK;   // what prevents opening the camera now
   bool obstacle_told_ = false;
 
-  mutable std::mutex mutex_;  // of counts_
+  mutable std::mutex mutex_;  // guards counts_
   LiveCounts counts_;
 };
 

@@ -1,7 +1,7 @@
-// Addresses and bits of IIDC cameras: 1394 Trade Association, "IIDC 1394-based Digital Camera Specification", 1.31
-// and 1.32, by the titles of its sections, which stand above their registers (their numbers differ from version to
-// version); configuration ROM and cycle time: IEEE 1212 and 1394. Bit 0 of the specification is the most significant of
-// a quadlet.
+// Addresses and bits of IIDC cameras, from: 1394 Trade Association, "IIDC 1394-based Digital Camera
+// Specification", 1.31 and 1.32. The titles of its sections are above their registers (section numbers differ between
+// versions). Configuration ROM and cycle time are from IEEE 1212 and 1394. Bit 0 of the specification is the most
+// significant bit of a quadlet.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ inline constexpr std::uint64_t kConfigRom = kRegisterSpace + 0x400;  // IEEE 121
 inline constexpr std::uint32_t kIidcSpecifier = 0x00a02d;            // unit_spec_ID, "Configuration ROM"
 inline constexpr std::uint32_t kIidcVersionFirst = 0x000100;  // unit_sw_version of 1.04; 0x101: 1.20, 0x102: 1.30
 
-// Offsets from the command registers' base, which the ROM tells [1.4 to 1.8].
+// Offsets from the base of the command registers, which is in the ROM [1.4 to 1.8].
 namespace reg {
 // "Camera initialize register".
 inline constexpr std::uint32_t kInitialize = 0x000;  // INITIALIZE: bit 0 resets to factory settings
@@ -59,7 +59,7 @@ inline constexpr std::uint32_t kOn = 0x8000'0000;  // bit 0
 namespace inquiry {
 inline constexpr std::uint32_t kPresent = 0x8000'0000, kAbsolute = 0x4000'0000, kOnePush = 0x1000'0000,
                                kReadOut = 0x0800'0000, kOnOff = 0x0400'0000, kAuto = 0x0200'0000, kManual = 0x0100'0000;
-inline constexpr int kMinShift = 12;  // 12 bits each: least and most value
+inline constexpr int kMinShift = 12;  // 12 bits each: minimum and maximum
 }  // namespace inquiry
 
 // "Status and control register for feature".
@@ -92,7 +92,7 @@ inline constexpr std::uint32_t kColorCodingInq = 0x014;   // COLOR_CODING_INQ: b
 inline constexpr std::uint32_t kPixelNumber = 0x034;      // PIXEL_NUMBER_INQ
 inline constexpr std::uint32_t kTotalBytesHi = 0x038;     // TOTAL_BYTES_HI_INQ
 inline constexpr std::uint32_t kTotalBytesLo = 0x03c;     // TOTAL_BYTES_LO_INQ
-inline constexpr std::uint32_t kPacketPara = 0x040;       // PACKET_PARA_INQ: unit and most bytes a packet
+inline constexpr std::uint32_t kPacketPara = 0x040;       // PACKET_PARA_INQ: unit and maximum bytes of a packet
 inline constexpr std::uint32_t kBytesPerPacket = 0x044;   // BYTE_PER_PACKET: in use, recommended
 inline constexpr std::uint32_t kPacketsPerFrame = 0x048;  // PACKET_PER_FRAME_INQ
 inline constexpr std::uint32_t kUnitPosition = 0x04c;     // UNIT_POSITION_INQ

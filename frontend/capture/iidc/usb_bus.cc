@@ -21,7 +21,7 @@ namespace relmap::iidc {
 
 namespace {
 
-// The upper 16 of an address's 48 bits choose the request, the others are its value and index.
+// The upper 16 bits of a 48-bit address select the request; the others are its value and index.
 constexpr std::uint8_t kRegisterRequest = 0x7f, kReadRegister = 0xc0, kWriteRegister = 0x40;
 constexpr unsigned kAnswerMs = 1000;
 constexpr timeval kEventsWait{0, 100'000};
@@ -42,7 +42,7 @@ Status of_open(int error) {
   }
 }
 
-// libusb, the thread that handles its events, and word of what is plugged in and out.
+// libusb, the thread that handles its events, and notifications of devices that are plugged in and out.
 class Context {
  public:
   static Result<std::shared_ptr<Context>> make() {
@@ -105,7 +105,7 @@ struct Endpoint {
   std::uint8_t address = 0;
 };
 
-// The first bulk endpoint that the camera sends by.
+// The camera's first bulk input endpoint.
 std::optional<Endpoint> video_endpoint(libusb_device* device) {
   libusb_config_descriptor* config = nullptr;
   if (libusb_get_active_config_descriptor(device, &config) != LIBUSB_SUCCESS &&
@@ -132,7 +132,8 @@ class UsbLink : public CameraLink {
     libusb_device_handle* handle = nullptr;
     if (const int error = libusb_open(device, &handle); error != LIBUSB_SUCCESS) return of_open(error);
     std::unique_ptr<UsbLink> link(new UsbLink(std::move(context), handle));
-    // One that was just plugged in may have none yet; another is not taken from who uses it.
+    // A device that was just plugged in may have no configuration yet. Another configuration is not taken away from its
+    // user.
     int configuration = 0;
     if (libusb_get_configuration(handle, &configuration) == LIBUSB_SUCCESS && configuration == 0)
       if (const int error = libusb_set_configuration(handle, 1); error != LIBUSB_SUCCESS) return of_open(error);
@@ -193,7 +194,7 @@ class UsbLink : public CameraLink {
     if (stream_->stop()) {
       stream_.reset();
     } else {
-      // A transfer has not come home: what it may still write to, and whoever it calls, must stay.
+      // A transfer was not completed: the memory that it may still write to, and its callback, must stay valid.
       (void)stream_.release();
       (void)new std::shared_ptr<Context>(context_);
       lost_ = true;
@@ -201,7 +202,7 @@ class UsbLink : public CameraLink {
   }
 
  private:
-  static constexpr std::size_t kQuadlets = 16;  // a transfer
+  static constexpr std::size_t kQuadlets = 16;  // of a transfer
 
   UsbLink(std::shared_ptr<Context> context, libusb_device_handle* handle)
       : context_(std::move(context)), handle_(handle) {}
@@ -236,7 +237,7 @@ class UsbLink : public CameraLink {
   const std::shared_ptr<Context> context_;
   libusb_device_handle* const handle_;
   std::optional<Endpoint> claimed_;
-  bool lost_ = false;  // with a transfer that never came home
+  bool lost_ = false;  // a transfer was never completed
   std::unique_ptr<UsbStream> stream_;
 };
 
@@ -269,7 +270,7 @@ class UsbBus : public CameraBus {
     });
     if (opened) return std::unique_ptr<CameraLink>(std::move(opened));
     if (!status.ok()) return status;
-    if (!unusable.ok()) return unusable;  // it may be this one: who it is cannot be read
+    if (!unusable.ok()) return unusable;  // this device may be the camera; its identity cannot be read
     return {Reason::NO_CAMERA, "no such camera on USB"};
   }
 
@@ -286,7 +287,7 @@ class UsbBus : public CameraBus {
     return listed || std::find(also_.begin(), also_.end(), id) != also_.end();
   }
 
-  // Until it answers false.
+  // Calls a function for each device until it returns false.
   template <typename See>
   Status for_each(See see) {
     libusb_device** devices = nullptr;
@@ -300,7 +301,7 @@ class UsbBus : public CameraBus {
     return {};
   }
 
-  // Who it is, by its ROM.
+  // Identifies a device by its ROM.
   std::pair<CameraAddress, std::unique_ptr<UsbLink>> look(libusb_device* device) {
     CameraAddress address;
     address.bus = name();

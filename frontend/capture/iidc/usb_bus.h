@@ -1,5 +1,5 @@
-// IIDC cameras over USB, by libusb: registers by vendor control transfers, frames by bulk transfers, several of them in
-// flight.
+// IIDC cameras over USB, by libusb: registers by vendor control transfers, frames by bulk transfers, of which several
+// are in flight.
 #pragma once
 
 #include <memory>
@@ -9,8 +9,8 @@
 
 namespace relmap::iidc {
 
-// Not only the cameras listed in usb_ids.h: with `also`, of vendor << 16 | product, others that speak the same.
-// UNSUPPORTED: USB cannot be had at all, with libusb's reason.
+// The bus has the cameras listed in usb_ids.h and, by `also` (vendor << 16 | product), others with the same protocol.
+// UNSUPPORTED if USB is not available, with libusb's reason.
 Result<std::shared_ptr<CameraBus>> open_usb_bus(std::vector<std::uint32_t> also = {});
 
 }  // namespace relmap::iidc

@@ -1,4 +1,4 @@
-// USB devices that are IIDC cameras. Nothing in a descriptor says so: a camera is known by its maker's numbers.
+// USB devices that are IIDC cameras. Nothing in a descriptor says so; cameras are recognised by vendor and product.
 #pragma once
 
 #include <array>

@@ -10,9 +10,9 @@ namespace relmap::iidc {
 
 namespace {
 
-constexpr std::chrono::seconds kHome{2};  // for transfers that were cancelled
-constexpr int kFailures = 8;              // in a row: the endpoint is reset
-constexpr std::size_t kMaxFaults = 64;    // that wait to be told
+constexpr std::chrono::seconds kHome{2};  // for cancelled transfers to complete
+constexpr int kFailures = 8;              // consecutive ones, before the endpoint is reset
+constexpr std::size_t kMaxFaults = 64;    // that wait to be reported
 
 Status of_submit(int error) {
   switch (error) {
@@ -32,7 +32,7 @@ Status of_submit(int error) {
 
 Result<std::unique_ptr<UsbStream>> UsbStream::start(libusb_device_handle* handle, std::uint8_t endpoint,
                                                     const StreamRequest& request) {
-  // USB 3 has packets of its own, and what fills the last one of 1394's is not sent.
+  // USB 3 has its own packets, and the padding of the last 1394 packet is not sent.
   const bool pads = libusb_get_device_speed(libusb_get_device(handle)) < LIBUSB_SPEED_SUPER;
   const std::size_t frame_bytes = pads ? request.frame_bytes : request.image_bytes;
   std::unique_ptr<UsbStream> stream(new UsbStream(handle, endpoint, frame_bytes, request.image_bytes));
@@ -105,7 +105,7 @@ void UsbStream::take(Transfer& transfer) {
     case LIBUSB_TRANSFER_COMPLETED:
       failures_ = 0;
       if (length < image_bytes_) {
-        // Nothing came between two frames: no frame.
+        // An empty transfer between two frames is no frame.
         if (length > 0 && !std::exchange(babbled_, false))
           lose(Reason::SHORT_FRAME,
                "a frame of " + std::to_string(length) + " bytes instead of " + std::to_string(image_bytes_));
@@ -118,7 +118,7 @@ void UsbStream::take(Transfer& transfer) {
       } else if (const auto oldest = std::find_if(arrivals_.begin(), arrivals_.end(),
                                                   [](const Arrival& arrival) { return arrival.status.ok(); });
                  oldest != arrivals_.end()) {
-        // Nobody took them: the oldest makes room.
+        // Frames were not taken in time: drop the oldest.
         FramePool::Buffer freed = std::move(oldest->buffer);
         const std::uint64_t lost = oldest->overrun + 1;
         const auto after = arrivals_.erase(oldest);
@@ -130,7 +130,7 @@ void UsbStream::take(Transfer& transfer) {
         arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(freed)), length, arrival_us, arrived,
                              std::exchange(overrun_, 0)});
       } else {
-        ++overrun_;  // all are lent
+        ++overrun_;  // all buffers are lent
       }
       break;
     case LIBUSB_TRANSFER_OVERFLOW:
@@ -161,7 +161,7 @@ void UsbStream::take(Transfer& transfer) {
   news_.notify_all();
 }
 
-// All transfers fetched home, the halt cleared, all sent off again.
+// Completes all transfers, clears the halt, and submits them again.
 Status UsbStream::recover(std::unique_lock<std::mutex>& lock) {
   if (!all_home(lock)) gone_ = true;
   if (gone_) return {};

@@ -1,4 +1,4 @@
-// The frames of a camera on USB: bulk transfers of a frame each, sent off again as soon as one has come.
+// The frames of a camera on USB: bulk transfers of one frame each, which are submitted again as soon as they complete.
 #pragma once
 
 #include <libusb.h>
@@ -16,13 +16,14 @@
 
 namespace relmap::iidc {
 
-// Callbacks are run by the thread that handles libusb's events; all else by one at a time.
+// Callbacks run on the thread that handles libusb's events; all functions must be called by one thread at a time.
 class UsbStream {
  public:
-  // Of an interface that is claimed. Reasons: CameraLink::start().
+  // The interface must be claimed. The reasons of CameraLink::start().
   static Result<std::unique_ptr<UsbStream>> start(libusb_device_handle* handle, std::uint8_t endpoint,
                                                   const StreamRequest& request);
-  // False: a transfer has not come home within two seconds, though it was cancelled; then it must not be destroyed.
+  // Cancels all transfers. Returns false if one did not complete within two seconds; the stream must then not be
+  // destroyed.
   bool stop();
   ~UsbStream();
 
@@ -36,7 +37,7 @@ class UsbStream {
     bool flying = false;
   };
   struct Arrival {
-    Status status;  // of a frame that is lost; else:
+    Status status;  // not ok if the frame is lost; otherwise:
     FramePool::Buffer buffer;
     std::size_t size = 0;
     std::int64_t arrival_us = 0;
@@ -59,15 +60,15 @@ class UsbStream {
   std::shared_ptr<FramePool> pool_;
   std::vector<std::unique_ptr<Transfer>> transfers_;
 
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the members below
   std::condition_variable news_;
   std::deque<Arrival> arrivals_;
   std::size_t flying_ = 0;
   std::uint64_t overrun_ = 0;  // since the last frame that was queued
-  int failures_ = 0;           // in a row
-  bool babbled_ = false;       // what comes short now is the end of a frame that was too long
+  int failures_ = 0;           // consecutive
+  bool babbled_ = false;       // the next short transfer is the end of a frame that was too long
   bool stopping_ = false;
-  bool halted_ = false;  // nothing is sent off until recover()
+  bool halted_ = false;  // no transfer is submitted until recover()
   bool gone_ = false;
 };
 

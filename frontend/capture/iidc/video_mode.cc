@@ -35,7 +35,7 @@ struct FixedMode {
   int width, height;
   Coding coding;
 };
-// Of Formats 0 and 2 [2.1.1, 2.1.3].
+// The modes of Formats 0 and 2 [2.1.1, 2.1.3].
 constexpr std::array<FixedMode, 7> kFormat0 = {{{160, 120, Coding::kYuv444},
                                                 {320, 240, Coding::kYuv422},
                                                 {640, 480, Coding::kYuv411},
@@ -58,7 +58,7 @@ constexpr double kPacketsPerSecond = 8000;  // IEEE 1394: one a cycle
 constexpr auto kPowerUp = std::chrono::milliseconds(1000), kSettle = std::chrono::milliseconds(500),
                kLook = std::chrono::milliseconds(2);
 
-// That carries two eyes: words of 16 bits.
+// The codings that carry two eyes: 16-bit words.
 std::optional<Coding> stereo_coding(const ModeInfo& info) {
   for (const Coding wanted : {Coding::kRaw16, Coding::kMono16, Coding::kYuv422})
     if (std::find(info.codings.begin(), info.codings.end(), wanted) != info.codings.end()) return wanted;
@@ -111,8 +111,8 @@ Result<ModeInfo> read_format7(const RegisterFile& registers, VideoMode mode) {
 
 Status cannot(const VideoMode& mode, const std::string& why) { return {Reason::UNSUPPORTED, mode.name() + ": " + why}; }
 
-// The camera looks at size, position and coding when it is told to, and at the size of packets when that is written
-// (VALUE_SETTING). Cameras of before IIDC 1.31 have not this register: nothing.
+// VALUE_SETTING makes the camera check size, position and coding; it checks the size of packets when that is written.
+// Cameras from before IIDC 1.31 do not have this register.
 Result<std::optional<std::uint32_t>> value_setting(const RegisterFile& csr) {
   const auto there = csr.read(format7::kValueSetting);
   if (there.reason() == Reason::IO_ERROR) return std::optional<std::uint32_t>();
@@ -148,7 +148,8 @@ Status check_packets(const RegisterFile& csr, const VideoMode& mode, int packet)
           mode.name() + ": the camera does not take packets of " + std::to_string(packet) + " bytes"};
 }
 
-// Whole packets. The register of the total (TOTAL_BYTES_INQ) counts what fills the last one in some cameras only.
+// The size in whole packets. The register of the total (TOTAL_BYTES_INQ) includes the padding of the last one only in
+// some cameras.
 Result<std::uint64_t> sent_bytes(const RegisterFile& csr, std::uint32_t packet) {
   const auto upper = csr.read(format7::kTotalBytesHi), lower = csr.read(format7::kTotalBytesLo);
   if (!upper.ok()) return upper.status();
@@ -179,14 +180,14 @@ Result<capture::ColourFilter> read_filter(const RegisterFile& csr, Coding coding
   }
 }
 
-// The rate feature holds the camera back where packets alone would let it run faster. The rate, 0 if not known.
+// Limits the rate by the rate feature, if packets alone would allow a higher one. Returns the rate, 0 if not known.
 Result<double> limit_rate(const RegisterFile& registers, double rate_hz) {
   const auto feature = read_feature(registers, Feature::kFrameRate);
   if (feature.reason() == Reason::UNSUPPORTED) return 0.0;
   if (!feature.ok()) return feature.status();
   if (!feature->absolute || !feature->can_be_set) return 0.0;
-  double wanted = rate_hz > 0 ? rate_hz : feature->absolute_most;
-  wanted = std::clamp<double>(wanted, feature->absolute_least, feature->absolute_most);
+  double wanted = rate_hz > 0 ? rate_hz : feature->absolute_max;
+  wanted = std::clamp<double>(wanted, feature->absolute_min, feature->absolute_max);
   FeatureSetting setting;
   setting.feature = Feature::kFrameRate;
   setting.how = FeatureSetting::How::kAbsolute;
@@ -232,11 +233,11 @@ Result<StreamFormat> set_format7(const RegisterFile& registers, const ModeInfo& 
 
   const auto para = csr->read(format7::kPacketPara);
   if (!para.ok()) return para.status();
-  const int unit = high(*para), most = low(*para);
-  if (unit < 1 || most < unit) return cannot(info.mode, "its packets are of no size (PACKET_PARA_INQ)");
+  const int unit = high(*para), max_packet = low(*para);
+  if (unit < 1 || max_packet < unit) return cannot(info.mode, "its packets are of no size (PACKET_PARA_INQ)");
   const double picture = static_cast<double>(format.width) * format.height * bits_per_pixel(format.coding) / 8;
-  // One packet a cycle: as many bytes as the rate needs.
-  int packet = most / unit * unit;
+  // There is one packet a cycle, with as many bytes as the rate needs.
+  int packet = max_packet / unit * unit;
   if (wish.rate_hz > 0) {
     const double needed = std::ceil(picture * wish.rate_hz / kPacketsPerSecond / unit) * unit;
     packet = static_cast<int>(std::min<double>(packet, std::max<double>(unit, needed)));
@@ -268,7 +269,7 @@ Result<StreamFormat> set_fixed(const RegisterFile& registers, const ModeInfo& in
   format.width = info.width;
   format.height = info.height;
   format.coding = info.codings.front();
-  // The slowest that is no slower than what is wished for.
+  // The slowest rate that is not below the one wished for.
   format.rate_hz = info.rates_hz.back();
   for (const double rate : info.rates_hz)
     if (wish.rate_hz > 0 && rate >= wish.rate_hz && rate < format.rate_hz) format.rate_hz = rate;

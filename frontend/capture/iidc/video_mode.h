@@ -1,4 +1,4 @@
-// The pictures that a camera can send, and the choice of those that carry two eyes.
+// The video modes of a camera, and the choice of one that carries two eyes.
 #pragma once
 
 #include <cstdint>
@@ -41,40 +41,42 @@ struct VideoMode {
 
 struct ModeInfo {
   VideoMode mode;
-  int width = 0, height = 0;            // Format7: the largest
-  int unit_width = 0, unit_height = 0;  // Format7: of sizes; else 0
+  int width = 0, height = 0;            // Format7: the maximum
+  int unit_width = 0, unit_height = 0;  // Format7: step of sizes; otherwise 0
   std::vector<Coding> codings;
-  std::vector<double> rates_hz;  // Formats 0 and 2: those of the camera. Format7: as packets allow
+  std::vector<double> rates_hz;  // Formats 0 and 2 only; the rates of Format7 depend on packets
 };
 
-// Formats 0, 2 and 7. Others that the camera has are left out.
+// Reads the modes of Formats 0, 2 and 7. Other formats are left out.
 Result<std::vector<ModeInfo>> read_modes(const RegisterFile& registers);
 
 struct StreamWish {
-  std::optional<VideoMode> mode;  // none: the first that carries two eyes: Format7 mode 3, another of Format7, 0, 2
-  int width = 0, height = 0;      // Format7; 0: the largest
-  double rate_hz = 0;             // 0: the fastest
+  // If not set, the first mode that carries two eyes, in this order: Format7 mode 3, others of Format7, Format 0,
+  // Format 2.
+  std::optional<VideoMode> mode;
+  int width = 0, height = 0;  // Format7 only; 0 for the maximum
+  double rate_hz = 0;         // 0 for the maximum
 };
 
-// What the camera has been set to.
+// The format that the camera has been set to.
 struct StreamFormat {
   VideoMode mode;
   int width = 0, height = 0;
   Coding coding{};
   capture::ColourFilter filter = capture::ColourFilter::kNone;
-  double rate_hz = 0;           // 0: not known
-  std::size_t image_bytes = 0;  // of the pixels
-  std::size_t frame_bytes = 0;  // with what fills the last packet
+  double rate_hz = 0;           // 0 if not known
+  std::size_t image_bytes = 0;  // size of the pixels
+  std::size_t frame_bytes = 0;  // with the padding of the last packet
 
   std::string describe() const;  // "format7.3, 640 x 480 RAW16 at 48/s"
 };
 
-// Stops what the camera sends, and sets it up; everything is read back. UNSUPPORTED: no mode, or not the one wished
-// for, carries words of 16 bits, or it has not that size; REGISTER_REFUSED: also where Format7 reports an error of its
-// settings; CORRUPT: it tells sizes that cannot be.
+// Stops the camera's stream and sets the camera up; everything is read back. UNSUPPORTED if no mode, or not the mode in
+// `wish`, carries 16-bit words, or it does not have that size; REGISTER_REFUSED, also if Format7 reports an error of
+// its settings; CORRUPT if the camera reports impossible sizes.
 Result<StreamFormat> set_stream(const RegisterFile& registers, const StreamWish& wish);
 
-// ISO_EN. Read back where on.
+// Sets ISO_EN. It is read back if `on`.
 Status set_sending(const RegisterFile& registers, bool on);
 
 }  // namespace relmap::iidc

@@ -1,4 +1,4 @@
-// Pictures and folders of them, for tests.
+// Writes pictures and folders of pictures for tests.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace relmap::capture::testing_files {
 
-// A new empty folder, gone with its owner.
+// A new empty folder, which is removed with this object.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -48,7 +48,7 @@ inline void write_picture(const std::filesystem::path& path, const cv::Mat& pict
   cv::imwrite(path.string(), picture);
 }
 
-// A picture with EXIF that says nothing but the focal length in millimetres of 35 mm film.
+// Adds EXIF to a JPEG that has only the focal length in millimetres of 35 mm film.
 inline std::string with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
   const Bytes exif{
       0xff, 0xe1, 0,    52,                                            // APP1, its length
@@ -64,7 +64,7 @@ inline std::string with_focal_length(const Bytes& jpeg, std::uint8_t millimetres
   return result;
 }
 
-// Of pictures of 160 x 120; baseline 0.2 m.
+// For pictures of 160 x 120; the baseline is 0.2 m.
 inline constexpr const char* kKittiCalibration =
     "P0: 100 0 79.5 0 0 100 59.5 0 0 0 1 0\nP1: 100 0 79.5 -20 0 100 59.5 0 0 0 1 0\n";
 

@@ -1,4 +1,4 @@
-// Raw logs written for a test.
+// Writes raw logs for tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ inline RawLogHeader raw_header(int width = 160, int height = 120) {
   return header;
 }
 
-// Of the i-th frame: any bytes, but always the same, with some padding behind.
+// The bytes of the i-th frame: arbitrary, but always the same, with some padding at the end.
 inline Bytes raw_bytes(const StereoLayout& layout, std::uint64_t i) {
   Bytes raw(layout.bytes() + 6);
   std::uint32_t state = static_cast<std::uint32_t>(i) * 2654435761u + 1;
@@ -68,7 +68,7 @@ inline void write_raw_log(const std::string& path, const RawLogHeader& header, s
   ASSERT_TRUE(closed.ok()) << closed.to_string();
 }
 
-// A frame as raw_frame() and raw_bytes() made it.
+// Expects that a frame is as raw_frame() and raw_bytes() make it.
 inline void expect_sound(const RawLogReader::Frame& frame, const StereoLayout& layout) {
   const RawLogFrame made = raw_frame(frame.frame.index);
   EXPECT_EQ(frame.frame.time_us, made.time_us);
@@ -76,7 +76,7 @@ inline void expect_sound(const RawLogReader::Frame& frame, const StereoLayout& l
   EXPECT_EQ(Bytes(frame.raw.begin(), frame.raw.end()), raw_bytes(layout, made.index)) << "frame " << made.index;
 }
 
-// All that comes from a reader.
+// Everything that a reader returns.
 struct WholeLog {
   std::vector<std::uint64_t> frames;  // their indexes
   std::vector<RawLogEvent> events;

@@ -29,7 +29,7 @@ constexpr milliseconds kFirstPause{100}, kMaxPause{2000};
 std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // The pauses are ours: otherwise a new channel would wait for what an old one to the same address has failed at.
+  // A new channel must not inherit the back-off of an old one to the same address; the pauses are made here.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
@@ -54,14 +54,14 @@ struct GrpcTransport::Impl {
   Impl(std::string given_server, std::string given_robot, GrpcTransportOptions given_options)
       : server(std::move(given_server)), robot(std::move(given_robot)), options(given_options) {}
 
-  // One call. What stands below `transport` is under the transport's lock.
+  // One call. The members below `transport` are guarded by the transport's mutex.
   struct Stream final : grpc::ClientBidiReactor<v1::IngestRequest, v1::IngestReply> {
     Stream(Impl& owner, const client::ServerAddress& address)
         : where(address), stub(v1::Ingest::NewStub(make_channel(address.address))), transport(owner) {}
 
     void start() {
       stub->async()->Stream(&context, this);
-      AddHold();  // until the transport's thread writes no more
+      AddHold();  // until the transport's thread has stopped writing
       StartRead(&reply);
       StartCall();
     }
@@ -97,9 +97,9 @@ struct GrpcTransport::Impl {
     Impl& transport;
     bool writing = true;
     bool broken = false;         // the daemon's side has ended
-    std::optional<BootId> boot;  // the daemon's: it has said welcome
-    bool acknowledged = false;   // it takes what it is given
-    Status fault;                // why it is not to be talked to
+    std::optional<BootId> boot;  // the daemon's, once it has sent its welcome
+    bool acknowledged = false;   // the daemon has acknowledged something
+    Status fault;                // why the stream must be closed
     std::optional<Clock::time_point> unanswered_since;
     std::optional<grpc::Status> outcome;
   };
@@ -118,7 +118,7 @@ struct GrpcTransport::Impl {
     }
   }
 
-  // One stream, until it is broken: why.
+  // Runs one stream until it ends, and returns why it did.
   Status talk(std::unique_lock<std::mutex>& lock, bool& acknowledged) {
     lock.unlock();
     const auto where = client::resolve_server(server);
@@ -152,7 +152,7 @@ struct GrpcTransport::Impl {
     lock.unlock();
     say_broken();
     lock.lock();
-    // The next daemon may serve another map: what waits is sent again when it has said which.
+    // The next daemon may serve another map. PublisherCore sends again what waits here once that daemon has said which.
     waiting.clear();
     waiting_bytes = 0;
     acknowledged = stream.acknowledged;
@@ -172,7 +172,7 @@ struct GrpcTransport::Impl {
     lock.lock();
   }
 
-  // By a thread of gRPC's.
+  // Called by a thread of gRPC.
   void hear(Stream& stream) {
     const v1::IngestReply& reply = stream.reply;
     {
@@ -236,7 +236,7 @@ struct GrpcTransport::Impl {
 
   std::mutex listener_mutex;
   Listener listener;
-  std::optional<DaemonIdentity> introduced;  // of the stream that is open: said again to a listener that comes later
+  std::optional<DaemonIdentity> introduced;  // of the open stream; repeated to a listener that registers later
 
   mutable std::mutex mutex;
   std::condition_variable changed;

@@ -1,4 +1,4 @@
-// Keyframes and gaps over the Ingest service; acknowledgements and news back.
+// Sends keyframes and gaps over the Ingest service, and receives acknowledgements and news.
 #pragma once
 
 #include <chrono>
@@ -11,20 +11,20 @@
 namespace relmap::publishing {
 
 struct GrpcTransportOptions {
-  // To be written, at most, which is more than PublisherCore has under way; what does not fit is lost.
+  // Maximum size of the queue, which exceeds what PublisherCore has in flight. Messages that do not fit are dropped.
   std::size_t waiting_bytes = std::size_t{4} << 20;
-  std::chrono::milliseconds silence{10'000};  // without an answer: another stream is tried
+  std::chrono::milliseconds silence{10'000};  // after this time without an answer another stream is opened
 };
 
 class GrpcTransport final : public PublishTransport {
  public:
-  // `server`: a data folder or HOST:PORT, as client/server_address.h takes it; INVALID_ARGUMENT: it is neither. A
-  // daemon that does not answer is waited for. `robot`: for display. Starts one thread.
+  // Starts one thread, which waits for a daemon that does not answer. `server` is a data folder or HOST:PORT
+  // (client/server_address.h); INVALID_ARGUMENT if it is neither. `robot` is for display.
   static Result<std::unique_ptr<GrpcTransport>> open(const std::string& server, const std::string& robot,
                                                      GrpcTransportOptions options = {});
   ~GrpcTransport() override;
 
-  PartBytes part_bytes() const override;  // keyframes travel whole
+  PartBytes part_bytes() const override;  // a keyframe is one part
   bool lossless() const override { return true; }
   Status trouble() const override;
   void send(const KeyframePart& part) override;

@@ -111,7 +111,7 @@ TEST_F(GrpcTransportTest, BrokenStreamsAreOpenedAgain) {
   EXPECT_EQ(daemon_.bad_payloads, 0u);
 }
 
-TEST_F(GrpcTransportTest, ADaemonThatWasRestartedElsewhereIsFoundAndGetsWhatItForgot) {
+TEST_F(GrpcTransportTest, ADaemonRestartedElsewhereIsFoundAndGetsWhatItLost) {
   write_endpoint(daemon_.boot_text());
   const auto started = publisher(folder());
   push(*started, 0, 19);
@@ -176,7 +176,7 @@ TEST_F(GrpcTransportTest, AnotherProtocolIsNamed) {
   EXPECT_TRUE(daemon_.order.empty());
 }
 
-TEST_F(GrpcTransportTest, NonsenseIsPassedOver) {
+TEST_F(GrpcTransportTest, MalformedMessagesAreIgnored) {
   std::vector<v1::IngestReply>& said = daemon_.manners.between;
   said.reserve(8);
   said.emplace_back();
@@ -204,7 +204,7 @@ TEST_F(GrpcTransportTest, NonsenseIsPassedOver) {
   EXPECT_EQ(daemon_.robots.size(), 1u);
 }
 
-TEST_F(GrpcTransportTest, ADaemonThatNeverAnswersIsLeft) {
+TEST_F(GrpcTransportTest, AStreamWithoutAnswersIsClosed) {
   daemon_.manners.silent = true;
   GrpcTransportOptions hasty;
   hasty.silence = milliseconds(200);
@@ -220,7 +220,7 @@ TEST_F(GrpcTransportTest, ADaemonThatNeverAnswersIsLeft) {
   EXPECT_TRUE(finish(*started).all_settled());
 }
 
-TEST_F(GrpcTransportTest, NobodyThereIsSaidAndDoesNotHoldUpAnEnd) {
+TEST_F(GrpcTransportTest, AnAbsentDaemonIsReportedAndDoesNotDelayTheEnd) {
   const std::string address = daemon_.address();
   daemon_.stop();
   const auto started = publisher(address);
@@ -231,7 +231,7 @@ TEST_F(GrpcTransportTest, NobodyThereIsSaidAndDoesNotHoldUpAnEnd) {
   EXPECT_EQ(started->progress().unsettled, 4u);
 }
 
-TEST_F(GrpcTransportTest, WhatFindsNoRoomIsLostAndWhatWaitsWaitsOnce) {
+TEST_F(GrpcTransportTest, TheQueueIsBoundedAndHoldsNoDuplicates) {
   auto held = daemon_.lock();  // it says no welcome
   GrpcTransportOptions narrow;
   narrow.waiting_bytes = 10'000;
@@ -251,7 +251,7 @@ TEST_F(GrpcTransportTest, WhatFindsNoRoomIsLostAndWhatWaitsWaitsOnce) {
   }));
 }
 
-TEST_F(GrpcTransportTest, NewsAreToldAsOverLcm) {
+TEST_F(GrpcTransportTest, NewsAreTheSameAsOverLcm) {
   const std::string uuid = uuid_to_wire(header().uuid);
   std::vector<v1::IngestReply>& said = daemon_.manners.between;
   for (int i = 0; i < 3; ++i) {
@@ -291,7 +291,7 @@ TEST_F(GrpcTransportTest, NewsAreToldAsOverLcm) {
   EXPECT_EQ(heard[3].rate_hz, 2.5);
 }
 
-TEST_F(GrpcTransportTest, TheEndOfASessionIsSaidUntilItIsNoted) {
+TEST_F(GrpcTransportTest, TheEndOfASessionIsSentUntilItIsConfirmed) {
   daemon_.manners.deaf_to_ends = 2;
   const auto started = publisher();
   push(*started, 0, 9);
@@ -310,7 +310,7 @@ TEST_F(GrpcTransportTest, TheEndOfASessionIsSaidUntilItIsNoted) {
   EXPECT_FALSE(again->end_session(steady_clock::now() + milliseconds(300)));
 }
 
-TEST_F(GrpcTransportTest, ARunThatBeginsAnewSendsOnlyWhatIsNotKnown) {
+TEST_F(GrpcTransportTest, ARepeatedRunSendsOnlyWhatTheDaemonLacks) {
   {
     const auto first = publisher();
     push(*first, 0, 99);
@@ -332,7 +332,7 @@ TEST_F(GrpcTransportTest, ARunThatBeginsAnewSendsOnlyWhatIsNotKnown) {
   for (const std::uint32_t sequence : daemon_.order) EXPECT_TRUE(sequence == 0 || sequence >= 100) << sequence;
 }
 
-TEST_F(GrpcTransportTest, ARunThatBeginsAnewWithSomethingElseIsStopped) {
+TEST_F(GrpcTransportTest, ARepeatedRunWithOtherKeyframesIsStopped) {
   for (std::uint32_t s = 0; s < 10; ++s) daemon_.settled[s] = 1;  // CRCs of another recording
   const auto started = publisher();
   push(*started, 0, 0);
@@ -340,7 +340,7 @@ TEST_F(GrpcTransportTest, ARunThatBeginsAnewWithSomethingElseIsStopped) {
   EXPECT_EQ(started->push(keyframe(1)).reason(), Reason::SEQUENCE_CONFLICT);
 }
 
-TEST_F(GrpcTransportTest, WhereADaemonOfAnotherMapAnswersNothingIsWrittenToIt) {
+TEST_F(GrpcTransportTest, ADaemonOfAnotherMapGetsNothing) {
   options_.in_memory = false;  // a live robot's
   options_.live = true;
   options_.spool = folder_ / "spool";
@@ -383,7 +383,7 @@ TEST_F(GrpcTransportTest, WhereADaemonOfAnotherMapAnswersNothingIsWrittenToIt) {
   EXPECT_EQ(daemon_.settled.size(), 20u);
 }
 
-TEST_F(GrpcTransportTest, ARecordingIsToBeginAnewInAnotherMap) {
+TEST_F(GrpcTransportTest, ARecordingMustBeginAnewInAnotherMap) {
   options_.in_memory = false;
   options_.recording = "drive";
   options_.spool = folder_ / "spool";

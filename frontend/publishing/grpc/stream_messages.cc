@@ -26,7 +26,7 @@ Result<BootId> read_boot(const std::string& bytes) {
 
 using Ranges = google::protobuf::RepeatedPtrField<v1::SequenceRange>;
 
-// Ascending, and apart from each other.
+// Ranges must ascend without touching each other.
 Result<std::vector<SequenceRange>> read_ranges(const Ranges& messages) {
   std::vector<SequenceRange> ranges;
   for (const v1::SequenceRange& message : messages) {

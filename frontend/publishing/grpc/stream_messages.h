@@ -1,4 +1,4 @@
-// What is said on Ingest.Stream (proto/relmap/v1/ingest.proto), to and from plain values.
+// Converts the messages of Ingest.Stream (proto/relmap/v1/ingest.proto) to and from plain values.
 #pragma once
 
 #include <string>
@@ -21,10 +21,10 @@ v1::IngestRequest end_request(const SessionEnd& end);
 
 // UNKNOWN_PROTOCOL_VERSION, CORRUPT.
 Result<DaemonIdentity> read_welcome(const v1::Welcome& welcome);
-// CORRUPT: sizes or orders that no daemon sends. INVALID_ARGUMENT: no session.
+// CORRUPT if sizes or orders are such as no daemon sends; INVALID_ARGUMENT if the session's uuid is malformed.
 Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message);
-// Localisation, pace or the end of a session; `boot` is the daemon's. CORRUPT: none of these, or no such numbers; and
-// the reasons of frames, transforms and covariances.
+// Reads a localisation, a pace or the end of a session; `boot` is the daemon's. CORRUPT if it is none of these or its
+// numbers are impossible; also the reasons of frames, transforms and covariances.
 Result<PoseNews> read_news(const v1::IngestReply& reply, const BootId& boot);
 
 }  // namespace relmap::publishing

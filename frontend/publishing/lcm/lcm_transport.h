@@ -1,4 +1,4 @@
-// Parts and gaps over LCM; acknowledgements and news back.
+// Sends parts of keyframes and gaps over LCM, and receives acknowledgements and news.
 #pragma once
 
 #include <functional>
@@ -17,8 +17,8 @@ class LcmTransport final : public PublishTransport {
   static Result<std::unique_ptr<LcmTransport>> open(const std::string& url);
   ~LcmTransport() override { stop(); }
 
-  // On one machine as large as a datagram may be; over a network a larger one would be several IP fragments, and die
-  // with any of them.
+  // On one machine, as large as a datagram may be. Over a network a large datagram is split into IP fragments and lost
+  // with any of them, so the usual part fits a packet.
   PartBytes part_bytes() const override;
   void send(const KeyframePart& part) override;
   void send(const Gap& gap) override;
@@ -28,7 +28,7 @@ class LcmTransport final : public PublishTransport {
 
  private:
   explicit LcmTransport(bool local) : local_(local) {}
-  // Decodes what comes on a channel and hands it to the listener's half; what is no such message is another's.
+  // Decodes the messages of a channel and passes them to a function of the listener. Others are ignored.
   template <typename Message>
   LcmLink::Handler handler(Result<Message> (*decode)(ByteSpan), std::function<void(const Message&)> Listener::*heard);
 

@@ -17,13 +17,13 @@
 
 namespace relmap::recording {
 
-// Channel and bytes, as they are recorded.
+// Channel and bytes of a recorded message.
 using Message = std::pair<std::string, Bytes>;
 
 inline Message to_message(const KeyframePart& part) { return {kKeyframeChannel, encode_lcm(part)}; }
 inline Message to_message(const Gap& gap) { return {kGapChannel, encode_lcm(gap)}; }
 
-// A keyframe's, in their order.
+// The messages of a keyframe, in the order of its parts.
 inline std::vector<Message> to_messages(const Keyframe& keyframe, std::uint32_t part_bytes = kNetworkPartBytes) {
   const Bytes payload = encode_keyframe(keyframe);
   std::vector<Message> messages;

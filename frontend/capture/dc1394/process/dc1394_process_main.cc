@@ -24,7 +24,7 @@ constexpr std::chrono::seconds kEndPatience{2};
 
 bool tell(const Message& message) { return send_packet(kProtocolFile, bytes_of(message)).ok(); }
 
-// libdc1394 may hang in the main thread: without the program that started it, this one ends all the same.
+// Ends this process when the program that started it has ended, even if libdc1394 hangs in the main thread.
 void end_with_socket() {
   std::thread([] {
     pollfd file{kProtocolFile, POLLRDHUP, 0};
@@ -97,7 +97,8 @@ class Server {
 };
 
 int run(bool usb_too) {
-  // It ends with its socket, not with what ends the program at the other end, which may still want to stop the camera.
+  // This process ends with its socket and not by the signals that end its parent, which may still want to stop the
+  // camera.
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) ::signal(number, SIG_IGN);
   keep_library_log();
   end_with_socket();

@@ -15,7 +15,7 @@ namespace relmap::iidc::dc1394 {
 
 namespace {
 
-// Between this machine and the camera, as the kernel measured; 400 Mbit/s where it does not tell.
+// The speed between this machine and the camera as measured by the kernel; 400 Mbit/s if the kernel does not say.
 int path_speed(std::uint64_t guid) {
   const auto nodes = firewire_nodes();
   if (!nodes.ok()) return SCODE_400;

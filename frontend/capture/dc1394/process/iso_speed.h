@@ -1,4 +1,4 @@
-// How fast a camera may send over its bus.
+// Sets how fast a camera may send over its bus.
 #pragma once
 
 #include <dc1394/dc1394.h>
@@ -7,8 +7,8 @@
 
 namespace relmap::iidc::dc1394 {
 
-// 800 Mbit/s where the camera and all that lies between can (IEEE 1394b), else 400 or what there is. IO_ERROR: the
-// camera refuses.
+// 800 Mbit/s if the camera and everything between support it (IEEE 1394b), otherwise 400 or the maximum. IO_ERROR if
+// the camera refuses.
 Status set_iso_speed(dc1394camera_t& camera);
 
 }  // namespace relmap::iidc::dc1394

@@ -1,4 +1,4 @@
-// What libdc1394 says of an error: its codes tell little, and its log goes nowhere else.
+// Collects libdc1394's log of an error, since its error codes say little.
 #pragma once
 
 #include <string>
@@ -7,12 +7,12 @@
 
 namespace relmap::iidc::dc1394 {
 
-// Before all else.
+// Must be called before all other functions of libdc1394.
 void keep_library_log();
-// Of this thread, since it was called last.
+// The messages of this thread since the last call.
 std::string library_words();
 
-// `what` went wrong, with the library's words behind it.
+// A status with the message `what`, followed by the library's messages.
 Status library_error(Reason reason, const std::string& what);
 
 }  // namespace relmap::iidc::dc1394

@@ -19,7 +19,7 @@ namespace relmap::iidc::dc1394 {
 
 namespace {
 
-constexpr int kFailures = 8;  // in a row: it is of no use any more
+constexpr int kFailures = 8;  // consecutive ones, after which the camera counts as gone
 
 Status of_setup(dc1394error_t error) {
   switch (error) {
@@ -33,7 +33,7 @@ Status of_setup(dc1394error_t error) {
       return {Reason::WRONG_STATE, "the camera's stream is received already"};
     default: {
       const std::string words = library_words();
-      // All that it says of who else holds the stream.
+      // libdc1394 gives no other sign that another program uses the stream.
       const Reason reason = words.find("claim interface") != std::string::npos ? Reason::CAMERA_BUSY : Reason::IO_ERROR;
       return {reason, "libdc1394 cannot receive the camera's stream: " +
                           (words.empty() ? std::string(dc1394_error_get_string(error)) : words)};
@@ -84,7 +84,7 @@ std::string ServedCamera::place() const {
 }
 
 Status ServedCamera::read(std::uint64_t address, std::span<std::uint32_t> quadlets) {
-  for (std::size_t i = 0; i < quadlets.size(); ++i)  // one by one: many cameras know no block requests
+  for (std::size_t i = 0; i < quadlets.size(); ++i)  // one by one, since many cameras do not support block requests
     if (gone_ || dc1394_get_register(camera_, address + 4 * i - kRegisterSpace, &quadlets[i]) != DC1394_SUCCESS)
       return failed("reading", address + 4 * i);
   return {};
@@ -96,7 +96,7 @@ Status ServedCamera::write(std::uint64_t address, std::uint32_t quadlet) {
   return {};
 }
 
-// Whether it refused or has gone: its ROM is what every camera can read out.
+// Determines whether the camera refused or has gone, by reading its ROM, which every camera allows.
 Status ServedCamera::failed(const std::string& what, std::uint64_t address) {
   const std::string words = library_words();
   std::uint32_t quadlet = 0;
@@ -127,7 +127,7 @@ void ServedCamera::stop() {
   if (!ring_) return;
   (void)::eventfd_write(wake_.get(), 1);
   receiver_.join();
-  // Of a camera that has gone, libdc1394 frees what it still uses.
+  // If a camera has gone, libdc1394 frees memory that it still uses.
   if (!gone_) (void)dc1394_capture_stop(camera_);
   ring_.reset();
 }

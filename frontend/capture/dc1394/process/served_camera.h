@@ -1,4 +1,4 @@
-// A camera as libdc1394 reaches it.
+// A camera as accessed by libdc1394.
 #pragma once
 
 #include <dc1394/dc1394.h>
@@ -25,27 +25,27 @@ struct LibraryDeleter {
 };
 using Library = std::unique_ptr<dc1394_t, LibraryDeleter>;
 
-// Of all cameras that libdc1394 finds now, on USB as well. IO_ERROR.
+// The GUIDs of all cameras that libdc1394 finds now, also on USB. IO_ERROR.
 Result<std::vector<std::uint64_t>> list_cameras(dc1394_t& library);
 
-// One thread calls it; frames and faults are told by another. It is never taken apart: libdc1394 does that badly where
-// the camera has gone, and the end of its process does it well.
+// Must be called by one thread; frames and faults are sent by another. Resources are left to the end of the process,
+// since libdc1394 does not release them safely when the camera has gone.
 class ServedCamera {
  public:
-  // False: it could not be told.
+  // Sends a message; returns false if that failed.
   using TellFunction = std::function<bool(const Message&)>;
 
-  // NO_CAMERA; IO_ERROR: it is there and cannot be opened.
+  // NO_CAMERA; IO_ERROR if the camera exists but cannot be opened.
   static Result<std::unique_ptr<ServedCamera>> open(std::uint64_t guid, bool usb_too, TellFunction tell);
 
   std::string place() const;
 
-  // CameraLink's reasons.
+  // The reasons of CameraLink.
   Status read(std::uint64_t address, std::span<std::uint32_t> quadlets);
   Status write(std::uint64_t address, std::uint32_t quadlet);
   Status start(std::shared_ptr<FrameRing> ring, std::size_t image_bytes);
   void stop();
-  // Where it is received: the camera is told to send no more.
+  // Tells the camera to stop sending, if a stream is being received.
   void silence();
 
  private:
@@ -67,7 +67,7 @@ class ServedCamera {
   std::size_t image_bytes_ = 0;
   FileHandle wake_;
   std::thread receiver_;
-  std::uint64_t overrun_ = 0;  // the receiver's: since the last frame that was told
+  std::uint64_t overrun_ = 0;  // used by the receiver: frames dropped since the last one that was sent
 };
 
 }  // namespace relmap::iidc::dc1394

@@ -1,4 +1,4 @@
-// The other end of a socket that a camera's process would have: a thread of the test, which says what the test wants.
+// A fake of a camera's process: a thread of the test at the other end of the socket, which sends what the test wants.
 #pragma once
 
 #include <sys/socket.h>
@@ -21,7 +21,7 @@ namespace relmap::iidc::dc1394::testing {
 
 class FakeProcess {
  public:
-  // Answers every request with OK, unless `answers` does something else: false, and it says nothing.
+  // Fills in the answer to a request, which is ok by default. No answer is sent if it returns false.
   std::function<bool(const Request&, Message&)> answers = [](const Request&, Message&) { return true; };
   Message hello = Message::hello();
 
@@ -30,7 +30,7 @@ class FakeProcess {
     if (thread_.joinable()) thread_.join();
   }
 
-  // Begins, and gives the end for the client.
+  // Starts the thread and returns the client's end of the socket.
   FileHandle begin() {
     auto ends = socket_pair().or_throw();
     socket_ = std::move(ends.second);
@@ -42,7 +42,7 @@ class FakeProcess {
   void end() { ::shutdown(socket_.get(), SHUT_RDWR); }
   std::shared_ptr<FrameRing> ring() const { return std::atomic_load(&ring_); }
 
-  // A frame full of one byte. False: no slot is free.
+  // Sends a frame filled with one byte. False if no slot is free.
   bool send_frame(std::uint8_t content, std::int64_t arrival_us = 0, std::uint64_t overrun = 0) {
     const auto slot = ring()->take();
     if (!slot) return false;

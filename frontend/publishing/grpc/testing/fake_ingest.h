@@ -1,5 +1,5 @@
-// The Ingest service as tests want it: a daemon that settles at once what it is given, in order, and can be told to
-// misbehave. What it has settled outlives its restarts.
+// A fake Ingest service for tests: a daemon that settles at once what it gets, and can be told to misbehave. What it
+// has settled survives its restarts.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -30,14 +30,14 @@ class FakeIngest final : public v1::Ingest::Service {
   struct Manners {
     std::uint32_t credits = 8;
     bool silent = false;   // never answers
-    int breaks = 0;        // so many streams more,
+    int breaks = 0;        // breaks so many more streams,
     int break_after = 5;   // each after that many keyframes
-    grpc::Status refusal;  // of every stream
+    grpc::Status refusal;  // refuses every stream if not ok
     int protocol = kProtocolMajor;
-    MapIdentity map;                       // that it says it serves; not known: it does not say
-    std::set<std::uint32_t> refused;       // sequences: NOT_FINITE
-    std::vector<v1::IngestReply> between;  // said before each acknowledgement
-    int deaf_to_ends = 0;                  // it notes the end only behind so many
+    MapIdentity map;                       // the map that it introduces itself with; none if not known
+    std::set<std::uint32_t> refused;       // refuses these sequences (NOT_FINITE)
+    std::vector<v1::IngestReply> between;  // sent before each acknowledgement
+    int deaf_to_ends = 0;                  // ignores so many ends of sessions
   };
 
   ~FakeIngest() override { stop(); }
@@ -61,12 +61,12 @@ class FakeIngest final : public v1::Ingest::Service {
   Manners manners;
 
   // Under lock().
-  std::map<std::uint32_t, std::uint32_t> settled;  // sequence -> CRC; of a gap 0
-  std::vector<std::uint32_t> order;                // of the keyframes that came
-  std::vector<std::string> robots;                 // of each stream that was taken
+  std::map<std::uint32_t, std::uint32_t> settled;  // sequence -> CRC, 0 for a gap
+  std::vector<std::uint32_t> order;                // sequences of keyframes as they arrived
+  std::vector<std::string> robots;                 // of each accepted stream
   std::uint64_t beyond_credits = 0;                // keyframes
   std::uint64_t bad_payloads = 0;
-  std::vector<std::uint64_t> ends;  // next_sequence of each that came
+  std::vector<std::uint64_t> ends;  // next_sequence of each end that arrived
 
   grpc::Status Stream(grpc::ServerContext* context, Both* stream) override {
     v1::IngestRequest request;
