@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "frontend/figures.h"
+#include "proto/base/mutex.h"
 #include "proto/base/number_text.h"
 #include "proto/geometry/canonical_rotation.h"
 
@@ -276,7 +277,7 @@ void ProgressLine::show_text(const RunSummary& so_far, const publishing::Publish
 
 void Refusals::say(const Status& status) {
   constexpr std::uint64_t kAlways = 3;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const std::uint64_t count = ++counts_[status.reason()];
   if (kept_.size() < max_kept_) kept_.push_back(status);
   if (count > kAlways && !std::has_single_bit(count)) return;
@@ -285,7 +286,7 @@ void Refusals::say(const Status& status) {
 }
 
 std::vector<Status> Refusals::all() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return kept_;
 }
 

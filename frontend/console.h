@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "frontend/publishing/publisher.h"
 #include "frontend/recording/recorded_sessions.h"
 #include "frontend/vision/rig_check.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 
 namespace relmap::frontend {
@@ -87,9 +87,9 @@ class Refusals {
 
  private:
   const std::size_t max_kept_;
-  mutable std::mutex mutex_;
-  std::map<Reason, std::uint64_t> counts_;
-  std::vector<Status> kept_;
+  mutable Mutex mutex_;
+  std::map<Reason, std::uint64_t> counts_ RELMAP_GUARDED_BY(mutex_);
+  std::vector<Status> kept_ RELMAP_GUARDED_BY(mutex_);
 };
 
 enum class ProgressStyle { kNone, kText, kJson };

@@ -5,6 +5,7 @@
 
 #include "proto/base/clock.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::capture {
 
@@ -53,7 +54,10 @@ Status RawLogWriter::begin(const RawLogHeader& header) {
 Status RawLogWriter::write_beginning(const RawLogHeader& header) {
   const Bytes magic = raw_log::encode_begin();
   if (Status status = file_.append(magic); !status.ok()) return status;
-  counts_.bytes = magic.size();
+  {
+    const MutexLock lock(mutex_);
+    counts_.bytes = magic.size();
+  }
   Item item;
   item.head.kind = Kind::kHeader;
   item.head.time_us = header.begun_us;
@@ -88,7 +92,7 @@ Status RawLogWriter::add_event(const RawLogEvent& event) {
 }
 
 Status RawLogWriter::add(const Head& head, ByteSpan body) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (closing_) return {Reason::WRONG_STATE, file_.path() + " is closed"};
   if (!failure_.ok()) {
     counts_.dropped_frames += head.kind == Kind::kFrame;
@@ -135,20 +139,20 @@ void RawLogWriter::tell_of_dropped() {
 void RawLogWriter::run() {
   auto synced = std::chrono::steady_clock::now();
   bool unsynced = false;
-  std::unique_lock lock(mutex_);
-  // Runs without the lock. Nothing is tried after a failure.
-  const auto unlocked = [&](auto work) {
-    lock.unlock();
+  MutexLock lock(mutex_);
+  // Runs without the mutex. Nothing is tried after a failure.
+  const auto unlocked = [&](auto work) RELMAP_REQUIRES(mutex_) {
+    mutex_.unlock();
     const Status status = work();
-    lock.lock();
+    mutex_.lock();
     if (!status.ok()) fail(status);
   };
   while (!closing_ || !queue_.empty()) {
-    const auto awake = [&] { return closing_ || !queue_.empty(); };
+    const auto awake = [&]() RELMAP_REQUIRES(mutex_) { return closing_ || !queue_.empty(); };
     if (unsynced)
-      changed_.wait_until(lock, synced + options_.sync_every, awake);
+      changed_.wait_until(mutex_, synced + options_.sync_every, awake);
     else
-      changed_.wait(lock, awake);
+      changed_.wait(mutex_, awake);
     if (!queue_.empty()) {
       Item item = std::move(queue_.front());
       queue_.pop_front();
@@ -173,7 +177,11 @@ void RawLogWriter::run() {
 }
 
 Status RawLogWriter::write(Item& item) {
-  const std::uint64_t offset = counts_.bytes;
+  std::uint64_t offset = 0;
+  {
+    const MutexLock lock(mutex_);
+    offset = counts_.bytes;
+  }
   item.head.bytes = static_cast<std::uint32_t>(item.body.size());
   item.head.crc = crc32c(item.body);
   Status status = file_.append(raw_log::encode_head(item.head));
@@ -184,7 +192,7 @@ Status RawLogWriter::write(Item& item) {
   }
   const RawLogEntry entry(item.head, offset);
   index_.add(entry);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   counts_.bytes = entry.end();
   counts_.frames += item.head.kind == Kind::kFrame;
   counts_.events += item.head.kind == Kind::kEvent;
@@ -208,18 +216,18 @@ void RawLogWriter::fail(const Status& status) {
 
 Status RawLogWriter::close() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!closing_ && failure_.ok()) tell_of_dropped();
     closing_ = true;
     changed_.notify_all();
   }
   if (thread_.joinable()) thread_.join();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return failure_;
 }
 
 RawLogCounts RawLogWriter::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 

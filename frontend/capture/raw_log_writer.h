@@ -2,17 +2,16 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 
 #include "frontend/capture/log_file.h"
 #include "frontend/capture/raw_log.h"
 #include "frontend/capture/raw_log_index.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::capture {
 
@@ -60,26 +59,27 @@ class RawLogWriter {
   Status begin(const RawLogHeader& header);
   Status write_beginning(const RawLogHeader& header);
   Status add(const raw_log::Head& head, ByteSpan body);
-  void count_dropped(const raw_log::Head& head);
-  void tell_of_dropped();
+  void count_dropped(const raw_log::Head& head) RELMAP_REQUIRES(mutex_);
+  void tell_of_dropped() RELMAP_REQUIRES(mutex_);
   void run();
   Status write(Item& item);
   Status sync();
-  void fail(const Status& status);
+  void fail(const Status& status) RELMAP_REQUIRES(mutex_);
 
   const RawLogOptions options_;
   const std::size_t frame_bytes_;  // minimum size of a frame
   LogFile file_;
   RawLogIndexWriter index_;  // file_ and index_ belong to the thread once it runs
 
-  mutable std::mutex mutex_;  // guards the members below
-  std::condition_variable changed_;
-  std::deque<Item> queue_;
-  RawLogCounts counts_;
-  std::uint64_t dropped_frames_ = 0, dropped_events_ = 0;  // that no event in the log states yet
-  std::int64_t dropped_us_ = 0;                            // time of the first of them
-  Status failure_;
-  bool closing_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<Item> queue_ RELMAP_GUARDED_BY(mutex_);
+  RawLogCounts counts_ RELMAP_GUARDED_BY(mutex_);
+  std::uint64_t dropped_frames_ RELMAP_GUARDED_BY(mutex_) = 0, dropped_events_ RELMAP_GUARDED_BY(mutex_) =
+                                                                   0;  // that no event in the log states yet
+  std::int64_t dropped_us_ RELMAP_GUARDED_BY(mutex_) = 0;              // time of the first of them
+  Status failure_ RELMAP_GUARDED_BY(mutex_);
+  bool closing_ RELMAP_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

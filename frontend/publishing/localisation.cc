@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::publishing {
 
 namespace {
@@ -12,7 +14,7 @@ constexpr std::size_t kMaxPoses = 4096;
 }  // namespace
 
 void Localisation::publishing(const Keyframe& keyframe) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   poses_.push_back({keyframe.sequence, keyframe.T_odom_frame});
   if (poses_.size() > kMaxPoses) poses_.pop_front();
   if (keyframe.source == MotionSource::kStart || is_vision(keyframe.source)) return;
@@ -43,7 +45,7 @@ std::uint64_t Localisation::bridge(const Ends& ends, bool in_force) {
 }
 
 std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++counts_.heard;
   if (news.kind != PoseNews::Kind::kClosure && news.kind != PoseNews::Kind::kClosureOut) return std::nullopt;
   if (news.keyframe.session != session_) {  // another map, to which the closures so far do not apply
@@ -72,7 +74,7 @@ std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
 }
 
 std::optional<Localisation::Place> Localisation::place() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto newest =
       std::find_if(closures_.rbegin(), closures_.rend(), [](const auto& entry) { return entry.second.has_value(); });
   if (newest == closures_.rend()) return std::nullopt;
@@ -82,7 +84,7 @@ std::optional<Localisation::Place> Localisation::place() const {
 }
 
 Localisation::Counts Localisation::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 

@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <utility>
 
+#include "proto/base/mutex.h"
 #include "proto/keyframe/ingest_messages.h"
 
 namespace relmap::publishing {
@@ -57,16 +57,16 @@ class Localisation {
     std::uint32_t closures = 0;  // closures in force that bridge it
   };
   using Ends = std::pair<FrameId, FrameId>;  // keyframe, frame
-  std::optional<SE3> odometry(std::uint32_t sequence) const;
-  std::uint64_t bridge(const Ends& ends, bool in_force);
+  std::optional<SE3> odometry(std::uint32_t sequence) const RELMAP_REQUIRES(mutex_);
+  std::uint64_t bridge(const Ends& ends, bool in_force) RELMAP_REQUIRES(mutex_);
 
-  mutable std::mutex mutex_;
-  std::deque<Pose> poses_;  // of the newest keyframes
-  std::deque<Guess> guesses_;
+  mutable Mutex mutex_;
+  std::deque<Pose> poses_ RELMAP_GUARDED_BY(mutex_);  // of the newest keyframes
+  std::deque<Guess> guesses_ RELMAP_GUARDED_BY(mutex_);
   // T_frame_odom of the closures in force, for the newest keyframes; nullopt if the keyframe's pose is not known.
-  std::map<Ends, std::optional<SE3>> closures_;
-  SessionNumber session_ = 0;  // this session's number in the map
-  Counts counts_;
+  std::map<Ends, std::optional<SE3>> closures_ RELMAP_GUARDED_BY(mutex_);
+  SessionNumber session_ RELMAP_GUARDED_BY(mutex_) = 0;  // this session's number in the map
+  Counts counts_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::publishing

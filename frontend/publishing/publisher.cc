@@ -1,8 +1,6 @@
 #include "frontend/publishing/publisher.h"
 
 #include <algorithm>
-#include <condition_variable>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
@@ -11,6 +9,7 @@
 #include "frontend/publishing/memory_spool.h"
 #include "frontend/publishing/publisher_core.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::publishing {
 
@@ -47,7 +46,7 @@ struct Publisher::Impl {
     went_on = core.next_sequence() > 0;
   }
 
-  PublishSummary summary() const {
+  PublishSummary summary() const RELMAP_REQUIRES(mutex) {
     const PublishCounts& counts = core.counts();
     PublishSummary s;
     s.pushed = pushed;
@@ -68,8 +67,8 @@ struct Publisher::Impl {
     return s;
   }
 
-  Status make_room(std::unique_lock<std::mutex>& lock, std::size_t bytes) {
-    const auto fits = [&] { return core.unsettled_bytes() + bytes <= options.spool_bytes; };
+  Status make_room(std::size_t bytes) RELMAP_REQUIRES(mutex) {
+    const auto fits = [&]() RELMAP_REQUIRES(mutex) { return core.unsettled_bytes() + bytes <= options.spool_bytes; };
     std::uint64_t settled = core.counts().settled;
     auto moved = std::chrono::steady_clock::now();
     while (!fits() && !closed) {
@@ -80,9 +79,9 @@ struct Publisher::Impl {
       } else if (options.live) {
         break;  // the daemon holds all of it: settled in a moment
       } else if (options.patience.count() == 0) {
-        changed.wait(lock);
+        changed.wait(mutex);
       } else {
-        changed.wait_for(lock, options.patience);
+        changed.wait_for(mutex, options.patience);
         const auto now = std::chrono::steady_clock::now();
         if (std::exchange(settled, core.counts().settled) != core.counts().settled)
           moved = now;
@@ -96,7 +95,7 @@ struct Publisher::Impl {
   }
 
   // Ok if the daemon accepts keyframes of the session.
-  Status session_status() const {
+  Status session_status() const RELMAP_REQUIRES(mutex) {
     const std::string name = "session " + session.uuid.to_string();
     if (core.closed() == Reason::SESSION_DELETED)
       return {Reason::SESSION_DELETED, name + " was deleted from the map; under another name it is a new one"};
@@ -104,13 +103,13 @@ struct Publisher::Impl {
     return map_status();
   }
 
-  Status map_status() const { return core.map_status(std::chrono::steady_clock::now()); }
+  Status map_status() const RELMAP_REQUIRES(mutex) { return core.map_status(std::chrono::steady_clock::now()); }
   // Why a repeatable source has to be published from its beginning; ok if it has not.
-  Status must_begin_anew() const { return options.repeatable() ? map_status() : Status(); }
+  Status must_begin_anew() const RELMAP_REQUIRES(mutex) { return options.repeatable() ? map_status() : Status(); }
 
   // A deleted session accepts nothing. If the daemon has other keyframes of this session, those that follow would be
   // appended to them.
-  Status check_session() const {
+  Status check_session() const RELMAP_REQUIRES(mutex) {
     if (Status status = session_status(); status.reason() == Reason::SESSION_DELETED) return status;
     if (Status status = must_begin_anew(); !status.ok()) return status;
     const auto conflicts = core.counts().refused.find(Reason::SEQUENCE_CONFLICT);
@@ -131,12 +130,12 @@ struct Publisher::Impl {
       return {Reason::BAD_SIZE,
               "keyframe of " + std::to_string(payload.size()) + " bytes; at most " + std::to_string(kMaxKeyframeBytes)};
     const std::uint32_t crc = crc32c(payload);
-    std::unique_lock lock(mutex);
+    MutexLock lock(mutex);
     if (keyframe.sequence < core.next_sequence())
       return {Reason::INVALID_ARGUMENT,
               "keyframe " + std::to_string(keyframe.sequence) + " after " + std::to_string(core.next_sequence() - 1)};
     if (Status s = check_session(); !s.ok()) return s;
-    if (Status s = make_room(lock, payload.size()); !s.ok()) return s;
+    if (Status s = make_room(payload.size()); !s.ok()) return s;
     if (const auto gap = core.skipped(keyframe.sequence))
       if (Status s = spool->append_gap(*gap); !s.ok()) return s;
     if (options.live || went_on)
@@ -150,7 +149,7 @@ struct Publisher::Impl {
   }
 
   void acknowledge(const Acknowledgement& ack) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     core.acknowledge(ack, std::chrono::steady_clock::now());
     // What cannot be removed now is removed later. Nothing is removed before the map that has it is on record.
     if (keep_map()) (void)spool->remove_below(core.keep_from());
@@ -159,74 +158,73 @@ struct Publisher::Impl {
   }
 
   void introduce(const DaemonIdentity& daemon) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     core.introduce(daemon, std::chrono::steady_clock::now());
     (void)keep_map();
     changed.notify_all();
   }
 
   // The gaps are stored before the map: with the map alone, a later process would not know that there are gaps.
-  bool keep_map() {
+  bool keep_map() RELMAP_REQUIRES(mutex) {
     for (const Gap& hole : core.take_holes())
       if (!spool->append_gap(hole).ok()) return false;
     return core.map() == spool->map() || spool->set_map(core.map()).ok();
   }
 
   void broken() {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     core.broken();
   }
 
   void hear(const PoseNews& news) {
     if (news.session != session.uuid) return;
     {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       if (core.is_other(news.boot)) return;
       if (news.kind == PoseNews::Kind::kEnded) {
         ended |= ending;
         changed.notify_all();
       }
     }
-    const std::lock_guard lock(news_mutex);
+    const MutexLock lock(news_mutex);
     if (news_listener) news_listener(news);
   }
 
   void run() {
-    std::unique_lock lock(mutex);
+    MutexLock lock(mutex);
     while (!stopping) {
       acknowledged = false;
       const auto sends = core.poll(std::chrono::steady_clock::now(), part_bytes());
       for (const PublisherCore::Send& send : sends) {
         if (stopping || !may_send()) break;
-        transmit(lock, send);
+        transmit(send);
       }
-      if (ending && !ended && may_send()) say_end(lock);
+      if (ending && !ended && may_send()) say_end();
       const std::uint64_t next = core.next_sequence();
       const bool idle = core.all_settled() && !ending;
-      changed.wait_for(lock, idle ? kIdle : kTick,
-                       [&] { return stopping || acknowledged || core.next_sequence() != next || (idle && ending); });
+      changed.wait_for(mutex, idle ? kIdle : kTick, [&]() RELMAP_REQUIRES(mutex) {
+        return stopping || acknowledged || core.next_sequence() != next || (idle && ending);
+      });
     }
   }
 
   // False if, for example, a daemon of another map has answered meanwhile.
-  bool may_send() const { return core.may_send(std::chrono::steady_clock::now()); }
+  bool may_send() const RELMAP_REQUIRES(mutex) { return core.may_send(std::chrono::steady_clock::now()); }
 
-  void say_end(std::unique_lock<std::mutex>& lock) {
+  void say_end() RELMAP_REQUIRES(mutex) {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_end) return;
     next_end = now + kEndAgain;
     const SessionEnd end{session.uuid, core.next_sequence()};
-    lock.unlock();
+    const MutexUnlock unlocked(mutex);
     transport->send(end);
-    lock.lock();
   }
 
   // The lock is not held while the transport sends.
-  void transmit(std::unique_lock<std::mutex>& lock, const PublisherCore::Send& send) {
+  void transmit(const PublisherCore::Send& send) RELMAP_REQUIRES(mutex) {
     if (send.gap) {
-      lock.unlock();
+      const MutexUnlock unlocked(mutex);
       transport->send(Gap{session.uuid, send.sequence, send.to, send.reason});
-      lock.lock();
       return;
     }
     const auto entry = spool->keyframes().find(send.sequence);
@@ -239,7 +237,7 @@ struct Publisher::Impl {
       core.give_up(gap);
       return;
     }
-    lock.unlock();
+    const MutexUnlock unlocked(mutex);
     const std::uint32_t count = count_parts(payload->size(), part_bytes());
     const auto cut = [&](std::uint32_t part) {
       transport->send(cut_part(session.uuid, send.sequence, *payload, crc, part_bytes(), part));
@@ -248,14 +246,13 @@ struct Publisher::Impl {
       for (std::uint32_t part = 0; part < count; ++part) cut(part);
     else
       for (const std::uint32_t part : send.parts) cut(part);
-    lock.lock();
   }
 
   std::uint32_t part_bytes() const { return static_cast<std::uint32_t>(options.part_bytes); }
 
   void stop() {
     {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       closed = stopping = true;
       changed.notify_all();
     }
@@ -268,22 +265,22 @@ struct Publisher::Impl {
   const std::unique_ptr<Spool> spool;
   const std::unique_ptr<PublishTransport> transport;
 
-  std::mutex news_mutex;
-  std::function<void(const PoseNews&)> news_listener;
+  Mutex news_mutex;
+  std::function<void(const PoseNews&)> news_listener RELMAP_GUARDED_BY(news_mutex);
 
-  mutable std::mutex mutex;
-  std::condition_variable changed;
-  PublisherCore core;
-  std::uint64_t pushed = 0;
-  std::uint64_t spooled = 0;
-  bool went_on = false;  // the spool held something at start
-  bool acknowledged = false;
-  bool closed = false;                               // push() is refused
-  bool interrupted = false;                          // waits end at once
-  bool ending = false;                               // the daemon is to be told that the session has ended
-  bool ended = false;                                // the daemon has confirmed that
-  std::chrono::steady_clock::time_point next_end{};  // when it is told again
-  bool stopping = false;
+  mutable Mutex mutex;
+  ConditionVariable changed;
+  PublisherCore core RELMAP_GUARDED_BY(mutex);
+  std::uint64_t pushed RELMAP_GUARDED_BY(mutex) = 0;
+  std::uint64_t spooled RELMAP_GUARDED_BY(mutex) = 0;
+  bool went_on RELMAP_GUARDED_BY(mutex) = false;  // the spool held something at start
+  bool acknowledged RELMAP_GUARDED_BY(mutex) = false;
+  bool closed RELMAP_GUARDED_BY(mutex) = false;       // push() is refused
+  bool interrupted RELMAP_GUARDED_BY(mutex) = false;  // waits end at once
+  bool ending RELMAP_GUARDED_BY(mutex) = false;       // the daemon is to be told that the session has ended
+  bool ended RELMAP_GUARDED_BY(mutex) = false;        // the daemon has confirmed that
+  std::chrono::steady_clock::time_point next_end RELMAP_GUARDED_BY(mutex){};  // when it is told again
+  bool stopping RELMAP_GUARDED_BY(mutex) = false;
   std::thread thread;
 };
 
@@ -315,7 +312,7 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
 const SessionHeader& Publisher::session() const { return impl_->session; }
 
 std::optional<Keyframe> Publisher::last_keyframe() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   if (impl_->spool->keyframes().empty()) return std::nullopt;
   const Result<Bytes> payload = impl_->spool->read(impl_->spool->keyframes().rbegin()->first);
   if (!payload.ok()) return std::nullopt;
@@ -325,62 +322,63 @@ std::optional<Keyframe> Publisher::last_keyframe() const {
 }
 
 std::uint32_t Publisher::next_sequence() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return static_cast<std::uint32_t>(impl_->core.next_sequence());
 }
 
 Status Publisher::push(const Keyframe& keyframe) { return impl_->push(keyframe); }
 
 void Publisher::hear(std::function<void(const PoseNews&)> listener) {
-  const std::lock_guard lock(impl_->news_mutex);
+  const MutexLock lock(impl_->news_mutex);
   impl_->news_listener = std::move(listener);
 }
 
 PublishSummary Publisher::progress() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->summary();
 }
 
 PublishSummary Publisher::finish(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(impl_->mutex);
+  MutexLock lock(impl_->mutex);
   impl_->closed = true;
   impl_->changed.notify_all();
-  impl_->changed.wait_until(lock, deadline, [&] {
+  impl_->changed.wait_until(impl_->mutex, deadline, [&]() RELMAP_REQUIRES(impl_->mutex) {
     return impl_->interrupted || impl_->core.all_settled() || !impl_->must_begin_anew().ok();
   });
   return impl_->summary();
 }
 
 bool Publisher::end_session(std::chrono::steady_clock::time_point deadline) {
-  std::unique_lock lock(impl_->mutex);
+  MutexLock lock(impl_->mutex);
   impl_->ending = true;
   impl_->changed.notify_all();
-  impl_->changed.wait_until(lock, deadline, [&] { return impl_->interrupted || impl_->ended; });
+  impl_->changed.wait_until(impl_->mutex, deadline,
+                            [&]() RELMAP_REQUIRES(impl_->mutex) { return impl_->interrupted || impl_->ended; });
   impl_->ending = false;
   return impl_->ended;
 }
 
 Status Publisher::await_map(std::chrono::steady_clock::time_point deadline) {
   using Clock = std::chrono::steady_clock;
-  std::unique_lock lock(impl_->mutex);
-  const auto known = [&] {
+  MutexLock lock(impl_->mutex);
+  const auto known = [&]() RELMAP_REQUIRES(impl_->mutex) {
     return impl_->interrupted || !impl_->core.map().known() || impl_->core.introduced() || !impl_->map_status().ok();
   };
   while (!known() && Clock::now() < deadline && impl_->transport->trouble().ok())
-    impl_->changed.wait_until(lock, std::min(deadline, Clock::now() + kLook));
+    impl_->changed.wait_until(impl_->mutex, std::min(deadline, Clock::now() + kLook));
   return impl_->map_status();
 }
 
 Status Publisher::trouble() const {
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     if (Status map = impl_->map_status(); !map.ok()) return map;
   }
   return impl_->transport->trouble();
 }
 
 void Publisher::interrupt() {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   impl_->closed = impl_->interrupted = true;
   impl_->changed.notify_all();
 }

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
 
 #include "frontend/tracking/bounded_queue.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::tracking {
 
@@ -77,10 +77,10 @@ struct Pipeline::Impl {
   BoundedQueue<Eye> right_ready;
   BoundedQueue<TrackedPair> tracked, described;
 
-  std::mutex mutex;            // guards the members below
-  std::exception_ptr failure;  // the first exception
-  Status ended;                // publish()'s error
-  PipelineSummary summary;
+  Mutex mutex;
+  std::exception_ptr failure RELMAP_GUARDED_BY(mutex);  // the first exception
+  Status ended RELMAP_GUARDED_BY(mutex);                // publish()'s error
+  PipelineSummary summary RELMAP_GUARDED_BY(mutex);
 
   Impl(StereoTracker& given_tracker, const vision::Rectifier& given_rectifier, PipelineStages given_stages,
        PipelineOptions given_options)
@@ -105,7 +105,7 @@ struct Pipeline::Impl {
   }
 
   void refuse(const Status& status) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     ++summary.refused[status.reason()];
     if (stages.refused) stages.refused(status);
   }
@@ -117,7 +117,7 @@ struct Pipeline::Impl {
       stage();
     } catch (...) {
       {
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         if (!failure) failure = std::current_exception();
       }
       cancel();
@@ -149,7 +149,7 @@ struct Pipeline::Impl {
     if (!options.drop_oldest) return captured.push(std::move(pair));
     const auto pushed = captured.push_dropping_oldest(std::move(pair));
     if (pushed.dropped) {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       ++summary.dropped;
     }
     return pushed.taken;
@@ -236,14 +236,14 @@ struct Pipeline::Impl {
   void publish() {
     while (auto item = described.pop()) {
       {
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         ++summary.tracked;
         summary.tracking.add(item->until_tracked_ms);
         if (item->keyframe) summary.keyframes.add(ms_since(item->arrived));
       }
       if (Status status = stages.publish(*item); !status.ok()) {
         {
-          const std::lock_guard lock(mutex);
+          const MutexLock lock(mutex);
           ended = std::move(status);
         }
         cancel();
@@ -272,6 +272,7 @@ Status Pipeline::run() {
       self.capture();
     });
   }
+  const MutexLock lock(self.mutex);
   if (self.failure) std::rethrow_exception(self.failure);
   return self.ended;
 }

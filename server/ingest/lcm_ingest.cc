@@ -3,12 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/mutex.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
 #include "proto/wire/receive_buffer.h"
@@ -60,13 +59,13 @@ struct LcmIngest::Impl {
   }
 
   void run() {
-    std::unique_lock lock(mutex);
+    MutexLock lock(mutex);
     while (!stopping) {
       lock.unlock();
       say_map();
       say_status();
       lock.lock();
-      stopped.wait_for(lock, kStatusInterval, [this] { return stopping; });
+      stopped.wait_for(mutex, kStatusInterval, [this]() RELMAP_REQUIRES(mutex) { return stopping; });
     }
   }
 
@@ -76,9 +75,9 @@ struct LcmIngest::Impl {
   const std::unique_ptr<LcmLink> link;
   std::chrono::steady_clock::time_point map_said{};  // used by the server's thread only
   std::unique_ptr<intake::IngestServer::Subscription> said;
-  std::mutex mutex;
-  std::condition_variable stopped;
-  bool stopping = false;
+  Mutex mutex;
+  ConditionVariable stopped;
+  bool stopping RELMAP_GUARDED_BY(mutex) = false;
   std::thread status_thread;
 };
 
@@ -113,7 +112,7 @@ void LcmIngest::stop() {
   impl_->link->stop();
   impl_->said.reset();
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     impl_->stopping = true;
     impl_->stopped.notify_all();
   }

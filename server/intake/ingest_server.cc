@@ -1,16 +1,15 @@
 #include "server/intake/ingest_server.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <thread>
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/mutex.h"
 #include "server/intake/part_queue.h"
 
 namespace relmap::intake {
@@ -35,7 +34,7 @@ struct IngestServer::Impl {
   ~Impl() { budget.release(storage::Share::kReassembly, queue_bytes); }
 
   void wake() {
-    const std::lock_guard lock(wake_mutex);
+    const MutexLock lock(wake_mutex);
     woken = true;
     wake_condition.notify_one();
   }
@@ -44,36 +43,36 @@ struct IngestServer::Impl {
     for (bool last = false; !last;) {
       SteadyTime next;
       {
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         next = planned = intake.next_due(now());
       }
       {
-        std::unique_lock lock(wake_mutex);
-        wake_condition.wait_until(lock, next, [this] { return woken || stopping; });
+        MutexLock lock(wake_mutex);
+        wake_condition.wait_until(wake_mutex, next, [this]() RELMAP_REQUIRES(wake_mutex) { return woken || stopping; });
         woken = false;
         last = stopping;
       }
       say();
     }
-    const std::lock_guard lock(subscribers_mutex);
+    const MutexLock lock(subscribers_mutex);
     all_said = true;
     for (const auto& [id, listener] : subscribers)
       if (listener.stopping) listener.stopping();
   }
 
   void say() {
-    const std::lock_guard subscribers_lock(subscribers_mutex);
+    const MutexLock subscribers_lock(subscribers_mutex);
     std::vector<Acknowledgement> due;
     std::vector<PoseNews> news;
     std::vector<RobotEvent> events;
     {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       due = intake.poll(now());
       news = intake.take_news();
       events = intake.take_events();
     }
     {
-      const std::lock_guard lock(wake_mutex);
+      const MutexLock lock(wake_mutex);
       news.insert(news.end(), told.begin(), told.end());
       told.clear();
     }
@@ -95,7 +94,7 @@ struct IngestServer::Impl {
   void take(Take&& action) {
     bool sooner = false;
     {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       if (stopped) return;
       action(intake);
       const SteadyTime next = intake.next_due(now());
@@ -107,11 +106,11 @@ struct IngestServer::Impl {
 
   void enqueue(KeyframePart part) {
     if (const Status sound = check_part(part); !sound.ok()) {
-      const std::lock_guard lock(queue_mutex);
+      const MutexLock lock(queue_mutex);
       ++unsound[index_of(sound.reason())];
       return;
     }
-    const std::lock_guard lock(queue_mutex);
+    const MutexLock lock(queue_mutex);
     const bool answers = begun.contains(part.session);
     queue.push(answers ? part.session : SessionUuid{}, std::move(part));
     queue_condition.notify_one();
@@ -122,8 +121,9 @@ struct IngestServer::Impl {
     for (;;) {
       parts.clear();
       {
-        std::unique_lock lock(queue_mutex);
-        queue_condition.wait(lock, [this] { return queue_stopping || !queue.empty(); });
+        MutexLock lock(queue_mutex);
+        queue_condition.wait(queue_mutex,
+                             [this]() RELMAP_REQUIRES(queue_mutex) { return queue_stopping || !queue.empty(); });
         while (parts.size() < kPartsAtOnce) {
           auto part = queue.pop();
           if (!part) break;
@@ -132,12 +132,12 @@ struct IngestServer::Impl {
       }
       if (parts.empty()) return;
       std::optional<std::set<SessionUuid>> changed;
-      take([&](Intake& i) {
+      take([&](Intake& i) RELMAP_REQUIRES(mutex) {
         for (const KeyframePart& part : parts) i.take_part(part, now());
         if (std::exchange(begun_version, i.begun_version()) != i.begun_version()) changed = i.begun();
       });
       if (!changed) continue;
-      const std::lock_guard lock(queue_mutex);
+      const MutexLock lock(queue_mutex);
       begun = std::move(*changed);
       queue.keep_only(begun);
     }
@@ -148,29 +148,29 @@ struct IngestServer::Impl {
   const std::size_t queue_bytes;
 
   // Outlive the intake, which the sink's threads wake until it is gone.
-  std::mutex wake_mutex;
-  std::condition_variable wake_condition;
-  bool woken = false;
-  bool stopping = false;
-  std::vector<PoseNews> told;  // guarded by wake_mutex
+  Mutex wake_mutex;
+  ConditionVariable wake_condition;
+  bool woken RELMAP_GUARDED_BY(wake_mutex) = false;
+  bool stopping RELMAP_GUARDED_BY(wake_mutex) = false;
+  std::vector<PoseNews> told RELMAP_GUARDED_BY(wake_mutex);
 
-  std::mutex subscribers_mutex;
-  std::map<std::uint64_t, Listener> subscribers;
-  std::uint64_t next_subscriber = 1;
-  bool all_said = false;  // guarded by subscribers_mutex: new subscribers are told `stopping` at once
+  Mutex subscribers_mutex;
+  std::map<std::uint64_t, Listener> subscribers RELMAP_GUARDED_BY(subscribers_mutex);
+  std::uint64_t next_subscriber RELMAP_GUARDED_BY(subscribers_mutex) = 1;
+  bool all_said RELMAP_GUARDED_BY(subscribers_mutex) = false;  // new subscribers are told `stopping` at once
 
-  mutable std::mutex queue_mutex;
-  std::condition_variable queue_condition;
-  PartQueue queue;
-  std::set<SessionUuid> begun;  // each has a queue of its own
-  ReasonCounts unsound{};       // parts that check_part() refused
-  bool queue_stopping = false;
+  mutable Mutex queue_mutex;
+  ConditionVariable queue_condition;
+  PartQueue queue RELMAP_GUARDED_BY(queue_mutex);
+  std::set<SessionUuid> begun RELMAP_GUARDED_BY(queue_mutex);  // each has a queue of its own
+  ReasonCounts unsound RELMAP_GUARDED_BY(queue_mutex){};       // parts that check_part() refused
+  bool queue_stopping RELMAP_GUARDED_BY(queue_mutex) = false;
 
-  mutable std::mutex mutex;
-  Intake intake;
-  std::uint64_t begun_version = 0;
-  bool stopped = false;
-  SteadyTime planned = SteadyTime::min();  // when the thread polls next without being woken
+  mutable Mutex mutex;
+  Intake intake RELMAP_GUARDED_BY(mutex);
+  std::uint64_t begun_version RELMAP_GUARDED_BY(mutex) = 0;
+  bool stopped RELMAP_GUARDED_BY(mutex) = false;
+  SteadyTime planned RELMAP_GUARDED_BY(mutex) = SteadyTime::min();  // when the thread polls next without being woken
 
   std::thread thread, parts_thread;
 };
@@ -179,7 +179,7 @@ class IngestServer::Entry : public IngestServer::Subscription {
  public:
   Entry(std::shared_ptr<Impl> impl, std::uint64_t id) : impl_(std::move(impl)), id_(id) {}
   ~Entry() override {
-    const std::lock_guard lock(impl_->subscribers_mutex);
+    const MutexLock lock(impl_->subscribers_mutex);
     impl_->subscribers.erase(id_);
   }
 
@@ -211,22 +211,22 @@ void IngestServer::take_end(SessionEnd end) {
 }
 
 void IngestServer::count_foreign(Reason reason) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   impl_->intake.count_foreign(reason);
 }
 
 Result<Acknowledgement> IngestServer::acknowledgement(const SessionUuid& session) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->intake.acknowledgement(session);
 }
 
 IngestStats IngestServer::stats() const {
   IngestStats stats;
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     stats = impl_->intake.stats();
   }
-  const std::lock_guard lock(impl_->queue_mutex);
+  const MutexLock lock(impl_->queue_mutex);
   for (std::size_t i = 0; i < impl_->unsound.size(); ++i) {
     stats.parts += impl_->unsound[i];
     stats.parts_refused[i] += impl_->unsound[i];
@@ -237,10 +237,10 @@ IngestStats IngestServer::stats() const {
 std::vector<RobotStats> IngestServer::robots() const {
   std::vector<RobotStats> robots;
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     robots = impl_->intake.robots(now());
   }
-  const std::lock_guard lock(impl_->queue_mutex);
+  const MutexLock lock(impl_->queue_mutex);
   for (RobotStats& robot : robots) {
     const PartQueue::Facts facts = impl_->queue.of(robot.uuid);
     robot.queued = facts.waiting;
@@ -253,7 +253,7 @@ const DaemonIdentity& IngestServer::identity() const { return impl_->identity; }
 
 void IngestServer::tell(PoseNews news) {
   {
-    const std::lock_guard lock(impl_->wake_mutex);
+    const MutexLock lock(impl_->wake_mutex);
     if (impl_->told.size() >= kMaxNews) return;  // news are not reliable: transports may lose them too
     impl_->told.push_back(std::move(news));
   }
@@ -261,7 +261,7 @@ void IngestServer::tell(PoseNews news) {
 }
 
 std::unique_ptr<IngestServer::Subscription> IngestServer::subscribe(Listener listener) {
-  const std::lock_guard lock(impl_->subscribers_mutex);
+  const MutexLock lock(impl_->subscribers_mutex);
   const std::uint64_t id = impl_->next_subscriber++;
   if (impl_->all_said && listener.stopping) listener.stopping();
   impl_->subscribers.emplace(id, std::move(listener));
@@ -270,17 +270,17 @@ std::unique_ptr<IngestServer::Subscription> IngestServer::subscribe(Listener lis
 
 void IngestServer::stop() {
   {
-    const std::lock_guard lock(impl_->queue_mutex);
+    const MutexLock lock(impl_->queue_mutex);
     impl_->queue_stopping = true;
     impl_->queue_condition.notify_one();
   }
   if (impl_->parts_thread.joinable()) impl_->parts_thread.join();
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     impl_->stopped = true;
   }
   {
-    const std::lock_guard lock(impl_->wake_mutex);
+    const MutexLock lock(impl_->wake_mutex);
     impl_->stopping = true;
     impl_->wake_condition.notify_one();
   }

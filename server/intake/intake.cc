@@ -7,6 +7,7 @@
 
 #include "proto/base/clock.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/mutex.h"
 #include "proto/base/names.h"
 
 namespace relmap::intake {
@@ -37,7 +38,7 @@ Intake::Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, 
 }
 
 Intake::~Intake() {
-  const std::lock_guard lock(outcomes_->mutex);
+  const MutexLock lock(outcomes_->mutex);
   outcomes_->wake = nullptr;
 }
 
@@ -47,7 +48,7 @@ Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
     if (sessions_.size() >= options_.max_sessions && !make_room(now)) return nullptr;
     auto submit = [this, session, outcomes = outcomes_](storage::JournalRecord record, std::uint64_t ticket) {
       return sink_.submit(std::move(record), [outcomes, session, ticket](const Result<std::uint64_t>& result) {
-        const std::lock_guard lock(outcomes->mutex);
+        const MutexLock lock(outcomes->mutex);
         outcomes->list.push_back({session, ticket, result.status()});
         if (outcomes->wake) outcomes->wake();
       });
@@ -276,7 +277,7 @@ void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
 void Intake::take_outcomes(SteadyTime now) {
   std::vector<Outcomes::Outcome> outcomes;
   {
-    const std::lock_guard lock(outcomes_->mutex);
+    const MutexLock lock(outcomes_->mutex);
     outcomes.swap(outcomes_->list);
   }
   for (const Outcomes::Outcome& outcome : outcomes) {

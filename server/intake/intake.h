@@ -5,11 +5,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "proto/base/mutex.h"
 #include "server/intake/acknowledgement.h"
 #include "server/intake/ingest_stats.h"
 #include "server/intake/rate_meter.h"
@@ -99,9 +99,9 @@ class Intake {
       std::uint64_t ticket = 0;
       Status status;
     };
-    std::mutex mutex;
-    std::vector<Outcome> list;
-    std::function<void()> wake;
+    Mutex mutex;
+    std::vector<Outcome> list RELMAP_GUARDED_BY(mutex);
+    std::function<void()> wake RELMAP_GUARDED_BY(mutex);
   };
 
   Entry* open(const SessionUuid& session, SteadyTime now);

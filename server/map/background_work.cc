@@ -3,6 +3,7 @@
 #include <utility>
 #include <variant>
 
+#include "proto/base/mutex.h"
 #include "server/map/deletion.h"
 
 namespace relmap::map {
@@ -10,48 +11,48 @@ namespace relmap::map {
 BackgroundWork::BackgroundWork(std::uint64_t slice, Hooks hooks) : slice_(slice), hooks_(std::move(hooks)) {}
 
 void BackgroundWork::resume(bool relaxation_pending) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   relaxation_pending_ = relaxation_pending;
 }
 
 void BackgroundWork::applied(const storage::JournalRecord& record, bool relaxation_pending) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   relaxation_pending_ = relaxation_pending;
   if (std::holds_alternative<storage::IdleWorkRecord>(record)) relaxation_on_its_way_ = false;
   if (std::holds_alternative<storage::RemoveChunkRecord>(record)) removal_on_its_way_ = false;
 }
 
 void BackgroundWork::forget_relaxation() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   relaxation_pending_ = false;
 }
 
 void BackgroundWork::delete_session(SessionNumber session) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   going_.insert(session);
 }
 
 void BackgroundWork::submit_next() {
   bool relax = false, remove = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     relax = relaxation_pending_ && !relaxation_on_its_way_;
     remove = !removal_on_its_way_;
   }
-  if (relax && hooks_.is_quiet()) submit(storage::IdleWorkRecord{slice_}, relaxation_on_its_way_);
+  if (relax && hooks_.is_quiet()) submit(storage::IdleWorkRecord{slice_}, &BackgroundWork::relaxation_on_its_way_);
   if (!remove || !hooks_.is_quiet()) return;
-  if (const auto removal = next_removal()) submit(*removal, removal_on_its_way_);
+  if (const auto removal = next_removal()) submit(*removal, &BackgroundWork::removal_on_its_way_);
 }
 
-void BackgroundWork::submit(storage::JournalRecord record, bool& on_its_way) {
+void BackgroundWork::submit(storage::JournalRecord record, bool BackgroundWork::*on_its_way) {
   {
-    const std::lock_guard lock(mutex_);
-    on_its_way = true;
+    const MutexLock lock(mutex_);
+    this->*on_its_way = true;
   }
-  const Done done = [this, &on_its_way](const Result<std::uint64_t>& result) {
+  const Done done = [this, on_its_way](const Result<std::uint64_t>& result) {
     if (result.ok()) return;  // until it is applied
-    const std::lock_guard lock(mutex_);
-    on_its_way = false;
+    const MutexLock lock(mutex_);
+    this->*on_its_way = false;
   };
   if (Status status = hooks_.submit(std::move(record), done); !status.ok()) done(status);
 }
@@ -60,21 +61,21 @@ std::optional<storage::RemoveChunkRecord> BackgroundWork::next_removal() {
   while (hooks_.may_remove()) {
     SessionNumber session = 0;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (going_.empty()) break;
       session = *going_.begin();
     }
     if (const auto next = next_deletion(*hooks_.session(session)))
       return hooks_.has_waiting_lookups(session) ? std::nullopt : next;
     hooks_.on_gone(session);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     going_.erase(session);
   }
   return std::nullopt;
 }
 
 bool BackgroundWork::done() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return !relaxation_pending_ && !relaxation_on_its_way_ && going_.empty();
 }
 

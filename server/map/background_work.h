@@ -5,11 +5,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <set>
 
 #include "proto/base/ids.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 #include "storage/graph/frame.h"
 #include "storage/journal/journal_record.h"
@@ -59,16 +59,17 @@ class BackgroundWork {
   bool done() const;
 
  private:
-  void submit(storage::JournalRecord record, bool& on_its_way);
+  // `on_its_way`: set until the record is refused, or applied().
+  void submit(storage::JournalRecord record, bool BackgroundWork::*on_its_way);
 
   const std::uint64_t slice_;
   const Hooks hooks_;
 
-  mutable std::mutex mutex_;
-  bool relaxation_pending_ = false;
+  mutable Mutex mutex_;
+  bool relaxation_pending_ RELMAP_GUARDED_BY(mutex_) = false;
   // A record of that kind is submitted, and neither applied nor refused yet.
-  bool relaxation_on_its_way_ = false, removal_on_its_way_ = false;
-  std::set<SessionNumber> going_;  // sessions that are being deleted
+  bool relaxation_on_its_way_ RELMAP_GUARDED_BY(mutex_) = false, removal_on_its_way_ RELMAP_GUARDED_BY(mutex_) = false;
+  std::set<SessionNumber> going_ RELMAP_GUARDED_BY(mutex_);  // sessions that are being deleted
 };
 
 }  // namespace relmap::map

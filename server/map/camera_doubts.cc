@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::map {
 
 namespace {
@@ -15,7 +17,7 @@ std::pair<SessionNumber, SessionNumber> ascending(SessionNumber a, SessionNumber
 
 std::optional<CameraDoubt> CameraDoubts::contradict(SessionNumber session, SessionNumber with,
                                                     const std::string& message) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto before = doubts_locked();
   Pair& pair = pairs_[ascending(session, with)];
   ++pair.contradicted;
@@ -30,17 +32,17 @@ std::optional<CameraDoubt> CameraDoubts::contradict(SessionNumber session, Sessi
 
 void CameraDoubts::confirm(SessionNumber session, SessionNumber with) {
   if (session == with) return;  // a wrong calibration agrees with itself
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++pairs_[ascending(session, with)].confirmed;
 }
 
 void CameraDoubts::forget(SessionNumber session) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(pairs_, [&](const auto& pair) { return pair.first.first == session || pair.first.second == session; });
 }
 
 std::vector<CameraDoubt> CameraDoubts::doubts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return doubts_locked();
 }
 
@@ -63,7 +65,7 @@ std::vector<CameraDoubt> CameraDoubts::doubts_locked() const {
           worst = session;
     CameraDoubt doubt;
     doubt.session = worst;
-    std::erase_if(contradictions, [&](const Sessions& sessions) {
+    std::erase_if(contradictions, [&](const Sessions& sessions) RELMAP_REQUIRES(mutex_) {
       const auto [a, b] = sessions;
       if (a != worst && b != worst) return false;
       const Pair& pair = pairs_.at(sessions);

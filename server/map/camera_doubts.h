@@ -3,13 +3,13 @@
 
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "proto/base/ids.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::map {
 
@@ -46,10 +46,10 @@ class CameraDoubts {
   };
   using Sessions = std::pair<SessionNumber, SessionNumber>;  // ascending
 
-  std::vector<CameraDoubt> doubts_locked() const;
+  std::vector<CameraDoubt> doubts_locked() const RELMAP_REQUIRES(mutex_);
 
-  mutable std::mutex mutex_;
-  std::map<Sessions, Pair> pairs_;
+  mutable Mutex mutex_;
+  std::map<Sessions, Pair> pairs_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::map

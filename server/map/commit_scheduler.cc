@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::map {
 
 CommitScheduler::CommitScheduler(std::chrono::milliseconds interval, std::shared_ptr<storage::Engine> engine,
@@ -14,7 +16,7 @@ CommitScheduler::CommitScheduler(std::chrono::milliseconds interval, std::shared
 std::uint64_t CommitScheduler::ask() {
   std::uint64_t ticket = 0;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ticket = ++asked_;
   }
   hooks_.on_change();
@@ -22,19 +24,19 @@ std::uint64_t CommitScheduler::ask() {
 }
 
 bool CommitScheduler::done(std::uint64_t ticket) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return done_ >= ticket;
 }
 
 bool CommitScheduler::wants_worker() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return done_ < asked_ || (!closed_ && under_way_ && written_ == begun_);
 }
 
 void CommitScheduler::run() {
   bool asked = false, through = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     asked = done_ < asked_;
     through = under_way_ && written_ == begun_;
   }
@@ -52,14 +54,14 @@ void CommitScheduler::begin_if_due() {
 void CommitScheduler::commit() {
   std::uint64_t asked = 0;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     asked = asked_;
   }
   finish();
   begin();
   finish();
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     done_ = asked;
   }
   hooks_.on_change();
@@ -73,7 +75,7 @@ void CommitScheduler::begin() {
     map_->state().lookups = std::move(open);
   std::uint64_t number = 0;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     number = ++begun_;
     under_way_ = true;
   }
@@ -81,7 +83,7 @@ void CommitScheduler::begin() {
   try {
     begun = map_->begin_commit([this, number] {
       {
-        const std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         written_ = number;
       }
       hooks_.on_change();
@@ -93,7 +95,7 @@ void CommitScheduler::begin() {
   if (begun.ok()) return;
   finish();  // the previous commit, unless it was the one that failed
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     under_way_ = false;
   }
   note(begun);
@@ -105,7 +107,7 @@ void CommitScheduler::finish() {
   if (!outcome) return;
   budget_->set(storage::Share::kEngine, engine_->memory_bytes());
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     under_way_ = false;
   }
   note(*outcome);

@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <set>
 
 #include "proto/base/ids.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 #include "storage/engine/engine.h"
 #include "storage/map/map.h"
@@ -76,10 +76,10 @@ class CommitScheduler {
   bool failing_ = false;
   std::atomic<bool> closed_ = false;
 
-  mutable std::mutex mutex_;
-  bool under_way_ = false;
-  std::uint64_t begun_ = 0, written_ = 0;  // commits, numbered
-  std::uint64_t asked_ = 0, done_ = 0;     // tickets
+  mutable Mutex mutex_;
+  bool under_way_ RELMAP_GUARDED_BY(mutex_) = false;
+  std::uint64_t begun_ RELMAP_GUARDED_BY(mutex_) = 0, written_ RELMAP_GUARDED_BY(mutex_) = 0;  // commits, numbered
+  std::uint64_t asked_ RELMAP_GUARDED_BY(mutex_) = 0, done_ RELMAP_GUARDED_BY(mutex_) = 0;     // tickets
 };
 
 }  // namespace relmap::map

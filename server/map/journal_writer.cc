@@ -7,6 +7,8 @@
 #include <iterator>
 #include <utility>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::map {
 
 namespace {
@@ -40,7 +42,7 @@ JournalWriter::~JournalWriter() { stop(); }
 
 Status JournalWriter::submit(storage::JournalRecord record, Done done) {
   const std::size_t bytes = queue_bytes(record);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (stopping_) return {Reason::SHUTTING_DOWN, "the map takes no more records"};
   if (!health_.ok()) return health_;
   if (!budget_->try_charge(storage::Share::kQueues, bytes))
@@ -51,9 +53,9 @@ Status JournalWriter::submit(storage::JournalRecord record, Done done) {
 }
 
 void JournalWriter::run() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   for (;;) {
-    wake_.wait(lock, [&] {
+    wake_.wait(mutex_, [&]() RELMAP_REQUIRES(mutex_) {
       const bool turn = !one_at_a_time_ || finished_ >= durable_;
       return (turn && !queue_.empty()) || stopping_ || !health_.ok();
     });
@@ -63,7 +65,7 @@ void JournalWriter::run() {
       lock.unlock();
       refuse(std::move(refused), why);
       lock.lock();
-      if (wake_.wait_for(lock, kAskAgain, [this] { return stopping_; })) return;
+      if (wake_.wait_for(mutex_, kAskAgain, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; })) return;
       lock.unlock();
       const Status now = engine_->append(epoch_, {}).status();
       lock.lock();
@@ -96,7 +98,7 @@ void JournalWriter::run() {
 void JournalWriter::write(std::vector<Queued> group) {
   const Result<std::uint64_t> last = append(group);
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     set_health(last.status());
     if (last.ok()) durable_ = *last;
   }
@@ -142,36 +144,36 @@ void JournalWriter::set_health(const Status& status) {
 Result<std::uint64_t> JournalWriter::append_follow_up(const storage::JournalRecord& record) {
   const Bytes bytes = storage::encode_record(record, durable_through());
   auto sequence = engine_->append(epoch_, std::span(&bytes, 1));
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   set_health(sequence.status());
   if (sequence.ok()) durable_ = *sequence;
   return sequence;
 }
 
 void JournalWriter::finished(std::uint64_t sequence) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   finished_ = std::max(finished_, sequence);
   wake_.notify_all();
 }
 
 std::uint64_t JournalWriter::durable_through() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return durable_;
 }
 
 bool JournalWriter::idle() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return queue_.empty() && !writing_;
 }
 
 Status JournalWriter::health() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return health_;
 }
 
 void JournalWriter::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     wake_.notify_all();
   }

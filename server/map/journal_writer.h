@@ -3,14 +3,13 @@
 // five times a second, would take records again. So callers keep what was refused, and no record overtakes another.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
+#include "proto/base/mutex.h"
 #include "storage/engine/engine.h"
 #include "storage/journal/journal_record.h"
 #include "storage/memory/budget.h"
@@ -62,7 +61,7 @@ class JournalWriter {
   void write(std::vector<Queued> group);
   Result<std::uint64_t> append(std::span<const Queued> group);
   void refuse(std::vector<Queued> group, const Status& why);
-  void set_health(const Status& status);
+  void set_health(const Status& status) RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<storage::Engine> engine_;
   const std::uint64_t epoch_;
@@ -70,14 +69,14 @@ class JournalWriter {
   const bool one_at_a_time_;
   const OnDurable on_durable_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::vector<Queued> queue_;
-  bool writing_ = false;
-  bool stopping_ = false;
-  std::uint64_t durable_ = 0;
-  std::uint64_t finished_ = 0;
-  Status health_;
+  mutable Mutex mutex_;
+  ConditionVariable wake_;
+  std::vector<Queued> queue_ RELMAP_GUARDED_BY(mutex_);
+  bool writing_ RELMAP_GUARDED_BY(mutex_) = false;
+  bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
+  std::uint64_t durable_ RELMAP_GUARDED_BY(mutex_) = 0;
+  std::uint64_t finished_ RELMAP_GUARDED_BY(mutex_) = 0;
+  Status health_ RELMAP_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

@@ -6,6 +6,8 @@
 #include <exception>
 #include <utility>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::map {
 
 namespace {
@@ -26,7 +28,7 @@ void LookupQueue::start(LookUp look_up, Journal journal, std::function<void()> o
 
 void LookupQueue::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     changed_.notify_all();
   }
@@ -34,14 +36,14 @@ void LookupQueue::stop() {
 }
 
 void LookupQueue::push(FrameId frame) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   open_locked(frame);
   queue_.push_back(frame);
   changed_.notify_all();
 }
 
 void LookupQueue::open(FrameId frame) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   open_locked(frame);
 }
 
@@ -50,7 +52,7 @@ void LookupQueue::open_locked(FrameId frame) {
 }
 
 void LookupQueue::close(FrameId frame) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   close_locked(frame);
 }
 
@@ -60,35 +62,35 @@ void LookupQueue::close_locked(FrameId frame) {
 }
 
 std::set<FrameId> LookupQueue::close_all() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   budget_->release(storage::Share::kQueues, open_.size() * kBytesPerFrame);
   failed_.clear();
   return std::exchange(open_, {});
 }
 
 void LookupQueue::forget_failed(SessionNumber session) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const FrameId frame : std::set<FrameId>(failed_))
     if (frame.session == session) close_locked(frame);
 }
 
 std::set<FrameId> LookupQueue::open_frames() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return open_;
 }
 
 bool LookupQueue::is_open(FrameId frame) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return open_.contains(frame);
 }
 
 std::size_t LookupQueue::waiting() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return open_.size() - failed_.size();
 }
 
 bool LookupQueue::is_waiting(SessionNumber session) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (auto frame = open_.lower_bound({session, 0}); frame != open_.end() && frame->session == session; ++frame)
     if (!failed_.contains(*frame)) return true;
   return false;
@@ -99,9 +101,9 @@ bool LookupQueue::is_full() const {
 }
 
 void LookupQueue::run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   for (;;) {
-    changed_.wait(lock, [&] { return stopping_ || !queue_.empty(); });
+    changed_.wait(mutex_, [&]() RELMAP_REQUIRES(mutex_) { return stopping_ || !queue_.empty(); });
     if (stopping_) return;
     const FrameId frame = queue_.front();
     queue_.pop_front();
@@ -112,7 +114,7 @@ void LookupQueue::run(const LookUp& look_up, const Journal& journal, const std::
     if (end == End::kFailed) failed_.insert(frame);
     if (end == End::kAgain) {
       queue_.push_back(frame);
-      changed_.wait_for(lock, kRetry, [this] { return stopping_; });
+      changed_.wait_for(mutex_, kRetry, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; });
     }
     lock.unlock();
     on_change();

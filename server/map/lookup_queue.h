@@ -5,17 +5,16 @@
 // nothing.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <thread>
 #include <vector>
 
 #include "proto/base/ids.h"
+#include "proto/base/mutex.h"
 #include "storage/journal/journal_record.h"
 #include "storage/memory/budget.h"
 
@@ -64,16 +63,16 @@ class LookupQueue {
 
   void run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change);
   static End look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal);
-  void open_locked(FrameId frame);
-  void close_locked(FrameId frame);
+  void open_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
+  void close_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<storage::Budget> budget_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<FrameId> queue_;  // for the thread
-  std::set<FrameId> open_;     // those queued, the one being looked up, and those that failed
-  std::set<FrameId> failed_;
-  bool stopping_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<FrameId> queue_ RELMAP_GUARDED_BY(mutex_);  // for the thread
+  std::set<FrameId> open_ RELMAP_GUARDED_BY(mutex_);     // those queued, the one being looked up, and those that failed
+  std::set<FrameId> failed_ RELMAP_GUARDED_BY(mutex_);
+  bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

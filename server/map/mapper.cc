@@ -4,15 +4,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <future>
-#include <mutex>
 #include <set>
 #include <thread>
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/mutex.h"
 #include "server/map/background_work.h"
 #include "server/map/commit_scheduler.h"
 #include "server/map/deterministic_driver.h"
@@ -91,11 +90,15 @@ struct Mapper::Impl {
   bool journal_patiently(const storage::JournalRecord& record);
 
   void tell_waiting() const {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     changed.notify_all();
   }
   Status health() const;
-  bool all_done_locked() const;
+  Status storage_status() const {
+    const MutexLock lock(mutex);
+    return storage;
+  }
+  bool all_done() const RELMAP_REQUIRES(mutex);
   bool recognises_places() const { return options.closures && places; }
 
   const std::shared_ptr<storage::Engine> engine;
@@ -106,19 +109,20 @@ struct Mapper::Impl {
   std::uint64_t epoch = 0;
   MapIdentity identity;
 
-  // The state that threads wait for: guarded by `mutex`, with `changed` notified of each change. Declared before the
-  // parts below, which call tell_waiting() until they are destroyed.
-  mutable std::mutex mutex;
-  mutable std::condition_variable changed;
-  std::deque<DurableRecord> durable;  // waiting for the worker
-  std::uint64_t applied = 0;
-  bool applying = false;
-  bool stopping = false;       // the worker ends when `durable` is empty
-  bool shutting_down = false;  // waits for the disk are broken off
-  Status storage;
-  std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes;  // by sequence, the last kRemembered
-  Timings timings;
-  std::uint64_t relaxations = 0, active_frames = 0;
+  // The state that threads wait for; `changed` is notified of each change. Declared before the parts below, which call
+  // tell_waiting() until they are destroyed.
+  mutable Mutex mutex;
+  mutable ConditionVariable changed;
+  std::deque<DurableRecord> durable RELMAP_GUARDED_BY(mutex);  // waiting for the worker
+  std::uint64_t applied RELMAP_GUARDED_BY(mutex) = 0;
+  bool applying RELMAP_GUARDED_BY(mutex) = false;
+  bool stopping RELMAP_GUARDED_BY(mutex) = false;       // the worker ends when `durable` is empty
+  bool shutting_down RELMAP_GUARDED_BY(mutex) = false;  // waits for the disk are broken off
+  Status storage RELMAP_GUARDED_BY(mutex);
+  std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes
+      RELMAP_GUARDED_BY(mutex);  // by sequence, the last kRemembered
+  Timings timings RELMAP_GUARDED_BY(mutex);
+  std::uint64_t relaxations RELMAP_GUARDED_BY(mutex) = 0, active_frames RELMAP_GUARDED_BY(mutex) = 0;
   std::atomic<bool> failed = false;
 
   // Declared before the map, whose threads call them.
@@ -148,7 +152,7 @@ CommitScheduler::Hooks Mapper::Impl::commit_hooks() {
   return {.open_lookups = [this] { return lookups.open_frames(); },
           .on_outcome =
               [this](const Status& outcome) {
-                const std::lock_guard lock(mutex);
+                const MutexLock lock(mutex);
                 if (!failed) storage = outcome;
                 changed.notify_all();
               },
@@ -161,7 +165,7 @@ BackgroundWork::Hooks Mapper::Impl::background_hooks() {
                        Done done) { return writer->submit(std::move(record), std::move(done)); },
       .is_quiet =
           [this] {
-            const std::lock_guard lock(mutex);
+            const MutexLock lock(mutex);
             return durable.empty() && !stopping && !failed;
           },
       .session = [this](SessionNumber session) { return map->session(session); },
@@ -170,7 +174,7 @@ BackgroundWork::Hooks Mapper::Impl::background_hooks() {
           [this] {  // what a removal edits cannot leave memory while commits fail
             if (commits.failing() || budget->used(storage::Share::kDirty) > budget->allowance(storage::Share::kDirty))
               return false;
-            const std::lock_guard lock(mutex);
+            const MutexLock lock(mutex);
             return !failed && !shutting_down;
           },
       .on_gone = [](SessionNumber session) { spdlog::info("session {} is deleted", session); }};
@@ -241,17 +245,21 @@ void Mapper::Impl::recover() {
   const Replayed replayed = replay(*engine, committed + 1, *builder);
   if (replayed.trouble.ok()) map->publish();
   const auto view = map->view();
-  applied = view->state().applied_sequence;
-  if (applied > committed)
+  const std::uint64_t through = view->state().applied_sequence;
+  {
+    const MutexLock lock(mutex);
+    applied = through;
+  }
+  if (through > committed)
     spdlog::info("recovered: journal records {} to {} were applied again, {} keyframes among them, in {:.1f} s",
-                 committed + 1, applied, replayed.frames.size(),
+                 committed + 1, through, replayed.frames.size(),
                  std::chrono::duration<double>(Clock::now() - begun).count());
   sessions.load(epoch, view->sessions());
   for (const storage::Session& session : view->sessions()) begin_deletion(session);
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
   } else if (!replayed.trouble.ok()) {
-    fail("the journal could not be re-applied beyond record " + std::to_string(applied), replayed.trouble);
+    fail("the journal could not be re-applied beyond record " + std::to_string(through), replayed.trouble);
   } else {
     background.resume(view->pending_frames() > 0);
     find_open_lookups(replayed);
@@ -302,7 +310,7 @@ void Mapper::Impl::add_place(FrameId frame, std::span<const std::uint32_t> words
 void Mapper::Impl::start() {
   writer = std::make_unique<JournalWriter>(engine, epoch, budget, options.deterministic,
                                            [this](std::vector<DurableRecord> group) {
-                                             const std::lock_guard lock(mutex);
+                                             const MutexLock lock(mutex);
                                              for (DurableRecord& record : group) durable.push_back(std::move(record));
                                              changed.notify_all();
                                            });
@@ -319,17 +327,17 @@ void Mapper::Impl::start() {
 void Mapper::Impl::catch_up() {
   if (failed) return;
   const std::set<FrameId> open = lookups.close_all();
-  for (const FrameId frame : open) follow_up(applied, frame);
+  for (const FrameId frame : open) follow_up(map->state().applied_sequence, frame);
   constexpr std::uint32_t kAll = DeterministicDriver::kSlices;
   const auto done = static_cast<int>(std::min(map->state().idle_records, kAll));
-  if (open.empty()) follow_up(applied, std::nullopt, DeterministicDriver::kSlices - done);
+  if (open.empty()) follow_up(map->state().applied_sequence, std::nullopt, DeterministicDriver::kSlices - done);
 }
 
 void Mapper::Impl::work() {
-  std::unique_lock lock(mutex);
+  MutexLock lock(mutex);
   for (;;) {
-    changed.wait_until(lock, commits.next_due(),
-                       [&] { return !durable.empty() || stopping || commits.wants_worker(); });
+    changed.wait_until(mutex, commits.next_due(),
+                       [&]() RELMAP_REQUIRES(mutex) { return !durable.empty() || stopping || commits.wants_worker(); });
     if (durable.empty() && stopping) break;
     if (!durable.empty()) {
       DurableRecord record = std::move(durable.front());
@@ -381,7 +389,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::Jour
 // Notes the outcome of an applied record and wakes the threads that wait for it.
 void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result) {
   background.applied(record, !map->state().pending.empty());
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   applied = sequence;
   if (std::holds_alternative<storage::ClosureProposalRecord>(record) ||
       std::holds_alternative<storage::SetEdgeStateRecord>(record)) {
@@ -413,8 +421,9 @@ std::optional<std::uint64_t> Mapper::Impl::append_patiently(const storage::Journ
     if (const auto appended = writer->append_follow_up(record); appended.ok()) return *appended;
     if (!patient) return std::nullopt;
     commits.begin_if_due();
-    std::unique_lock lock(mutex);
-    if (changed.wait_for(lock, kDiskFails, [this] { return shutting_down; })) return std::nullopt;
+    MutexLock lock(mutex);
+    if (changed.wait_for(mutex, kDiskFails, [this]() RELMAP_REQUIRES(mutex) { return shutting_down; }))
+      return std::nullopt;
   }
 }
 
@@ -428,7 +437,7 @@ void Mapper::Impl::fail(const std::string& what, const Status& why) {
   const Status status(Reason::READ_ONLY, what + ": " + why.to_string() + "; " + advice);
   spdlog::critical("the map is read-only: {}", status.message());
   commits.close();
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   storage = status;
   failed = true;  // after `storage`, which is the reason that is given to whoever sees it
   changed.notify_all();
@@ -480,13 +489,13 @@ bool Mapper::Impl::journal_patiently(const storage::JournalRecord& record) {
         record, [durable_at](const Result<std::uint64_t>& result) { durable_at->set_value(result.ok()); });
     if (submitted.ok() && written.get()) return true;
     if (failed || submitted.reason() == Reason::SHUTTING_DOWN) return false;
-    std::unique_lock lock(mutex);
+    MutexLock lock(mutex);
     const auto pause = submitted.reason() == Reason::BUDGET_EXCEEDED ? kQueueFull : kDiskFails;
-    if (changed.wait_for(lock, pause, [this] { return shutting_down; })) return false;
+    if (changed.wait_for(mutex, pause, [this]() RELMAP_REQUIRES(mutex) { return shutting_down; })) return false;
   }
 }
 
-bool Mapper::Impl::all_done_locked() const {
+bool Mapper::Impl::all_done() const {
   return writer->idle() && durable.empty() && !applying && applied == writer->durable_through() &&
          lookups.waiting() == 0 && background.done();
 }
@@ -494,7 +503,7 @@ bool Mapper::Impl::all_done_locked() const {
 // As MapperStats::storage.
 Status Mapper::Impl::health() const {
   const Status journal = writer->health();
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   return journal.ok() || failed ? storage : journal;
 }
 
@@ -519,18 +528,18 @@ Result<std::uint64_t> Mapper::Impl::submit_and_wait(storage::JournalRecord recor
 }
 
 Status Mapper::Impl::stop() {
-  if (stopped) return storage;
+  if (stopped) return storage_status();
   stopped = true;
-  if (!writer) return storage;  // never started
+  if (!writer) return storage_status();  // never started
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     shutting_down = true;
     changed.notify_all();
   }
   lookups.stop();
   writer->stop();
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     stopping = true;
     changed.notify_all();
   }
@@ -538,7 +547,7 @@ Status Mapper::Impl::stop() {
   if (places)
     if (const Status saved = places->save(); !saved.ok())
       spdlog::warn("the next start reads more of the map for its place index: {}", saved.to_string());
-  return storage;
+  return storage_status();
 }
 
 Mapper::Mapper(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -569,32 +578,35 @@ Result<std::uint64_t> Mapper::submit_and_wait(storage::JournalRecord record) {
 }
 
 Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) const {
-  std::unique_lock lock(impl_->mutex);
-  if (impl_->changed.wait_until(lock, deadline, [&] { return impl_->applied >= sequence; })) return {};
+  MutexLock lock(impl_->mutex);
+  if (impl_->changed.wait_until(impl_->mutex, deadline,
+                                [&]() RELMAP_REQUIRES(impl_->mutex) { return impl_->applied >= sequence; }))
+    return {};
   return {Reason::DEADLINE, "journal record " + std::to_string(sequence) + " is durable but not applied yet"};
 }
 
 std::optional<std::vector<EdgeChange>> Mapper::edge_changes(std::uint64_t sequence) const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   for (const auto& [of, changes] : impl_->edge_changes)
     if (of == sequence) return changes;
   return std::nullopt;
 }
 
 Status Mapper::wait_idle(Clock::time_point deadline) const {
-  std::unique_lock lock(impl_->mutex);
-  while (!impl_->all_done_locked()) {
+  MutexLock lock(impl_->mutex);
+  while (!impl_->all_done()) {
     if (impl_->failed) return impl_->storage;
     if (Clock::now() >= deadline) return {Reason::DEADLINE, "the map is still being worked on"};
-    impl_->changed.wait_for(lock, std::chrono::milliseconds(20));
+    impl_->changed.wait_for(impl_->mutex, std::chrono::milliseconds(20));
   }
   return {};
 }
 
 Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
   const std::uint64_t ticket = impl_->commits.ask();
-  std::unique_lock lock(impl_->mutex);
-  if (!impl_->changed.wait_until(lock, deadline, [&] { return impl_->commits.done(ticket); }))
+  MutexLock lock(impl_->mutex);
+  if (!impl_->changed.wait_until(impl_->mutex, deadline,
+                                 [&]() RELMAP_REQUIRES(impl_->mutex) { return impl_->commits.done(ticket); }))
     return Status(Reason::DEADLINE, "the commit has not come about yet");
   if (!impl_->storage.ok()) return impl_->storage;
   return impl_->engine->applied_sequence();
@@ -605,8 +617,9 @@ void Mapper::watch_closures(ClosureAnnouncer::Watcher watcher) { impl_->closures
 void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
   const std::uint64_t told = impl_->edits.watch(std::move(watcher));
   // The edits that the first watcher was told of may not be published yet; the worker publishes them right after.
-  std::unique_lock lock(impl_->mutex);
-  while (view()->version() < told && !impl_->failed) impl_->changed.wait_for(lock, std::chrono::milliseconds(1));
+  MutexLock lock(impl_->mutex);
+  while (view()->version() < told && !impl_->failed)
+    impl_->changed.wait_for(impl_->mutex, std::chrono::milliseconds(1));
 }
 
 std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
@@ -624,7 +637,7 @@ MapperStats Mapper::stats() const {
   stats.places_left_out = impl_->places ? impl_->places->left_out() : 0;
   stats.pending_frames = impl_->map->view()->pending_frames();
   const Status journal = impl_->writer->health();
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   stats.storage = journal.ok() || impl_->failed ? impl_->storage : journal;
   stats.applied_sequence = impl_->applied;
   stats.queued = impl_->durable.size();

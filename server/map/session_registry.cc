@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "proto/base/mutex.h"
 #include "proto/keyframe/extension_codec.h"
 #include "proto/keyframe/keyframe.h"
 
@@ -31,13 +32,14 @@ SessionRegistry::~SessionRegistry() {
 }
 
 void SessionRegistry::load(std::uint64_t epoch, std::span<const storage::Session> sessions) {
+  const MutexLock lock(mutex_);
   epoch_ = epoch;
   for (const storage::Session& session : sessions) sessions_.insert_or_assign(session.header.uuid, session);
   for (const auto& [uuid, session] : sessions_) budget_->charge(storage::Share::kSessions, bytes_of(session));
 }
 
 Result<SessionNumber> SessionRegistry::begin(const SessionHeader& header) {
-  const std::lock_guard lock(mutex_);  // held through: one number for a uuid
+  const MutexLock lock(mutex_);  // held through: one number for a uuid
   if (const auto known = sessions_.find(header.uuid); known != sessions_.end()) {
     const storage::Session& begun = known->second;
     if (const auto now = view_()->session(begun.number); now && storage::is_going(*now))
@@ -61,7 +63,7 @@ Result<SessionNumber> SessionRegistry::begin(const SessionHeader& header) {
     return why;
   };
   // If the engine's counter was damaged and has gone back, its number may be in use already.
-  const auto taken = [&](SessionNumber number) {
+  const auto taken = [&](SessionNumber number) RELMAP_REQUIRES(mutex_) {
     return std::any_of(sessions_.begin(), sessions_.end(),
                        [&](const auto& entry) { return entry.second.number == number; });
   };

@@ -3,11 +3,11 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <unordered_map>
 
 #include "proto/base/ids.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 #include "storage/engine/engine.h"
 #include "storage/graph/frame.h"
@@ -51,8 +51,8 @@ class SessionRegistry {
   const Health health_;
   std::uint64_t epoch_ = 0;
 
-  std::mutex mutex_;
-  std::unordered_map<SessionUuid, storage::Session> sessions_;
+  Mutex mutex_;
+  std::unordered_map<SessionUuid, storage::Session> sessions_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::map

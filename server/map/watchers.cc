@@ -6,17 +6,19 @@
 #include <utility>
 #include <vector>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::map {
 
 void ClosureAnnouncer::watch(Watcher watcher) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watcher_ = std::move(watcher);
 }
 
 void ClosureAnnouncer::announce(const storage::Graph& view, const ClosureChange& closures) {
   if (closures.accepted.empty() && closures.out_of_force.empty() && closures.lone.empty() && closures.gone.empty())
     return;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!watcher_) return;
   for (const auto& ids : {closures.lone, closures.accepted, closures.out_of_force})
     for (const EdgeId id : ids) try {
@@ -32,7 +34,7 @@ void ClosureAnnouncer::announce(const storage::Graph& view, const ClosureChange&
 }
 
 std::uint64_t EditAnnouncer::watch(Watcher watcher) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watcher_ = std::move(watcher);
   watched_ = true;
   const std::vector<storage::ChunkId> untold(untold_.begin(), untold_.end());
@@ -42,7 +44,7 @@ std::uint64_t EditAnnouncer::watch(Watcher watcher) {
 }
 
 void EditAnnouncer::edited(std::uint64_t version, std::span<const storage::ChunkId> chunks) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   version_ = version;
   if (watcher_)
     watcher_(version, chunks);

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <span>
 #include <unordered_set>
 
+#include "proto/base/mutex.h"
 #include "server/map/closures.h"
 #include "storage/map/map.h"
 
@@ -25,8 +25,8 @@ class ClosureAnnouncer {
   void announce(const storage::Graph& view, const ClosureChange& closures);
 
  private:
-  std::mutex mutex_;
-  Watcher watcher_;
+  Mutex mutex_;
+  Watcher watcher_ RELMAP_GUARDED_BY(mutex_);
 };
 
 // Thread-safe: watch() by any thread, edited() by the worker.
@@ -42,11 +42,12 @@ class EditAnnouncer {
   void edited(std::uint64_t version, std::span<const storage::ChunkId> chunks);
 
  private:
-  std::mutex mutex_;
-  Watcher watcher_;
-  bool watched_ = false;  // there has been a watcher: edits are no longer kept for a later one
-  std::uint64_t version_ = 0;
-  std::unordered_set<storage::ChunkId> untold_;
+  Mutex mutex_;
+  Watcher watcher_ RELMAP_GUARDED_BY(mutex_);
+  bool watched_ RELMAP_GUARDED_BY(mutex_) =
+      false;  // there has been a watcher: edits are no longer kept for a later one
+  std::uint64_t version_ RELMAP_GUARDED_BY(mutex_) = 0;
+  std::unordered_set<storage::ChunkId> untold_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::map

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <mutex>
 #include <numeric>
 
 #include "proto/base/clock.h"
 #include "proto/base/hex.h"
+#include "proto/base/mutex.h"
 #include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
@@ -107,8 +107,8 @@ struct Daemon::Impl {
   std::unique_ptr<intake::IngestServer> ingest;
   std::unique_ptr<intake::IngestServer::Subscription> robot_log;
   std::unique_ptr<ingest::LcmIngest> lcm;
-  mutable std::mutex lcm_mutex;
-  Status lcm_refusal;  // why LCM ingest does not run; guarded by lcm_mutex
+  mutable Mutex lcm_mutex;
+  Status lcm_refusal RELMAP_GUARDED_BY(lcm_mutex);  // why LCM ingest does not run
   std::unique_ptr<rpc::Core> core;
   std::unique_ptr<rpc::RpcServer> server;
   std::string address;
@@ -166,7 +166,7 @@ Status Daemon::Impl::serve() {
   facts.started_us = started_us;
   core = std::make_unique<rpc::Core>(*mapper, facts, config.rpc);
   core->intake.facts = [this] {
-    const std::lock_guard lock(lcm_mutex);
+    const MutexLock lock(lcm_mutex);
     return facts_of(ingest->stats(), lcm_refusal);
   };
   core->intake.server = ingest.get();
@@ -204,7 +204,7 @@ void Daemon::Impl::start_lcm() {
     return;
   }
   spdlog::error("no LCM ingest: {}; gRPC goes on serving", started.status().to_string());
-  const std::lock_guard lock(lcm_mutex);
+  const MutexLock lock(lcm_mutex);
   lcm_refusal = started.status();
 }
 

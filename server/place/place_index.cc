@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
-#include <mutex>
 #include <unordered_map>
 #include <unordered_set>
 
+#include "proto/base/mutex.h"
 #include "server/place/block_scores.h"
 #include "server/place/compare_places.h"
 #include "server/place/fabmap_model.h"
@@ -167,22 +167,24 @@ struct PlaceIndex::Impl {
         places(model,
                {options.allowance - std::min(options.allowance, fixed_bytes()), options.folder, vocabulary->crc()}) {}
 
-  std::size_t fixed_bytes() const {
+  std::size_t fixed_bytes() {
+    const MutexLock lock(query_mutex);
     std::size_t bytes = sizeof(Impl) + model.memory_bytes() + query.memory_bytes();
     for (const Bytes& block : samples) bytes += block.capacity();
     return bytes;
   }
-  std::vector<LogLikelihood> at_samples();
-  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph);
+  std::vector<LogLikelihood> at_samples() RELMAP_REQUIRES(query_mutex);
+  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph)
+      RELMAP_REQUIRES(query_mutex);
 
   const std::shared_ptr<const Vocabulary> vocabulary;
   const FabMapModel model;
   const std::vector<Bytes> samples;
 
-  std::mutex query_mutex;  // one query at a time; guards its memory
-  BlockScores query{model};
-  PlaceScores scores;
-  std::vector<storage::FrameRange> sessions_left_out;  // guarded by it, too
+  Mutex query_mutex;  // one query at a time; guards its memory
+  BlockScores query RELMAP_GUARDED_BY(query_mutex){model};
+  PlaceScores scores RELMAP_GUARDED_BY(query_mutex);
+  std::vector<storage::FrameRange> sessions_left_out RELMAP_GUARDED_BY(query_mutex);
 
   InvertedIndex places;
   std::atomic<std::size_t> left_out = 0;
@@ -248,7 +250,7 @@ Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
 }
 
 void PlaceIndex::leave_out(SessionNumber session) {
-  const std::lock_guard one_at_a_time(impl_->query_mutex);
+  const MutexLock one_at_a_time(impl_->query_mutex);
   impl_->sessions_left_out.push_back({session, 0, std::numeric_limits<std::uint32_t>::max()});
 }
 
@@ -262,7 +264,7 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const storag
 
   Shortlist likeliest;
   {
-    const std::lock_guard one_at_a_time(impl_->query_mutex);
+    const MutexLock one_at_a_time(impl_->query_mutex);
     PlaceScores& scores = impl_->scores;
     impl_->query.ask(unique);
     std::vector<storage::FrameRange> all_masked(masked.begin(), masked.end());

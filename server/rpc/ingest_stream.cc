@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "proto/base/mutex.h"
 #include "proto/base/names.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
@@ -34,7 +35,7 @@ void IngestStream::OnReadDone(bool ok) {
   const Status taken = call_.guarded([&] { return take(request_); });
   if (!taken.ok()) return end(taken);
   request_.Clear();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!ending_) StartRead(&request_);
 }
 
@@ -88,7 +89,7 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
   v1::IngestReply welcome;
   *welcome.mutable_welcome() = welcome_message(intake_->identity());
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     replies_.push_back(std::move(welcome));
     go_on();
   }
@@ -101,7 +102,7 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
 }
 
 Status IngestStream::join(const SessionUuid& session) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (sessions_.size() >= kMaxSessions && !sessions_.contains(session))
     return {Reason::BUDGET_EXCEEDED, "more than " + std::to_string(kMaxSessions) + " sessions on one stream"};
   sessions_.insert(session);
@@ -109,14 +110,14 @@ Status IngestStream::join(const SessionUuid& session) {
 }
 
 void IngestStream::hear(const Acknowledgement& ack) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (ending_ || !sessions_.contains(ack.session)) return;
   acknowledgements_.insert_or_assign(ack.session, ack);
   go_on();
 }
 
 void IngestStream::hear(const PoseNews& news) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (ending_ || !sessions_.contains(news.session) || replies_.size() >= kMaxReplies) return;
   replies_.push_back(news_message(news));
   go_on();
@@ -143,7 +144,7 @@ void IngestStream::go_on() {
 }
 
 void IngestStream::OnWriteDone(bool ok) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   write_under_way_ = false;
   if (!ok) {
     replies_.clear();
@@ -162,7 +163,7 @@ void IngestStream::OnCancel() { end({Reason::DEADLINE, "the robot has gone"}); }
 
 // Ends the stream after what waits to be sent has been sent.
 void IngestStream::end(const Status& status) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!ending_) ending_ = status;
   go_on();
 }

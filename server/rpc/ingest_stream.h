@@ -9,11 +9,11 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 
+#include "proto/base/mutex.h"
 #include "relmap/v1/ingest.pb.h"
 #include "server/rpc/core.h"
 #include "server/rpc/gateway.h"
@@ -37,7 +37,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   void hear(const Acknowledgement& ack);
   void hear(const PoseNews& news);
   void end(const Status& status);
-  void go_on();  // requires mutex_
+  void go_on() RELMAP_REQUIRES(mutex_);
 
   map::Mapper& mapper_;
   intake::IngestServer* const intake_;  // null: refused
@@ -45,14 +45,14 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   v1::IngestRequest request_;
   std::string who_;  // robot and address, set by its hello
 
-  std::mutex mutex_;
-  std::set<SessionUuid> sessions_;  // sessions that this stream has mentioned
-  std::map<SessionUuid, Acknowledgement> acknowledgements_;
-  std::deque<v1::IngestReply> replies_;
-  v1::IngestReply writing_;
-  bool write_under_way_ = false;
-  std::optional<Status> ending_;
-  bool finished_ = false;
+  Mutex mutex_;
+  std::set<SessionUuid> sessions_ RELMAP_GUARDED_BY(mutex_);  // sessions that this stream has mentioned
+  std::map<SessionUuid, Acknowledgement> acknowledgements_ RELMAP_GUARDED_BY(mutex_);
+  std::deque<v1::IngestReply> replies_ RELMAP_GUARDED_BY(mutex_);
+  v1::IngestReply writing_ RELMAP_GUARDED_BY(mutex_);
+  bool write_under_way_ RELMAP_GUARDED_BY(mutex_) = false;
+  std::optional<Status> ending_ RELMAP_GUARDED_BY(mutex_);
+  bool finished_ RELMAP_GUARDED_BY(mutex_) = false;
 
   std::unique_ptr<intake::IngestServer::Subscription> subscription_;  // declared last, so that it is destroyed first
 };

@@ -3,13 +3,12 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <thread>
 
+#include "proto/base/mutex.h"
 #include "server/rpc/deadline.h"
 #include "server/rpc/maintenance_turn.h"
 
@@ -25,7 +24,7 @@ class JobStream {
   // Tells the job to end, and waits for it.
   ~JobStream() {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       abandoned_ = true;
       changed_.notify_all();
     }
@@ -36,19 +35,19 @@ class JobStream {
 
   // Called by the job. Not ok if nobody waits for it any more.
   Status check() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (abandoned_) return {Reason::DEADLINE, "the caller has gone"};
     return deadline_.check();
   }
   // Called by the job. Sets its progress, of which only the newest is sent.
   void show(Reply progress) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     progress_ = std::move(progress);
   }
   // Called by the job. Sends a message; waits while kUnsent messages have not been taken.
   void send(Reply reply) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return unsent_.size() < kUnsent || abandoned_; });
+    MutexLock lock(mutex_);
+    changed_.wait(mutex_, [this]() RELMAP_REQUIRES(mutex_) { return unsent_.size() < kUnsent || abandoned_; });
     if (!abandoned_) unsent_.push_back(std::move(reply));
     changed_.notify_all();
   }
@@ -57,8 +56,8 @@ class JobStream {
   // work goes on, and the daemon whether the caller has gone. nullopt at the end, or the status with which the job
   // failed.
   Result<std::optional<Reply>> take() {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, kPulse, [this] { return !unsent_.empty() || end_; });
+    MutexLock lock(mutex_);
+    changed_.wait_for(mutex_, kPulse, [this]() RELMAP_REQUIRES(mutex_) { return !unsent_.empty() || end_; });
     if (unsent_.empty()) {
       if (!end_) return std::optional<Reply>(progress_);
       if (!end_->ok()) return *end_;
@@ -85,19 +84,19 @@ class JobStream {
     } catch (const std::exception& error) {
       end = {Reason::INTERNAL, error.what()};
     }
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = std::move(end);
     changed_.notify_all();
   }
 
   const MaintenanceTurn::Held turn_;
   const Deadline& deadline_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Reply> unsent_;
-  Reply progress_;
-  std::optional<Status> end_;
-  bool abandoned_ = false;
+  mutable Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<Reply> unsent_ RELMAP_GUARDED_BY(mutex_);
+  Reply progress_ RELMAP_GUARDED_BY(mutex_);
+  std::optional<Status> end_ RELMAP_GUARDED_BY(mutex_);
+  bool abandoned_ RELMAP_GUARDED_BY(mutex_) = false;
   std::thread thread_;  // declared last, since it uses the others
 };
 

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 
 namespace relmap::rpc {
@@ -18,19 +18,19 @@ class MaintenanceTurn {
 
   // Takes the turn for `work`. BUDGET_EXCEEDED, with the name of the work that is running, if there is one.
   Result<Held> take(const std::string& work) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!under_way_.empty())
       return Status(Reason::BUDGET_EXCEEDED, work + ": " + under_way_ + " is running, and only one may run at a time");
     under_way_ = work;
     return Held(this, [this](const void*) {
-      const std::lock_guard ended(mutex_);
+      const MutexLock ended(mutex_);
       under_way_.clear();
     });
   }
 
  private:
-  std::mutex mutex_;
-  std::string under_way_;
+  Mutex mutex_;
+  std::string under_way_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::rpc

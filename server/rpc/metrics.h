@@ -5,9 +5,9 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <string>
 
+#include "proto/base/mutex.h"
 #include "proto/base/reason.h"
 
 namespace relmap::rpc {
@@ -23,7 +23,7 @@ struct MethodMetrics {
 class Metrics {
  public:
   void count(const std::string& method, Reason outcome, std::chrono::microseconds took) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     MethodMetrics& m = methods_[method];
     ++m.calls;
     const auto us = static_cast<std::uint64_t>(took.count());
@@ -32,13 +32,13 @@ class Metrics {
     if (outcome != Reason::OK) ++m.failures[outcome];
   }
   std::map<std::string, MethodMetrics> methods() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return methods_;
   }
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, MethodMetrics> methods_;
+  mutable Mutex mutex_;
+  std::map<std::string, MethodMetrics> methods_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::rpc

@@ -1,5 +1,7 @@
 #include "server/rpc/task_pool.h"
 
+#include "proto/base/mutex.h"
+
 namespace relmap::rpc {
 
 TaskPool::TaskPool(int threads) {
@@ -8,7 +10,7 @@ TaskPool::TaskPool(int threads) {
 
 TaskPool::~TaskPool() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
   wake_.notify_all();
@@ -17,15 +19,15 @@ TaskPool::~TaskPool() {
 
 void TaskPool::post(std::function<void()> task) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     tasks_.push_back(std::move(task));
   }
   wake_.notify_one();
 }
 
 void TaskPool::run() {
-  for (std::unique_lock lock(mutex_);;) {
-    wake_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
+  for (MutexLock lock(mutex_);;) {
+    wake_.wait(mutex_, [this]() RELMAP_REQUIRES(mutex_) { return stopping_ || !tasks_.empty(); });
     if (tasks_.empty()) return;
     const std::function<void()> task = std::move(tasks_.front());
     tasks_.pop_front();

@@ -1,13 +1,13 @@
 // Threads that run handlers, so that no RPC blocks a thread of gRPC.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <deque>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "proto/base/mutex.h"
 
 namespace relmap::rpc {
 
@@ -25,10 +25,10 @@ class TaskPool {
  private:
   void run();
 
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::deque<std::function<void()>> tasks_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  ConditionVariable wake_;
+  std::deque<std::function<void()>> tasks_ RELMAP_GUARDED_BY(mutex_);
+  bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;
 };
 

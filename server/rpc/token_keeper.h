@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 #include "storage/map/map.h"
 
@@ -36,7 +36,7 @@ class TokenKeeper {
 
   // Keeps an object under this number and returns a token for `position` in it.
   std::string token(std::uint64_t number, std::shared_ptr<const T> kept, std::string_view position) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     expire_locked();
     keep_locked(number, std::move(kept));
     return boot_ + "-" + std::to_string(number) + "-" + std::string(position);
@@ -54,7 +54,7 @@ class TokenKeeper {
     const auto [end, error] = std::from_chars(token.data() + first + 1, digits_end, number);
     if (error != std::errc{} || end != digits_end) return not_ours;
 
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     expire_locked();
     const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.number == number; });
     if (token.compare(0, first, boot_) != 0 || found == kept_.end())
@@ -66,14 +66,14 @@ class TokenKeeper {
 
   // Drops the least recently used object. False if nothing is kept.
   bool drop_oldest() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (kept_.empty()) return false;
     kept_.pop_back();
     return true;
   }
   // Drops what is too old. Must be called now and then.
   void expire() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     expire_locked();
   }
 
@@ -84,11 +84,11 @@ class TokenKeeper {
     std::shared_ptr<const T> kept;
     Clock::time_point used;
   };
-  void expire_locked() {
+  void expire_locked() RELMAP_REQUIRES(mutex_) {
     const Clock::time_point oldest = Clock::now() - kMaxAge;
     kept_.remove_if([&](const Kept& k) { return k.used < oldest; });
   }
-  void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) {
+  void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) RELMAP_REQUIRES(mutex_) {
     kept_.remove_if([&](const Kept& k) { return k.number == number; });
     kept_.push_front({number, std::move(kept), Clock::now()});
     if (kept_.size() > max_kept_) kept_.pop_back();
@@ -96,8 +96,8 @@ class TokenKeeper {
 
   const std::string boot_, name_;
   const std::size_t max_kept_;
-  std::mutex mutex_;
-  std::list<Kept> kept_;  // most recently used first
+  Mutex mutex_;
+  std::list<Kept> kept_ RELMAP_GUARDED_BY(mutex_);  // most recently used first
 };
 
 // Keeps map versions by their numbers.

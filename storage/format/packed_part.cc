@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "proto/base/crc32c.h"
+#include "proto/base/mutex.h"
 #include "storage/format/frame_codec.h"
 
 namespace relmap::storage {
@@ -35,14 +36,14 @@ PackedPart<Frame>::~PackedPart() {
 
 template <typename Frame>
 std::shared_ptr<const Frame> PackedPart<Frame>::frame(std::uint32_t slot) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return frame_locked(slot);
 }
 
 template <typename Frame>
 Slots<Frame> PackedPart<Frame>::frames(std::uint64_t slots) const {
   Slots<Frame> all;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
     if ((slots >> slot) & 1) all[slot] = frame_locked(slot);
   return all;
@@ -67,18 +68,19 @@ const std::shared_ptr<const Frame>& PackedPart<Frame>::frame_locked(std::uint32_
 
 template <typename Frame>
 typename PackedPart<Frame>::Record PackedPart<Frame>::record(std::uint32_t slot) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return records_[slot];
 }
 
 template <typename Frame>
 bool PackedPart<Frame>::empty() const {
+  const MutexLock lock(mutex_);
   return std::none_of(records_.begin(), records_.end(), [](const Record& record) { return record.there(); });
 }
 
 template <typename Frame>
 bool PackedPart<Frame>::sound() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return std::all_of(records_.begin(), records_.end(), [](const Record& record) {
     return !record.there() || (!record.damage && crc32c(record.body) == record.crc);
   });

@@ -6,10 +6,10 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 
 #include "proto/base/bytes.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 #include "storage/format/chunk_codec.h"
 #include "storage/graph/chunk.h"
@@ -50,13 +50,13 @@ class PackedPart {
   bool sound() const;
 
  private:
-  const std::shared_ptr<const Frame>& frame_locked(std::uint32_t slot) const;
+  const std::shared_ptr<const Frame>& frame_locked(std::uint32_t slot) const RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<Budget> budget_;
   const ChunkId id_;
-  mutable std::mutex mutex_;
-  mutable Records records_;
-  mutable std::size_t bytes_ = 0;
+  mutable Mutex mutex_;
+  mutable Records records_ RELMAP_GUARDED_BY(mutex_);
+  mutable std::size_t bytes_ RELMAP_GUARDED_BY(mutex_) = 0;
 };
 
 extern template class PackedPart<FrameHot>;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::storage {
 namespace {
 
@@ -35,7 +37,7 @@ void DiskSpace::look(Clock::time_point now) {
 }
 
 Status DiskSpace::check() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (const auto now = Clock::now(); now >= look_at_) look(now);
   if (!full_) return {};
   return {Reason::DISK_FULL, folder_ + ": " + megabytes(room_.free) + " of " + megabytes(room_.size) +
@@ -43,7 +45,7 @@ Status DiskSpace::check() {
 }
 
 Status DiskSpace::spare(std::uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto room = files_->room(folder_);
   if (!room.ok() || room->free >= bytes) return {};
   return {Reason::DISK_FULL, folder_ + ": " + megabytes(room->free) + " of " + megabytes(room->size) + " free, " +
@@ -51,7 +53,7 @@ Status DiskSpace::spare(std::uint64_t bytes) {
 }
 
 void DiskSpace::note_failure() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (const auto room = files_->room(folder_); room.ok()) room_ = *room;
   full_ = true;
   look_at_ = Clock::now() + options_.believe_failure;
@@ -59,7 +61,7 @@ void DiskSpace::note_failure() {
 
 bool DiskSpace::give_up_reserve() {
   note_failure();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!reserved_ || !files_->remove(reserve_path_).ok()) return false;
   reserved_ = false;
   return true;

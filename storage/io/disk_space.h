@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 
+#include "proto/base/mutex.h"
 #include "storage/io/file.h"
 
 namespace relmap::storage {
@@ -40,18 +40,18 @@ class DiskSpace {
   bool give_up_reserve();
 
  private:
-  void look(std::chrono::steady_clock::time_point now);
+  void look(std::chrono::steady_clock::time_point now) RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<FileSystem> files_;
   const std::string folder_;
   const std::string reserve_path_;
   DiskSpaceOptions options_;
 
-  std::mutex mutex_;
-  std::chrono::steady_clock::time_point look_at_{};  // the next look() is not before this
-  DiskRoom room_;
-  bool full_ = false;
-  bool reserved_ = false;
+  Mutex mutex_;
+  std::chrono::steady_clock::time_point look_at_ RELMAP_GUARDED_BY(mutex_){};  // the next look() is not before this
+  DiskRoom room_ RELMAP_GUARDED_BY(mutex_);
+  bool full_ RELMAP_GUARDED_BY(mutex_) = false;
+  bool reserved_ RELMAP_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace relmap::storage

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::storage {
 namespace {
 
@@ -19,7 +21,10 @@ Result<std::unique_ptr<JournalLog>> JournalLog::open(std::shared_ptr<FileSystem>
   if (!log->options_.read_only) {
     if (Status made = create_durable_directory(*log->files_, directory); !made.ok()) return made;
   }
-  if (Status recovered = log->recover(applied); !recovered.ok()) return recovered;
+  {
+    const MutexLock lock(log->mutex_);
+    if (Status recovered = log->recover(applied); !recovered.ok()) return recovered;
+  }
   return log;
 }
 
@@ -124,7 +129,7 @@ Status JournalLog::begin_segment() {
     const Status removed = files_->remove(path);
     return removed.reason() == Reason::NO_SUCH_FILE ? Status() : removed;
   };
-  const auto begin = [&]() -> Status {
+  const auto begin = [&]() RELMAP_REQUIRES(mutex_) -> Status {
     auto file = files_->open_append(begun.path);
     if (!file.ok()) return file.status();
     if (Status status = (*file)->append(header); !status.ok()) return status;
@@ -147,7 +152,7 @@ Status JournalLog::begin_segment() {
 }
 
 Result<std::uint64_t> JournalLog::append(std::span<const Bytes> records) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!loss_.ok()) return loss_;
   if (options_.read_only) return Status(Reason::READ_ONLY, "the journal was opened for reading");
   for (const Bytes& record : records)
@@ -186,7 +191,7 @@ Status JournalLog::read(std::uint64_t from,
   std::vector<Segment> segments;
   std::uint64_t last = 0;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     segments = segments_;
     last = last_;
     from = std::max(from, first_);
@@ -221,7 +226,7 @@ Status JournalLog::read(std::uint64_t from,
 Status JournalLog::trim(std::uint64_t through) {
   std::vector<Segment> gone;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (options_.read_only) return Status(Reason::READ_ONLY, "the journal was opened for reading");
     first_ = std::max(first_, std::min(through, last_) + 1);
     while (segments_.size() > 1 && segments_[1].first <= through + 1) {
@@ -236,7 +241,7 @@ Status JournalLog::trim(std::uint64_t through) {
 }
 
 Result<std::vector<JournalLog::KeptFile>> JournalLog::keep() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<KeptFile> kept;
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     auto file = files_->open_read(segments_[i].path);
@@ -257,12 +262,12 @@ Result<std::uint64_t> JournalLog::bytes() const {
 }
 
 std::uint64_t JournalLog::first() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return first_;
 }
 
 std::uint64_t JournalLog::last() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return last_;
 }
 

@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "proto/base/bytes.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 #include "storage/io/file.h"
 #include "storage/journal/journal_segment.h"
@@ -78,12 +78,12 @@ class JournalLog {
         directory_(std::move(directory)),
         options_(std::move(options)),
         next_salt_(options_.salts()) {}
-  Status recover(std::uint64_t applied);
-  Status loss(std::uint64_t durable, const Status& unreadable) const;
-  Status continue_behind(const Tail& tail);
-  Status begin_segment();
-  Status write(std::span<const Bytes> records);
-  void leave_segment();
+  Status recover(std::uint64_t applied) RELMAP_REQUIRES(mutex_);
+  Status loss(std::uint64_t durable, const Status& unreadable) const RELMAP_REQUIRES(mutex_);
+  Status continue_behind(const Tail& tail) RELMAP_REQUIRES(mutex_);
+  Status begin_segment() RELMAP_REQUIRES(mutex_);
+  Status write(std::span<const Bytes> records) RELMAP_REQUIRES(mutex_);
+  void leave_segment() RELMAP_REQUIRES(mutex_);
   Segment segment(const SegmentName& name) const;
 
   const std::shared_ptr<FileSystem> files_;
@@ -92,13 +92,14 @@ class JournalLog {
   Status loss_;
   std::string dropped_;
 
-  mutable std::mutex mutex_;
-  std::vector<Segment> segments_;     // ascending; the last is appended to
-  std::unique_ptr<AppendFile> file_;  // of the last segment; null if a write to it failed or it is of version 1
-  std::uint64_t next_salt_ = 0;       // of the next segment
-  std::uint64_t file_bytes_ = 0;      // durable bytes of the last segment
-  std::uint64_t first_ = 1;
-  std::uint64_t last_ = 0;
+  mutable Mutex mutex_;
+  std::vector<Segment> segments_ RELMAP_GUARDED_BY(mutex_);  // ascending; the last is appended to
+  std::unique_ptr<AppendFile> file_
+      RELMAP_GUARDED_BY(mutex_);  // of the last segment; null if a write to it failed or it is of version 1
+  std::uint64_t next_salt_ RELMAP_GUARDED_BY(mutex_) = 0;   // of the next segment
+  std::uint64_t file_bytes_ RELMAP_GUARDED_BY(mutex_) = 0;  // durable bytes of the last segment
+  std::uint64_t first_ RELMAP_GUARDED_BY(mutex_) = 1;
+  std::uint64_t last_ RELMAP_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace relmap::storage

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "proto/base/mutex.h"
 #include "storage/map/part_loader.h"
 
 namespace relmap::storage {
@@ -84,7 +85,7 @@ void ChunkCache::update(const Written<Frame>& written, std::uint64_t number) {
 
 void ChunkCache::committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
                            std::span<const Written<FrameWarm>> warm) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   current_ = number;
   for (const auto& written : hot) update(written, number);
   for (const auto& written : warm) update(written, number);
@@ -99,7 +100,7 @@ ChunkCache::Versions::iterator ChunkCache::version_locked(const Key& key, std::u
 }
 
 std::shared_ptr<const void> ChunkCache::find(const Key& key, std::uint64_t commit) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = version_locked(key, commit);
   if (found == index_.end()) return nullptr;
   lru_.splice(lru_.begin(), lru_, found->second);
@@ -107,7 +108,7 @@ std::shared_ptr<const void> ChunkCache::find(const Key& key, std::uint64_t commi
 }
 
 void ChunkCache::insert(Entry entry, std::uint64_t loaded_at) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   entry.through = loaded_at == current_ ? kNewest : loaded_at;
   insert_locked(std::move(entry));
   evict_locked();
@@ -144,12 +145,12 @@ void ChunkCache::evict_locked() {
 }
 
 void ChunkCache::evict() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   evict_locked();
 }
 
 void ChunkCache::clear() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   while (!lru_.empty()) erase_locked(lru_.begin());
 }
 

@@ -11,12 +11,12 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
 
+#include "proto/base/mutex.h"
 #include "storage/engine/engine.h"
 #include "storage/format/packed_part.h"
 #include "storage/memory/budget.h"
@@ -90,20 +90,20 @@ class ChunkCache {
   using Versions = std::unordered_multimap<Key, Lru::iterator, KeyHash>;
 
   template <typename Frame>
-  void update(const Written<Frame>& written, std::uint64_t number);
+  void update(const Written<Frame>& written, std::uint64_t number) RELMAP_REQUIRES(mutex_);
   std::shared_ptr<const void> find(const Key& key, std::uint64_t commit);
   void insert(Entry entry, std::uint64_t loaded_at);
-  void insert_locked(Entry entry);
-  Versions::iterator version_locked(const Key& key, std::uint64_t commit);
-  void erase_locked(Lru::iterator entry);
-  void evict_locked();
+  void insert_locked(Entry entry) RELMAP_REQUIRES(mutex_);
+  Versions::iterator version_locked(const Key& key, std::uint64_t commit) RELMAP_REQUIRES(mutex_);
+  void erase_locked(Lru::iterator entry) RELMAP_REQUIRES(mutex_);
+  void evict_locked() RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<Budget> budget_;
   const std::tuple<std::shared_ptr<const PackedPart<FrameHot>>, std::shared_ptr<const PackedPart<FrameWarm>>> absent_;
-  std::mutex mutex_;
-  std::uint64_t current_;
-  Lru lru_;
-  Versions index_;
+  Mutex mutex_;
+  std::uint64_t current_ RELMAP_GUARDED_BY(mutex_);
+  Lru lru_ RELMAP_GUARDED_BY(mutex_);
+  Versions index_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::storage

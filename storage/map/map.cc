@@ -4,6 +4,7 @@
 #include <cassert>
 #include <chrono>
 
+#include "proto/base/mutex.h"
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
 #include "storage/map/label_index.h"
@@ -259,7 +260,7 @@ std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
 void Map::watch_edits(EditWatcher watcher) { impl_->edit_watcher = std::move(watcher); }
 
 std::shared_ptr<const MapView> Map::view() const {
-  const std::lock_guard lock(impl_->view_mutex);
+  const MutexLock lock(impl_->view_mutex);
   return impl_->shown.view;
 }
 

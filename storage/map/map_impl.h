@@ -4,13 +4,13 @@
 #include <future>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
+#include "proto/base/mutex.h"
 #include "storage/map/map_view_impl.h"
 #include "storage/map/working_chunk.h"
 #include "storage/memory/spares.h"
@@ -102,8 +102,8 @@ struct Map::Impl {
     std::shared_ptr<const MapView> view;
     MapView::Impl* parts = nullptr;  // of `view`
   };
-  mutable std::mutex view_mutex;
-  Shown shown;
+  mutable Mutex view_mutex;
+  Shown shown RELMAP_GUARDED_BY(view_mutex);
   Shown spare_view;  // one that was released, to be used again
 
   const WorkingChunk* find(ChunkId id) const { return find_chunk(dirty, id); }

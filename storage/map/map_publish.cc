@@ -1,5 +1,6 @@
 // How edits become visible: frozen copies of the chunks touched, a new table, one pointer swap. Where possible they are
 // made in the memory of versions that nobody reads any more.
+#include "proto/base/mutex.h"
 #include "storage/graph/precision.h"
 #include "storage/map/map_impl.h"
 
@@ -127,7 +128,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts.ledger = ledger;
   std::shared_ptr<const MapView> view = next.view;
   {
-    const std::lock_guard lock(view_mutex);
+    const MutexLock lock(view_mutex);
     std::swap(shown, next);
   }
   if (only_ours(next.view)) {  // otherwise it ends with its last reader

@@ -2,6 +2,8 @@
 
 #include <cassert>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::storage {
 namespace {
 
@@ -114,18 +116,18 @@ void Budget::set(Share share, std::size_t bytes) {
 }
 
 void Budget::add_evictor(const void* owner, std::function<void()> evict) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   evictors_[owner] = std::move(evict);
 }
 
 void Budget::remove_evictor(const void* owner) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   evictors_.erase(owner);
 }
 
 void Budget::relieve(Share grown) {
   if (grown == Share::kCache || grown == Share::kPictures || used() <= limit_) return;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const auto& [owner, evict] : evictors_) evict();
 }
 

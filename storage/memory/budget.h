@@ -8,8 +8,9 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string_view>
+
+#include "proto/base/mutex.h"
 
 namespace relmap::storage {
 
@@ -67,8 +68,8 @@ class Budget {
 
   const std::size_t limit_;
   std::array<std::atomic<std::size_t>, kShares> used_{};
-  std::mutex mutex_;
-  std::map<const void*, std::function<void()>> evictors_;
+  Mutex mutex_;
+  std::map<const void*, std::function<void()>> evictors_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::storage

@@ -2,17 +2,19 @@
 
 #include <algorithm>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::storage {
 
 void ViewLedger::add(std::uint64_t version) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   live_.push_back(version);
 }
 
 void ViewLedger::remove(std::uint64_t version) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   live_.erase(std::lower_bound(live_.begin(), live_.end(), version));
-  std::erase_if(retired_, [&](const Retired& part) {
+  std::erase_if(retired_, [&](const Retired& part) RELMAP_REQUIRES(mutex_) {
     if (version < part.created || version >= part.retired || held(part, 0)) return false;
     budget_->release(Share::kViews, part.bytes);
     return true;
@@ -20,7 +22,7 @@ void ViewLedger::remove(std::uint64_t version) {
 }
 
 void ViewLedger::retire(std::uint64_t created, std::uint64_t retired, std::size_t bytes) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const Retired part{created, retired, bytes};
   if (!held(part, 0)) return;
   retired_.push_back(part);

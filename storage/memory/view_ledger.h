@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "proto/base/mutex.h"
 #include "storage/memory/budget.h"
 
 namespace relmap::storage {
@@ -33,13 +33,14 @@ class ViewLedger {
     std::uint64_t created, retired;
     std::size_t bytes;
   };
-  bool held(const Retired& part, std::uint64_t from) const;  // by a live view not older than `from`
-  void expire();
+  bool held(const Retired& part, std::uint64_t from) const
+      RELMAP_REQUIRES(mutex_);  // by a live view not older than `from`
+  void expire() RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<Budget> budget_;
-  std::mutex mutex_;
-  std::vector<std::uint64_t> live_;  // ascending
-  std::vector<Retired> retired_;
+  Mutex mutex_;
+  std::vector<std::uint64_t> live_ RELMAP_GUARDED_BY(mutex_);  // ascending
+  std::vector<Retired> retired_ RELMAP_GUARDED_BY(mutex_);
   std::atomic<std::uint64_t> expired_below_{0};
 };
 

@@ -5,8 +5,8 @@
 #include <rocksdb/write_batch.h>
 
 #include <filesystem>
-#include <mutex>
 
+#include "proto/base/mutex.h"
 #include "storage/io/copy_file.h"
 #include "storage/io/disk_space.h"
 #include "storage/journal/journal_log.h"
@@ -132,7 +132,8 @@ class RocksDbEngine final : public Engine {
         reclaimer_(*database_->map) {}
 
   Result<std::uint64_t> acquire() override {
-    const std::scoped_lock lock(append_mutex_, write_mutex_);  // no append of the former owner is under way after this
+    const MutexLock append_lock(append_mutex_),
+        write_lock(write_mutex_);  // no append of the former owner is under way after this
     Root next = root_;
     ++next.epoch;
     rocksdb::WriteBatch batch;
@@ -141,9 +142,9 @@ class RocksDbEngine final : public Engine {
   }
 
   Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
-    const std::lock_guard lock(append_mutex_);
+    const MutexLock lock(append_mutex_);
     {
-      const std::lock_guard root_lock(mutex_);
+      const MutexLock root_lock(mutex_);
       if (Status owner = check_owner(epoch); !owner.ok()) return owner;
     }
     if (Status room = database_->space->check(); !room.ok()) return room;
@@ -163,7 +164,7 @@ class RocksDbEngine final : public Engine {
 
   Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
                 std::span<const std::string> deletes) override {
-    const std::lock_guard lock(write_mutex_);
+    const MutexLock lock(write_mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
     if (applied_sequence < root_.applied)
       return Status(Reason::INVALID_ARGUMENT, "a commit of journal sequence " + std::to_string(applied_sequence) +
@@ -184,17 +185,17 @@ class RocksDbEngine final : public Engine {
   }
 
   std::uint64_t applied_sequence() const override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return root_.applied;
   }
 
   std::shared_ptr<const EngineSnapshot> snapshot() const override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return snapshot_;
   }
 
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
-    const std::lock_guard lock(write_mutex_);
+    const MutexLock lock(write_mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
     if (Status room = database_->space->check(); !room.ok()) return room;
     Root next = root_;
@@ -264,7 +265,7 @@ class RocksDbEngine final : public Engine {
     if (status.reason() == Reason::DISK_FULL && database_->space->give_up_reserve()) status = write_if_room(batch);
     if (!status.ok()) return status;
     std::shared_ptr<const EngineSnapshot> snapshot = std::make_shared<RocksDbSnapshot>(database_, next.commits);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     root_ = next;
     snapshot_.swap(snapshot);
     return {};
@@ -303,9 +304,9 @@ class RocksDbEngine final : public Engine {
   const std::unique_ptr<JournalLog> journal_;
 
   // Locked in this order. Neither a slow sync of the journal nor one of the map holds up anything else.
-  std::mutex append_mutex_;
-  std::mutex write_mutex_;    // changes of the root
-  mutable std::mutex mutex_;  // root_, snapshot_: read under either of these, written under both
+  Mutex append_mutex_;
+  Mutex write_mutex_;    // changes of the root
+  mutable Mutex mutex_;  // root_, snapshot_: read under either of these, written under both
   Root root_;
   std::shared_ptr<const EngineSnapshot> snapshot_;
   Resumption resumption_;

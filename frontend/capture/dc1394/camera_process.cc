@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "frontend/capture/dc1394/packet_socket.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc::dc1394 {
 
@@ -99,7 +100,7 @@ Result<std::unique_ptr<CameraProcess>> CameraProcess::at(FileHandle socket, std:
 
 CameraProcess::~CameraProcess() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ending_ = true;
   }
   ::shutdown(socket_.get(), SHUT_RDWR);
@@ -107,8 +108,9 @@ CameraProcess::~CameraProcess() {
 }
 
 Status CameraProcess::greet() {
-  std::unique_lock lock(mutex_);
-  if (!news_.wait_for(lock, kPatience, [this] { return version_ || !gone_.ok(); })) return hung(lock, kPatience);
+  MutexLock lock(mutex_);
+  if (!news_.wait_for(mutex_, kPatience, [this]() RELMAP_REQUIRES(mutex_) { return version_ || !gone_.ok(); }))
+    return hung(kPatience);
   if (!version_) return gone_;
   if (*version_ != kProtocolVersion)
     return {Reason::UNSUPPORTED, "relmap-camera-1394 is of another release: it speaks version " +
@@ -120,30 +122,31 @@ Status CameraProcess::greet() {
 Result<Message> CameraProcess::ask(Request request, int file) {
   const bool of_register = request.ask == Ask::kRead || request.ask == Ask::kWrite;
   const milliseconds patience = of_register ? kRegisterPatience : kPatience;
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   if (!gone_.ok()) return gone_;
   request.number = ++last_number_;
   const auto awaited = answers_.emplace(request.number, std::nullopt).first;
   (void)send_packet(socket_.get(), bytes_of(request), file);  // no answer comes where it could not be sent
-  const bool came = news_.wait_for(lock, patience, [&] { return awaited->second || !gone_.ok(); });
+  const bool came =
+      news_.wait_for(mutex_, patience, [&]() RELMAP_REQUIRES(mutex_) { return awaited->second || !gone_.ok(); });
   const std::optional<Message> answer = awaited->second;
   answers_.erase(awaited);
-  if (!came) return hung(lock, patience);
+  if (!came) return hung(patience);
   if (!answer) return gone_;
   if (Status status = answer->status(); !status.ok()) return status;
   return *answer;
 }
 
-Status CameraProcess::hung(std::unique_lock<std::mutex>& lock, milliseconds patience) {
+Status CameraProcess::hung(milliseconds patience) {
   if (killed_for_.empty()) killed_for_ = "it did not answer within " + seconds(patience) + " and was killed";
   ::shutdown(socket_.get(), SHUT_RDWR);  // wakes the reader
-  news_.wait(lock, [this] { return !gone_.ok(); });
+  news_.wait(mutex_, [this]() RELMAP_REQUIRES(mutex_) { return !gone_.ok(); });
   return gone_;
 }
 
 void CameraProcess::run() {
   const Status rubbish = receive();
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   if (!rubbish.ok() && killed_for_.empty())
     killed_for_ = "it spoke nonsense, " + rubbish.message() + ", and was killed";
   const bool kill = !killed_for_.empty();
@@ -155,11 +158,12 @@ void CameraProcess::run() {
     how = reap();
   }
   lock.lock();
-  gone_ = gone(kill ? killed_for_ : how);
+  const Status end = gone(kill ? killed_for_ : how);
+  gone_ = end;
   const bool on_purpose = ending_;
   news_.notify_all();
   lock.unlock();
-  if (!on_purpose) events_.ended(gone_);
+  if (!on_purpose) events_.ended(end);
 }
 
 // Receives until the socket is closed at either end. Returns an error if an invalid message arrived.
@@ -178,7 +182,7 @@ Status CameraProcess::receive() {
 
 Status CameraProcess::take(const Message& message) {
   if (message.tell == Tell::kFrame || message.tell == Tell::kFault) return events_.told(message);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (message.tell == Tell::kHello) {
     version_ = message.values[0];
   } else {

@@ -5,11 +5,9 @@
 #include <sys/types.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -17,6 +15,7 @@
 
 #include "frontend/capture/dc1394/file_handle.h"
 #include "frontend/capture/dc1394/protocol.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
@@ -53,7 +52,7 @@ class CameraProcess {
  private:
   CameraProcess(FileHandle socket, std::optional<pid_t> process, ProcessEvents& events);
   Status greet();
-  Status hung(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds patience);
+  Status hung(std::chrono::milliseconds patience) RELMAP_REQUIRES(mutex_);
   void run();
   Status receive();
   Status take(const Message& message);
@@ -63,14 +62,14 @@ class CameraProcess {
   const std::optional<pid_t> process_;
   ProcessEvents& events_;
 
-  std::mutex mutex_;  // guards the members below
-  std::condition_variable news_;
-  std::optional<std::uint64_t> version_;                     // from its greeting
-  std::map<std::uint32_t, std::optional<Message>> answers_;  // of pending requests, by number
-  std::uint32_t last_number_ = 0;
-  std::string killed_for_;  // why it was killed; empty if it was not
-  Status gone_;
-  bool ending_ = false;
+  Mutex mutex_;
+  ConditionVariable news_;
+  std::optional<std::uint64_t> version_ RELMAP_GUARDED_BY(mutex_);                     // from its greeting
+  std::map<std::uint32_t, std::optional<Message>> answers_ RELMAP_GUARDED_BY(mutex_);  // of pending requests, by number
+  std::uint32_t last_number_ RELMAP_GUARDED_BY(mutex_) = 0;
+  std::string killed_for_ RELMAP_GUARDED_BY(mutex_);  // why it was killed; empty if it was not
+  Status gone_ RELMAP_GUARDED_BY(mutex_);
+  bool ending_ RELMAP_GUARDED_BY(mutex_) = false;
 
   std::thread reader_;
 };

@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "frontend/capture/dc1394/dc1394_link.h"
 #include "frontend/capture/dc1394/firewire_nodes.h"
 #include "frontend/capture/iidc/identity.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc {
 
@@ -133,7 +133,7 @@ class Dc1394Bus : public CameraBus {
   // The identity of a camera does not change, so it is read only once.
   void identify_once(CameraAddress& address) {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (const auto known = known_.find(address.guid); known != known_.end()) {
         address.serial = known->second.serial;
         address.vendor = known->second.vendor;
@@ -150,15 +150,15 @@ class Dc1394Bus : public CameraBus {
     }
     if (address.place.empty()) address.place = (*link)->place();
     if (!identify(**link, address)) return;
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     known_[guid] = address;
   }
 
   const std::string program_, nodes_;
   std::vector<std::string> arguments_;
   const std::shared_ptr<RestartPause> pause_ = std::make_shared<RestartPause>();
-  std::mutex mutex_;
-  std::map<std::uint64_t, CameraAddress> known_;  // by GUID
+  Mutex mutex_;
+  std::map<std::uint64_t, CameraAddress> known_ RELMAP_GUARDED_BY(mutex_);  // by GUID
 };
 
 }  // namespace

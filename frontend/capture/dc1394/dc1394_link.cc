@@ -4,6 +4,8 @@
 #include <tuple>
 #include <utility>
 
+#include "proto/base/mutex.h"
+
 namespace relmap::iidc::dc1394 {
 
 namespace {
@@ -61,7 +63,7 @@ Status Dc1394Link::start(const StreamRequest& request) {
   auto ring = FrameRing::make(slots, request.frame_bytes);
   if (!ring.ok()) return {Reason::BUDGET_EXCEEDED, ring.status().message()};
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (ring_) return {Reason::WRONG_STATE, "the camera's stream is received already"};
     ring_ = *ring;  // frames may come before the answer
     image_bytes_ = request.image_bytes;
@@ -78,21 +80,21 @@ Status Dc1394Link::start(const StreamRequest& request) {
 
 void Dc1394Link::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!ring_) return;
   }
   Request request;
   request.ask = Ask::kStop;
   (void)process_->ask(request);  // whose frames all came before its answer; where it has ended, none come
   std::deque<Arrival> dropped;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ring_.reset();
   arrivals_.swap(dropped);
   overrun_ = 0;
 }
 
 Status Dc1394Link::told(const Message& message) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   news_.notify_all();
   if (message.tell == Tell::kFrame) return queue_frame(message);
   if (message.reason == Reason::CAMERA_GONE)
@@ -128,15 +130,15 @@ void Dc1394Link::drop_oldest() {
 
 void Dc1394Link::ended(const Status& why) {
   pause_->crashed(why);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   gone_ = why;
   news_.notify_all();
 }
 
 Result<RawFrame> Dc1394Link::next(std::chrono::milliseconds wait) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   if (!ring_) return {Reason::WRONG_STATE, "the camera's stream is not received"};
-  news_.wait_for(lock, wait, [this] { return !arrivals_.empty() || !gone_.ok(); });
+  news_.wait_for(mutex_, wait, [this]() RELMAP_REQUIRES(mutex_) { return !arrivals_.empty() || !gone_.ok(); });
   if (arrivals_.empty() && gone_.ok())
     return {Reason::CAMERA_SILENT, "no frame within " + std::to_string(wait.count()) + " ms"};
   if (arrivals_.empty()) return gone_;

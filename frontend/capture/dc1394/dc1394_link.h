@@ -1,11 +1,9 @@
 // A camera on IEEE 1394, served by a process of its own.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,6 +13,7 @@
 #include "frontend/capture/dc1394/frame_ring.h"
 #include "frontend/capture/dc1394/restart_pause.h"
 #include "frontend/capture/iidc/camera_link.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc::dc1394 {
 
@@ -44,19 +43,19 @@ class Dc1394Link : public CameraLink, private ProcessEvents {
   Status told(const Message& message) override;
   void ended(const Status& why) override;
   Status open(Result<std::unique_ptr<CameraProcess>> process, std::uint64_t guid);
-  Status queue_frame(const Message& message);
-  void drop_oldest();
+  Status queue_frame(const Message& message) RELMAP_REQUIRES(mutex_);
+  void drop_oldest() RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<RestartPause> pause_;
   std::string place_;
 
-  std::mutex mutex_;  // guards the members below
-  std::condition_variable news_;
-  std::shared_ptr<FrameRing> ring_;  // of the current stream
-  std::size_t image_bytes_ = 0;
-  std::deque<Arrival> arrivals_;
-  std::uint64_t overrun_ = 0;  // since the last frame that was queued
-  Status gone_;
+  Mutex mutex_;
+  ConditionVariable news_;
+  std::shared_ptr<FrameRing> ring_ RELMAP_GUARDED_BY(mutex_);  // of the current stream
+  std::size_t image_bytes_ RELMAP_GUARDED_BY(mutex_) = 0;
+  std::deque<Arrival> arrivals_ RELMAP_GUARDED_BY(mutex_);
+  std::uint64_t overrun_ RELMAP_GUARDED_BY(mutex_) = 0;  // since the last frame that was queued
+  Status gone_ RELMAP_GUARDED_BY(mutex_);
 
   std::unique_ptr<CameraProcess> process_;  // last, so that it is destroyed first: it calls told() and ended()
 };

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <chrono>
-#include <mutex>
 
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
@@ -21,10 +21,10 @@ class RestartPause {
   Status allows_start(Clock::time_point now = Clock::now()) const;
 
  private:
-  mutable std::mutex mutex_;
-  std::chrono::milliseconds pause_{0};
-  Clock::time_point last_{};
-  Status how_;
+  mutable Mutex mutex_;
+  std::chrono::milliseconds pause_ RELMAP_GUARDED_BY(mutex_){0};
+  Clock::time_point last_ RELMAP_GUARDED_BY(mutex_){};
+  Status how_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::iidc::dc1394

@@ -4,9 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <new>
 #include <vector>
+
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc {
 
@@ -18,6 +19,7 @@ class FramePool : public std::enable_shared_from_this<FramePool> {
   // Null if there is not enough memory.
   static std::shared_ptr<FramePool> make(std::size_t buffers, std::size_t bytes) {
     auto pool = std::make_shared<FramePool>();
+    const MutexLock lock(pool->mutex_);
     for (std::size_t i = 0; i < buffers; ++i) {
       pool->free_.emplace_back(new (std::nothrow) std::uint8_t[bytes]);
       if (!pool->free_.back()) return nullptr;
@@ -27,14 +29,14 @@ class FramePool : public std::enable_shared_from_this<FramePool> {
 
   // Null if all buffers are in use.
   Buffer take() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (free_.empty()) return nullptr;
     Buffer buffer = std::move(free_.back());
     free_.pop_back();
     return buffer;
   }
   void give(Buffer buffer) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     free_.push_back(std::move(buffer));
   }
   // Lends a buffer; it returns to the pool with the last copy of the pointer.
@@ -43,8 +45,8 @@ class FramePool : public std::enable_shared_from_this<FramePool> {
   }
 
  private:
-  std::mutex mutex_;
-  std::vector<Buffer> free_;
+  Mutex mutex_;
+  std::vector<Buffer> free_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::iidc

@@ -9,6 +9,7 @@
 #include "frontend/capture/iidc/embedded_info.h"
 #include "frontend/capture/iidc/registers.h"
 #include "proto/base/clock.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc {
 
@@ -147,7 +148,7 @@ Status LiveCamera::begin() {
 
 Status LiveCamera::begin_anew() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counts_.begun_anew;
   }
   if (Status status = set_sending(*registers_, false); !status.ok()) return status;
@@ -173,13 +174,13 @@ std::optional<std::chrono::milliseconds> LiveCamera::help() {
 }
 
 Status LiveCamera::fault(Status status) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++counts_.faults[status.reason()];
   return status;
 }
 
 LiveCounts LiveCamera::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 
@@ -200,7 +201,7 @@ void LiveCamera::read_clock() {
   // A reading that took so long is useless.
   if (clock_read_ - before > kClockDoubt) return;
   clock_.observe(cycle, host_us(before), host_us(clock_read_));
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   counts_.drift_ppm = clock_.drift_ppm();
 }
 
@@ -232,7 +233,7 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
         gap = {Reason::FRAME_DAMAGED,
                "its stamps are not what this driver takes them for: times are those of arrival from now on"};
       }
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       ++counts_.lost;
       return std::nullopt;
     }
@@ -250,7 +251,7 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   if (frame.time_us <= last_time_us_ && last_time_us_ - frame.time_us < kStep) frame.time_us = last_time_us_ + 1;
   last_time_us_ = frame.time_us;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counts_.frames;
     counts_.lost += missing;
   }
@@ -278,7 +279,7 @@ std::optional<Status> LiveCamera::come_back() {
       link_ = std::move(*link);
       status = set_up();
       if (status.ok()) {
-        const std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         ++counts_.reopened;
         obstacle_ = Reason::OK;
         return std::nullopt;
@@ -330,7 +331,7 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
       ++told_;
       if (!embeds_) {  // otherwise its counter shows the gap
         ++index_;
-        const std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         ++counts_.lost;
       }
     }

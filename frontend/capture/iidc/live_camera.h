@@ -7,7 +7,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "frontend/capture/iidc/features.h"
 #include "frontend/capture/iidc/identity.h"
 #include "frontend/capture/iidc/video_mode.h"
+#include "proto/base/mutex.h"
 #include "proto/base/status.h"
 
 namespace relmap::iidc {
@@ -117,8 +117,8 @@ class LiveCamera {
   Reason obstacle_ = Reason::OK;   // what prevents opening the camera now
   bool obstacle_told_ = false;
 
-  mutable std::mutex mutex_;  // guards counts_
-  LiveCounts counts_;
+  mutable Mutex mutex_;
+  LiveCounts counts_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::iidc

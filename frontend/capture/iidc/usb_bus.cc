@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <condition_variable>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +14,7 @@
 #include "frontend/capture/iidc/registers.h"
 #include "frontend/capture/iidc/usb_ids.h"
 #include "frontend/capture/iidc/usb_stream.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc {
 
@@ -62,8 +61,9 @@ class Context {
   libusb_context* usb() const { return usb_; }
 
   bool wait_for_change(std::chrono::milliseconds wait) {
-    std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, wait, [this] { return changes_ != seen_; }) && (seen_ = changes_, true);
+    MutexLock lock(mutex_);
+    return changed_.wait_for(mutex_, wait, [this]() RELMAP_REQUIRES(mutex_) { return changes_ != seen_; }) &&
+           (seen_ = changes_, true);
   }
 
  private:
@@ -84,7 +84,7 @@ class Context {
 
   static int LIBUSB_CALL changed(libusb_context*, libusb_device*, libusb_hotplug_event, void* self) {
     auto& context = *static_cast<Context*>(self);
-    const std::lock_guard lock(context.mutex_);
+    const MutexLock lock(context.mutex_);
     ++context.changes_;
     context.changed_.notify_all();
     return 0;
@@ -94,9 +94,9 @@ class Context {
   bool watches_ = false;
   libusb_hotplug_callback_handle watch_{};
   std::atomic<bool> ending_ = false;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::uint64_t changes_ = 0, seen_ = 0;
+  Mutex mutex_;
+  ConditionVariable changed_;
+  std::uint64_t changes_ RELMAP_GUARDED_BY(mutex_) = 0, seen_ RELMAP_GUARDED_BY(mutex_) = 0;
   std::thread events_;
 };
 

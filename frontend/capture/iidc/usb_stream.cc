@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc {
 
@@ -51,7 +52,7 @@ Result<std::unique_ptr<UsbStream>> UsbStream::start(libusb_device_handle* handle
   }
   Status status;
   {
-    const std::lock_guard lock(stream->mutex_);
+    const MutexLock lock(stream->mutex_);
     for (auto& transfer : stream->transfers_)
       if (status = stream->submit(*transfer); !status.ok()) break;
   }
@@ -60,16 +61,16 @@ Result<std::unique_ptr<UsbStream>> UsbStream::start(libusb_device_handle* handle
   return status;
 }
 
-bool UsbStream::all_home(std::unique_lock<std::mutex>& lock) {
+bool UsbStream::all_home() {
   for (auto& transfer : transfers_)
     if (transfer->flying) libusb_cancel_transfer(transfer->usb);
-  return news_.wait_for(lock, kHome, [this] { return flying_ == 0; });
+  return news_.wait_for(mutex_, kHome, [this]() RELMAP_REQUIRES(mutex_) { return flying_ == 0; });
 }
 
 bool UsbStream::stop() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   stopping_ = true;
-  return all_home(lock);
+  return all_home();
 }
 
 UsbStream::~UsbStream() {
@@ -97,7 +98,7 @@ void UsbStream::lose(Reason reason, std::string message) {
 void UsbStream::take(Transfer& transfer) {
   const std::int64_t arrival_us = now_us();
   const auto arrived = std::chrono::steady_clock::now();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   transfer.flying = false;
   --flying_;
   const auto length = static_cast<std::size_t>(transfer.usb->actual_length);
@@ -162,12 +163,13 @@ void UsbStream::take(Transfer& transfer) {
 }
 
 // Completes all transfers, clears the halt, and submits them again.
-Status UsbStream::recover(std::unique_lock<std::mutex>& lock) {
-  if (!all_home(lock)) gone_ = true;
+Status UsbStream::recover() {
+  if (!all_home()) gone_ = true;
   if (gone_) return {};
-  lock.unlock();
+  mutex_.unlock();
   const int cleared = libusb_clear_halt(handle_, endpoint_);
-  lock.lock();
+  mutex_.lock();
+
   if (cleared == LIBUSB_ERROR_NO_DEVICE) {
     gone_ = true;
     return {};
@@ -187,11 +189,11 @@ Status UsbStream::recover(std::unique_lock<std::mutex>& lock) {
 
 Result<RawFrame> UsbStream::next(std::chrono::milliseconds wait) {
   const auto until = std::chrono::steady_clock::now() + wait;
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   for (;;) {
     if (halted_ && !gone_)
-      if (Status status = recover(lock); !status.ok()) {
-        news_.wait_until(lock, until, [this] { return gone_; });  // not again at once
+      if (Status status = recover(); !status.ok()) {
+        news_.wait_until(mutex_, until, [this]() RELMAP_REQUIRES(mutex_) { return gone_; });  // not again at once
         return status;
       }
     if (!arrivals_.empty()) {
@@ -202,7 +204,8 @@ Result<RawFrame> UsbStream::next(std::chrono::milliseconds wait) {
                       arrival.overrun};
     }
     if (gone_) return {Reason::CAMERA_GONE, "the camera was unplugged"};
-    if (!news_.wait_until(lock, until, [this] { return !arrivals_.empty() || halted_ || gone_; }))
+    if (!news_.wait_until(mutex_, until,
+                          [this]() RELMAP_REQUIRES(mutex_) { return !arrivals_.empty() || halted_ || gone_; }))
       return {Reason::CAMERA_SILENT, "no frame within " + std::to_string(wait.count()) + " ms"};
   }
 }

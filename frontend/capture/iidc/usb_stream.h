@@ -4,15 +4,14 @@
 #include <libusb.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "frontend/capture/iidc/camera_link.h"
 #include "frontend/capture/iidc/frame_pool.h"
+#include "proto/base/mutex.h"
 
 namespace relmap::iidc {
 
@@ -49,10 +48,10 @@ class UsbStream {
       : handle_(handle), endpoint_(endpoint), frame_bytes_(frame_bytes), image_bytes_(image_bytes) {}
   static void LIBUSB_CALL done(libusb_transfer* usb);
   void take(Transfer& transfer);
-  void lose(Reason reason, std::string message);
-  Status submit(Transfer& transfer);  // locked
-  bool all_home(std::unique_lock<std::mutex>& lock);
-  Status recover(std::unique_lock<std::mutex>& lock);
+  void lose(Reason reason, std::string message) RELMAP_REQUIRES(mutex_);
+  Status submit(Transfer& transfer) RELMAP_REQUIRES(mutex_);
+  bool all_home() RELMAP_REQUIRES(mutex_);
+  Status recover() RELMAP_REQUIRES(mutex_);
 
   libusb_device_handle* const handle_;
   const std::uint8_t endpoint_;
@@ -60,16 +59,16 @@ class UsbStream {
   std::shared_ptr<FramePool> pool_;
   std::vector<std::unique_ptr<Transfer>> transfers_;
 
-  std::mutex mutex_;  // guards the members below
-  std::condition_variable news_;
-  std::deque<Arrival> arrivals_;
-  std::size_t flying_ = 0;
-  std::uint64_t overrun_ = 0;  // since the last frame that was queued
-  int failures_ = 0;           // consecutive
-  bool babbled_ = false;       // the next short transfer is the end of a frame that was too long
-  bool stopping_ = false;
-  bool halted_ = false;  // no transfer is submitted until recover()
-  bool gone_ = false;
+  Mutex mutex_;
+  ConditionVariable news_;
+  std::deque<Arrival> arrivals_ RELMAP_GUARDED_BY(mutex_);
+  std::size_t flying_ RELMAP_GUARDED_BY(mutex_) = 0;
+  std::uint64_t overrun_ RELMAP_GUARDED_BY(mutex_) = 0;  // since the last frame that was queued
+  int failures_ RELMAP_GUARDED_BY(mutex_) = 0;           // consecutive
+  bool babbled_ RELMAP_GUARDED_BY(mutex_) = false;  // the next short transfer is the end of a frame that was too long
+  bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
+  bool halted_ RELMAP_GUARDED_BY(mutex_) = false;  // no transfer is submitted until recover()
+  bool gone_ RELMAP_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace relmap::iidc

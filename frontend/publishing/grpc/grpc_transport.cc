@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -15,6 +13,7 @@
 #include "client/server_address.h"
 #include "frontend/publishing/grpc/stream_messages.h"
 #include "proto/base/hex.h"
+#include "proto/base/mutex.h"
 #include "relmap/v1/ingest.grpc.pb.h"
 
 namespace relmap::publishing {
@@ -73,17 +72,17 @@ struct GrpcTransport::Impl {
     void OnReadDone(bool ok) override {
       if (ok) transport.hear(*this);
       if (ok) return StartRead(&reply);
-      const std::lock_guard lock(transport.mutex);
+      const MutexLock lock(transport.mutex);
       broken = true;
       transport.changed.notify_all();
     }
     void OnWriteDone(bool ok) override {
-      const std::lock_guard lock(transport.mutex);
+      const MutexLock lock(transport.mutex);
       writing = !ok;  // after a failure reading ends, too
       transport.changed.notify_all();
     }
     void OnDone(const grpc::Status& status) override {
-      const std::lock_guard lock(transport.mutex);
+      const MutexLock lock(transport.mutex);
       outcome = status;
       transport.changed.notify_all();
     }
@@ -106,34 +105,36 @@ struct GrpcTransport::Impl {
 
   void run() {
     milliseconds pause = kFirstPause;
-    std::unique_lock lock(mutex);
+    MutexLock lock(mutex);
     while (!stopping) {
       bool acknowledged = false;
-      Status why = talk(lock, acknowledged);
+      Status why = talk(acknowledged);
       if (stopping) break;
       trouble = std::move(why);
       if (acknowledged) pause = kFirstPause;
-      changed.wait_for(lock, pause, [&] { return stopping; });
+      changed.wait_for(mutex, pause, [&]() RELMAP_REQUIRES(mutex) { return stopping; });
       pause = std::min(2 * pause, kMaxPause);
     }
   }
 
   // Runs one stream until it ends, and returns why it did.
-  Status talk(std::unique_lock<std::mutex>& lock, bool& acknowledged) {
-    lock.unlock();
+  Status talk(bool& acknowledged) RELMAP_REQUIRES(mutex) {
+    mutex.unlock();
     const auto where = client::resolve_server(server);
     if (!where.ok()) {
-      lock.lock();
+      mutex.lock();
       return where.status();
     }
+
     Stream stream(*this, *where);
     stream.unanswered_since = Clock::now();
     stream.start();
     stream.write(hello_request(robot));
-    lock.lock();
+    mutex.lock();
+
     while (!stopping && !stream.broken && stream.fault.ok()) {
       if (stream.boot && !stream.writing && !waiting.empty()) {
-        write_next(lock, stream);
+        write_next(stream);
         continue;
       }
       const auto now = Clock::now();
@@ -141,17 +142,19 @@ struct GrpcTransport::Impl {
       if (now >= deadline)
         stream.fault = {Reason::UNREACHABLE, "the daemon does not answer"};
       else
-        changed.wait_until(lock, deadline);
+        changed.wait_until(mutex, deadline);
     }
     const bool broken = stream.broken;
-    lock.unlock();
+    mutex.unlock();
     if (!broken) stream.context.TryCancel();
     stream.RemoveHold();
-    lock.lock();
-    changed.wait(lock, [&] { return stream.outcome.has_value(); });
-    lock.unlock();
+    mutex.lock();
+
+    changed.wait(mutex, [&]() RELMAP_REQUIRES(mutex) { return stream.outcome.has_value(); });
+    mutex.unlock();
     say_broken();
-    lock.lock();
+    mutex.lock();
+
     // The next daemon may serve another map. PublisherCore sends again what waits here once that daemon has said which.
     waiting.clear();
     waiting_bytes = 0;
@@ -161,27 +164,26 @@ struct GrpcTransport::Impl {
     return {why.reason(), where->address + ": " + why.message()};
   }
 
-  void write_next(std::unique_lock<std::mutex>& lock, Stream& stream) {
+  void write_next(Stream& stream) RELMAP_REQUIRES(mutex) {
     v1::IngestRequest next = std::move(waiting.front());
     waiting.pop_front();
     waiting_bytes -= next.ByteSizeLong();
     stream.writing = true;
     if (!stream.unanswered_since) stream.unanswered_since = Clock::now();
-    lock.unlock();
+    const MutexUnlock unlocked(mutex);
     stream.write(std::move(next));
-    lock.lock();
   }
 
   // Called by a thread of gRPC.
   void hear(Stream& stream) {
     const v1::IngestReply& reply = stream.reply;
     {
-      std::unique_lock lock(mutex);
+      MutexLock lock(mutex);
       stream.unanswered_since = stream.writing ? std::optional(Clock::now()) : std::nullopt;
-      if (!stream.boot) return welcome(lock, stream);
+      if (!stream.boot) return welcome(stream);
       if (reply.has_acknowledgement()) stream.acknowledged = true;
     }
-    const std::lock_guard lock(listener_mutex);
+    const MutexLock lock(listener_mutex);
     if (reply.has_acknowledgement()) {
       const auto ack = read_acknowledgement(reply.acknowledgement());
       if (ack.ok() && listener.acknowledged) listener.acknowledged(*ack);
@@ -192,12 +194,12 @@ struct GrpcTransport::Impl {
   }
 
   void say_broken() {
-    const std::lock_guard lock(listener_mutex);
+    const MutexLock lock(listener_mutex);
     introduced.reset();
     if (listener.broken) listener.broken();
   }
 
-  void welcome(std::unique_lock<std::mutex>& lock, Stream& stream) {
+  void welcome(Stream& stream) RELMAP_REQUIRES(mutex) {
     const auto daemon = stream.reply.has_welcome()
                             ? read_welcome(stream.reply.welcome())
                             : Result<DaemonIdentity>(Reason::CORRUPT, "the daemon does not say welcome");
@@ -206,9 +208,11 @@ struct GrpcTransport::Impl {
     } else if (!stream.where.boot_id.empty() && hex(daemon->boot) != stream.where.boot_id) {
       stream.fault = {Reason::UNREACHABLE, "the daemon that served " + server + " is gone, another answers"};
     } else {
-      lock.unlock();
-      introduce(*daemon);  // before anything is written
-      lock.lock();
+      {
+        const MutexUnlock unlocked(mutex);
+        introduce(*daemon);  // before anything is written
+      }
+
       stream.boot = daemon->boot;
       trouble = {};
     }
@@ -216,13 +220,13 @@ struct GrpcTransport::Impl {
   }
 
   void introduce(const DaemonIdentity& daemon) {
-    const std::lock_guard lock(listener_mutex);
+    const MutexLock lock(listener_mutex);
     introduced = daemon;
     if (listener.introduced) listener.introduced(daemon);
   }
 
   void send(v1::IngestRequest request) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     const std::size_t bytes = request.ByteSizeLong();
     const auto is_same = [&](const v1::IngestRequest& other) { return same(request, other); };
     if (waiting_bytes + bytes > options.waiting_bytes || std::any_of(waiting.begin(), waiting.end(), is_same)) return;
@@ -234,16 +238,17 @@ struct GrpcTransport::Impl {
   const std::string server, robot;
   const GrpcTransportOptions options;
 
-  std::mutex listener_mutex;
-  Listener listener;
-  std::optional<DaemonIdentity> introduced;  // of the open stream; repeated to a listener that registers later
+  Mutex listener_mutex;
+  Listener listener RELMAP_GUARDED_BY(listener_mutex);
+  std::optional<DaemonIdentity> introduced
+      RELMAP_GUARDED_BY(listener_mutex);  // of the open stream; repeated to a listener that registers later
 
-  mutable std::mutex mutex;
-  std::condition_variable changed;
-  std::deque<v1::IngestRequest> waiting;
-  std::size_t waiting_bytes = 0;
-  Status trouble;
-  bool stopping = false;
+  mutable Mutex mutex;
+  ConditionVariable changed;
+  std::deque<v1::IngestRequest> waiting RELMAP_GUARDED_BY(mutex);
+  std::size_t waiting_bytes RELMAP_GUARDED_BY(mutex) = 0;
+  Status trouble RELMAP_GUARDED_BY(mutex);
+  bool stopping RELMAP_GUARDED_BY(mutex) = false;
   std::thread thread;
 };
 
@@ -265,7 +270,7 @@ PublishTransport::PartBytes GrpcTransport::part_bytes() const {
 }
 
 Status GrpcTransport::trouble() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->trouble;
 }
 
@@ -279,14 +284,14 @@ void GrpcTransport::send(const Gap& gap) { impl_->send(gap_request(gap)); }
 void GrpcTransport::send(const SessionEnd& end) { impl_->send(end_request(end)); }
 
 void GrpcTransport::listen(Listener listener) {
-  const std::lock_guard lock(impl_->listener_mutex);
+  const MutexLock lock(impl_->listener_mutex);
   impl_->listener = std::move(listener);
   if (impl_->introduced && impl_->listener.introduced) impl_->listener.introduced(*impl_->introduced);
 }
 
 void GrpcTransport::stop() {
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     impl_->stopping = true;
     impl_->changed.notify_all();
   }

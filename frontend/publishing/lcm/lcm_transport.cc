@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "proto/base/mutex.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 
@@ -13,7 +14,7 @@ LcmLink::Handler LcmTransport::handler(Result<Message> (*decode)(ByteSpan),
   return [this, decode, heard](ByteSpan bytes) {
     const Result<Message> message = decode(bytes);
     if (!message.ok()) return;
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (listener_.*heard) (listener_.*heard)(*message);
   };
 }
@@ -40,7 +41,7 @@ void LcmTransport::send(const Gap& gap) { link_->publish(kGapChannel, encode_lcm
 void LcmTransport::send(const SessionEnd& end) { link_->publish(kEndChannel, encode_lcm(end)); }
 
 void LcmTransport::listen(Listener listener) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   listener_ = std::move(listener);
 }
 

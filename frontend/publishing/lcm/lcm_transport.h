@@ -3,10 +3,10 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "frontend/publishing/publish_transport.h"
+#include "proto/base/mutex.h"
 #include "proto/wire/lcm_link.h"
 
 namespace relmap::publishing {
@@ -33,8 +33,8 @@ class LcmTransport final : public PublishTransport {
   LcmLink::Handler handler(Result<Message> (*decode)(ByteSpan), std::function<void(const Message&)> Listener::*heard);
 
   const bool local_;  // datagrams stay on this machine
-  std::mutex mutex_;
-  Listener listener_;
+  Mutex mutex_;
+  Listener listener_ RELMAP_GUARDED_BY(mutex_);
   std::unique_ptr<LcmLink> link_;
 };
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <list>
-#include <mutex>
 #include <span>
 #include <type_traits>
 #include <unordered_map>
 #include <utility>
 
 #include "proto/base/crc32c.h"
+#include "proto/base/mutex.h"
 #include "server/route/overlay/extents.h"
 #include "storage/io/file.h"
 #include "storage/io/random_file.h"
@@ -115,7 +115,7 @@ struct CellStore::Impl {
   template <typename T>
   void keep(std::uint64_t offset, T value, std::size_t bytes);
   bool is_kept(std::uint64_t offset) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     return places.contains(offset);
   }
   CellFrames load_frames(std::uint64_t offset, std::uint32_t nodes, std::uint32_t links);
@@ -124,7 +124,7 @@ struct CellStore::Impl {
   void read_sealed(std::uint64_t offset, std::span<std::uint8_t> bytes);
   void charge(std::size_t bytes);
   std::size_t evict(std::size_t bytes);
-  void drop(std::uint64_t offset);
+  void drop(std::uint64_t offset) RELMAP_REQUIRES(mutex);
   Status look_for_room(std::uint64_t bytes) const;
 
   const std::unique_ptr<storage::RandomFile> file;
@@ -133,11 +133,11 @@ struct CellStore::Impl {
   const std::uint64_t room_for_others;
   std::atomic<bool> damaged = false;
 
-  std::mutex mutex;
-  std::list<Kept> kept;  // most recently used first
-  std::unordered_map<std::uint64_t, std::list<Kept>::iterator> places;
-  Extents extents;
-  std::uint64_t file_end = 0;
+  Mutex mutex;
+  std::list<Kept> kept RELMAP_GUARDED_BY(mutex);  // most recently used first
+  std::unordered_map<std::uint64_t, std::list<Kept>::iterator> places RELMAP_GUARDED_BY(mutex);
+  Extents extents RELMAP_GUARDED_BY(mutex);
+  std::uint64_t file_end RELMAP_GUARDED_BY(mutex) = 0;
 };
 
 template <typename Load>
@@ -145,7 +145,7 @@ auto CellStore::Impl::part(std::uint64_t offset, std::size_t bytes, const Load& 
     -> std::shared_ptr<const std::invoke_result_t<Load>> {
   using T = std::invoke_result_t<Load>;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     if (const auto at = places.find(offset); at != places.end()) {
       kept.splice(kept.begin(), kept, at->second);
       return std::static_pointer_cast<const T>(at->second->part);
@@ -160,7 +160,7 @@ auto CellStore::Impl::part(std::uint64_t offset, std::size_t bytes, const Load& 
     budget->release(storage::Share::kRoutes, bytes);
     throw;
   }
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   if (places.contains(offset)) return made;
   kept.push_front({offset, made, bytes});
   places.emplace(offset, kept.begin());
@@ -172,7 +172,7 @@ template <typename T>
 void CellStore::Impl::keep(std::uint64_t offset, T value, std::size_t bytes) {
   if (!budget->try_charge(storage::Share::kRoutes, bytes)) return;
   const auto held = std::make_shared<const Held<T>>(std::move(value), budget, bytes);
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   kept.push_front({offset, std::shared_ptr<const T>(held, &held->value), bytes});
   places.emplace(offset, kept.begin());
 }
@@ -218,7 +218,7 @@ void CellStore::Impl::charge(std::size_t bytes) {
 std::size_t CellStore::Impl::evict(std::size_t bytes) {
   std::vector<std::shared_ptr<const void>> gone;  // freed after the lock is released
   std::size_t freed = 0;
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   for (auto at = kept.end(); freed < bytes && at != kept.begin();) {
     --at;
     if (at->part.use_count() > 1) continue;  // its memory would not be freed
@@ -276,6 +276,7 @@ Result<std::shared_ptr<CellStore>> CellStore::open_file(const std::string& folde
   if (!size.ok()) return size.status();
   std::shared_ptr<CellStore> store(
       new CellStore(std::make_unique<Impl>(std::move(file).value(), folder, std::move(budget), room_for_others)));
+  const MutexLock lock(store->impl_->mutex);
   store->impl_->file_end = *size;
   return store;
 }
@@ -304,7 +305,7 @@ std::shared_ptr<const StoredCell> CellStore::write(const CellFacts& facts, const
   const std::uint64_t bytes = stored->matrix_offset(metrics, false);
   std::uint64_t grown = 0;
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     stored->offset_ = impl_->extents.take(bytes);
     stored->bytes_ = bytes;
     if (const std::uint64_t end = impl_->extents.end(); end > impl_->file_end) grown = end - impl_->file_end;
@@ -345,7 +346,7 @@ std::shared_ptr<const StoredCell> CellStore::write(const CellFacts& facts, const
   if (same) return known;
   if (known && impl_->is_kept(known->offset_)) impl_->keep(stored->offset_, frames, stored->frames_memory());
   for (auto& [offset, matrix] : wanted) impl_->keep(offset, std::move(matrix), stored->matrix_memory());
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   impl_->file_end = std::max(impl_->file_end, stored->offset_ + stored->bytes_);
   return stored;
 }
@@ -372,7 +373,7 @@ std::shared_ptr<const StoredCell> CellStore::get(ByteReader& r) {
   cell->facts_.joined = r.get<std::uint8_t>() != 0;
   cell->facts_.min_support = r.get<std::uint32_t>();
   cell->facts_.longest_loop_m = r.get<double>();
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   if (!r.ok() || bytes == 0 || bytes > impl_->file_end || offset > impl_->file_end - bytes ||
       cell->nodes_ > (1u << 20) || cell->metrics_ > 1000 || bytes != cell->matrix_offset(cell->metrics_, false) ||
       !impl_->extents.is_free(offset, bytes))
@@ -388,7 +389,7 @@ Status CellStore::sync() { return impl_->file->sync(); }
 std::size_t CellStore::evict(std::size_t bytes) { return impl_->evict(bytes); }
 
 void CellStore::trim() {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   if (impl_->extents.end() >= impl_->file_end || !impl_->file->truncate(impl_->extents.end()).ok()) return;
   impl_->file_end = impl_->extents.end();
 }
@@ -396,14 +397,14 @@ void CellStore::trim() {
 bool CellStore::is_damaged() const { return impl_->damaged; }
 
 std::uint64_t CellStore::bytes_in_use() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->extents.in_use();
 }
 
 StoredCell::~StoredCell() {
   if (bytes_ == 0) return;
   CellStore::Impl& store = *store_->impl_;
-  const std::lock_guard lock(store.mutex);
+  const MutexLock lock(store.mutex);
   std::uint64_t offset = offset_;
   store.drop(offset);
   offset += frames_bytes();

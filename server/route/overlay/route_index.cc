@@ -3,12 +3,11 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 #include <unordered_map>
 #include <utility>
 
+#include "proto/base/mutex.h"
 #include "server/route/overlay/overlay_table.h"
 
 namespace relmap::route {
@@ -42,8 +41,16 @@ struct RouteIndex::Impl {
   void yield();
   void charge(std::size_t bytes);
   void check(std::size_t bytes) const;
+  std::shared_ptr<CellStore> current_store() const {
+    const MutexLock lock(mutex);
+    return store;
+  }
+  bool shows_cells() const {
+    const MutexLock lock(mutex);
+    return shown != nullptr;
+  }
   void note_late(const std::string& why) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     late_because = why;
   }
 
@@ -56,16 +63,17 @@ struct RouteIndex::Impl {
   std::size_t charged = 0;  // bytes charged for what is outside the store
   Clock::time_point damaged_at{};
 
-  mutable std::mutex mutex;
-  mutable std::condition_variable wake;
-  std::shared_ptr<CellStore> store;                           // null until it has been opened
-  std::unordered_map<storage::ChunkId, std::uint64_t> stale;  // the version of the last change of each stale chunk
-  std::shared_ptr<const Overlay> shown;                       // null while there are no cells
-  std::string missing_because = "the cells of this map are still being made";
-  std::string late_because;
-  bool given_up = false;  // until the next retry
-  bool must_yield = false;
-  bool stopping = false;
+  mutable Mutex mutex;
+  mutable ConditionVariable wake;
+  std::shared_ptr<CellStore> store RELMAP_GUARDED_BY(mutex);  // null until it has been opened
+  std::unordered_map<storage::ChunkId, std::uint64_t> stale
+      RELMAP_GUARDED_BY(mutex);                                   // the version of the last change of each stale chunk
+  std::shared_ptr<const Overlay> shown RELMAP_GUARDED_BY(mutex);  // null while there are no cells
+  std::string missing_because RELMAP_GUARDED_BY(mutex) = "the cells of this map are still being made";
+  std::string late_because RELMAP_GUARDED_BY(mutex);
+  bool given_up RELMAP_GUARDED_BY(mutex) = false;  // until the next retry
+  bool must_yield RELMAP_GUARDED_BY(mutex) = false;
+  bool stopping RELMAP_GUARDED_BY(mutex) = false;
   std::thread thread;
 };
 
@@ -73,7 +81,7 @@ void RouteIndex::Impl::run() {
   ::setpriority(PRIO_PROCESS, 0, 10);  // lowers the priority of this thread: robots and callers come first
   Clock::duration retry = options.retry;
   load();
-  std::unique_lock lock(mutex);
+  MutexLock lock(mutex);
   while (!stopping) {
     lock.unlock();
     const auto start = Clock::now();
@@ -93,25 +101,27 @@ void RouteIndex::Impl::run() {
       const auto share = (Clock::now() - start) * (1 / options.work_share - 1);
       pause = std::min<Clock::duration>(std::chrono::duration_cast<Clock::duration>(share), kMaxRest);
       if (std::exchange(hindered, false)) pause = kMaxRest;
-    } else if (store && store->is_damaged() && start - damaged_at > options.retry) {
+    } else if (const auto cells = current_store(); cells && cells->is_damaged() && start - damaged_at > options.retry) {
       damaged_at = start;
       drop(trouble.message(), false);  // they are made anew at once, in another file
       pause = {};
     } else {
       // If only the disk is full, the cells that exist are still used, and stale chunks are searched frame by frame.
-      if (shown && trouble.reason() == Reason::DISK_FULL)
+      if (shows_cells() && trouble.reason() == Reason::DISK_FULL)
         note_late(trouble.message());
       else
         drop(trouble.message(), true);  // the overlay may be half changed
-      if (store) store->trim();
+      if (cells) cells->trim();
       pause = retry;
       retry = std::min<Clock::duration>(2 * retry, kLastRetry);
     }
     lock.lock();
     wake.notify_all();
-    wake.wait_for(lock, pause, [&] { return stopping || (must_yield && !given_up); });
-    const auto called = [this] { return stopping || must_yield || !stale.empty() || store->is_damaged(); };
-    while (!more && !wake.wait_for(lock, kMaxRest, called)) {
+    wake.wait_for(mutex, pause, [&]() RELMAP_REQUIRES(mutex) { return stopping || (must_yield && !given_up); });
+    const auto called = [this]() RELMAP_REQUIRES(mutex) {
+      return stopping || must_yield || !stale.empty() || store->is_damaged();
+    };
+    while (!more && !wake.wait_for(mutex, kMaxRest, called)) {
     }
   }
 }
@@ -125,7 +135,7 @@ void RouteIndex::Impl::load() {
     if (!table) return;
     working = std::move(table->overlay);
     {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       store = working.store();
       for (const storage::ChunkId chunk : table->stale) stale.try_emplace(chunk, 0);
     }
@@ -136,27 +146,28 @@ void RouteIndex::Impl::load() {
 }
 
 void RouteIndex::Impl::open_store() {
-  if (store && !store->is_damaged()) return;
+  if (const auto cells = current_store(); cells && !cells->is_damaged()) return;
   auto opened = options.folder.empty() ? CellStore::open_temporary(budget)
                                        : CellStore::open(options.folder, budget, options.room_for_others);
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   store = std::move(opened).or_throw();
 }
 
 // Does some of the work that there is to do. Returns whether there is more.
 bool RouteIndex::Impl::work() {
-  if (shown && store->is_damaged())
+  const bool shows = shows_cells();
+  if (shows && current_store()->is_damaged())
     throw StatusError(Status(Reason::DATA_LOSS, "the file of cells is damaged; they are made again from the map"));
   std::vector<storage::ChunkId> chunks;
   std::shared_ptr<const storage::MapView> view;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     given_up = false;
-    if (!shown) must_yield = false;
+    if (!shows) must_yield = false;
     view = current_view();
     for (const auto& [chunk, version] : stale) chunks.push_back(chunk);
   }
-  if (!shown || is_mostly_new(chunks)) {
+  if (!shows || is_mostly_new(chunks)) {
     build(*view);
   } else {
     if (chunks.size() > options.chunks_at_once) chunks.resize(options.chunks_at_once);
@@ -169,7 +180,7 @@ bool RouteIndex::Impl::work() {
     }
     show(0, {});
   }
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   return working.outdated() > 0 || !stale.empty();
 }
 
@@ -177,7 +188,7 @@ bool RouteIndex::Impl::work() {
 void RouteIndex::Impl::build(const storage::MapView& view) {
   drop("the cells of this map are still being made", false);
   open_store();
-  working = Overlay(options.metrics, store);
+  working = Overlay(options.metrics, current_store());
   working.build(view, [this](std::size_t bytes) {
     charge(bytes);
     check(bytes);
@@ -194,7 +205,7 @@ std::vector<storage::ChunkId> RouteIndex::Impl::refresh(const storage::MapView& 
     try {
       next.refresh(view, some);
     } catch (const StatusError& error) {
-      if (error.status().reason() == Reason::DISK_FULL || store->is_damaged()) throw;
+      if (error.status().reason() == Reason::DISK_FULL || current_store()->is_damaged()) throw;
       hindered = true;
       return false;
     }
@@ -227,7 +238,7 @@ void RouteIndex::Impl::show(std::uint64_t version, const std::vector<storage::Ch
   check(bytes);
   make_room();
   auto copy = std::make_shared<const Overlay>(working);
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   std::swap(shown, copy);
   missing_because.clear();
   for (const storage::ChunkId chunk : known)
@@ -237,7 +248,7 @@ void RouteIndex::Impl::show(std::uint64_t version, const std::vector<storage::Ch
 void RouteIndex::Impl::drop(const std::string& why, bool for_a_while) {
   std::shared_ptr<const Overlay> gone;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     std::swap(shown, gone);
     missing_because = why;
     given_up = for_a_while;
@@ -265,7 +276,7 @@ void RouteIndex::Impl::make_room() {
   if (over == 0) return;
   std::shared_ptr<CellStore> cells;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     cells = store;
   }
   if (cells) cells->evict(over);
@@ -276,7 +287,7 @@ void RouteIndex::Impl::make_room() {
 void RouteIndex::Impl::yield() {
   make_room();
   if (budget->used_beside_cache() <= budget->limit()) return;
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   must_yield = true;
   wake.notify_all();
 }
@@ -287,7 +298,7 @@ void RouteIndex::Impl::check(std::size_t bytes) const {
     throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the cells of this map take more than the " +
                                                           std::to_string(allowance >> 20) +
                                                           " MB that memory_budget_mb leaves for them"));
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   if (must_yield)
     throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the memory of the cells was needed for something else"));
   if (stopping) throw StatusError(Status(Reason::SHUTTING_DOWN, "the daemon stops"));
@@ -302,7 +313,7 @@ void RouteIndex::start() {
 
 void RouteIndex::stop() {
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     impl_->stopping = true;
     impl_->wake.notify_all();
   }
@@ -321,14 +332,14 @@ RouteIndex::~RouteIndex() {
 }
 
 void RouteIndex::changed(std::uint64_t version, std::span<const storage::ChunkId> chunks) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   const bool idle = impl_->stale.empty();
   for (const storage::ChunkId chunk : chunks) impl_->stale[chunk] = version;
   if (idle) impl_->wake.notify_all();
 }
 
 RouteIndex::Snapshot RouteIndex::snapshot() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   // changed() is called before a view is published, so every chunk in which this view differs from the cells is in
   // `stale`.
   Snapshot snapshot{impl_->current_view(), impl_->shown, impl_->missing_because, impl_->late_because, {}};
@@ -339,8 +350,8 @@ RouteIndex::Snapshot RouteIndex::snapshot() const {
 }
 
 bool RouteIndex::wait_current(Clock::time_point deadline) const {
-  std::unique_lock lock(impl_->mutex);
-  return impl_->wake.wait_until(lock, deadline, [this] {
+  MutexLock lock(impl_->mutex);
+  return impl_->wake.wait_until(impl_->mutex, deadline, [this]() RELMAP_REQUIRES(impl_->mutex) {
     return impl_->given_up || !impl_->late_because.empty() ||
            (impl_->shown && impl_->stale.empty() && impl_->shown->outdated() == 0);
   });
