@@ -6,13 +6,19 @@
 #include <iostream>
 #include <string>
 
-#include "frontend/run.h"
+#include "frontend/console.h"
+#include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/workflow/exit_code.h"
+#include "frontend/workflow/list_recording.h"
+#include "frontend/workflow/run_frontend.h"
+#include "frontend/workflow/run_options.h"
+#include "frontend/workflow/wire/wire_outside.h"
 #include "tools/terminal/command_line.h"
 
 namespace relmap::frontend {
 namespace {
 
-enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnsettled = 3, kInterrupted = 4, kUntrusted = 5 };
+using namespace workflow;
 
 std::atomic<bool> g_stop = false;
 void on_signal(int) { g_stop = true; }
@@ -173,8 +179,9 @@ int main_function(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return terminal::end_with(app, error, std::cout, std::cerr, kUsage);
   }
+  const Outside outside = wire_outside();
   if (list) {
-    const Status listed = list_recording(a);
+    const Status listed = list_recording(a, outside);
     if (!listed.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", listed.to_string().c_str());
     return listed.ok() ? kDone : kFailed;
   }
@@ -182,19 +189,13 @@ int main_function(int argc, char** argv) {
   std::signal(SIGTERM, on_signal);
 
   RunSummary summary;
-  const Status status = run_frontend(a, g_stop, summary);
+  const Status status = run_frontend(a, outside, g_stop, summary);
   if (!status.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", status.to_string().c_str());
   if (json)
     std::printf("%s\n", summary_json(summary).c_str());
   else if (status.ok() || summary.pairs > 0)
     std::fputs(summary_text(summary).c_str(), stdout);
-  const bool misused = status.reason() == Reason::INVALID_ARGUMENT || status.reason() == Reason::NO_SUCH_SESSION ||
-                       status.reason() == Reason::BAD_NAME;
-  if (!status.ok()) return misused ? kUsage : kFailed;
-  if (summary.interrupted) return kInterrupted;
-  const publishing::PublishSummary& published = summary.publishing;
-  if (!published.all_settled() || !published.refused.empty() || published.gaps > 0) return kUnsettled;
-  return summary.trusted() ? kDone : kUntrusted;
+  return exit_code_of(status, summary);
 }
 
 }  // namespace
@@ -205,6 +206,6 @@ int main(int argc, char** argv) {
     return relmap::frontend::main_function(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "relmap-frontend: %s\n", error.what());
-    return relmap::frontend::kFailed;
+    return relmap::workflow::kFailed;
   }
 }

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "frontend/capture/keyframe_file.h"
-#include "frontend/publishing/grpc/grpc_transport.h"
 
 namespace relmap::frontend {
 
@@ -91,23 +90,11 @@ std::string as_folder(const std::string& name) {
   return folder;
 }
 
+}  // namespace
+
 Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<publishing::Publisher>> publisher) {
   if (!publisher.ok()) return publisher.status();
   return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher)));
-}
-
-}  // namespace
-
-Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(publishing::PublisherOptions options,
-                                                    const SessionHeader& session) {
-  return sink_of(publishing::Publisher::start(std::move(options), session));
-}
-
-Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, publishing::PublisherOptions options,
-                                                     const SessionHeader& session) {
-  auto transport = publishing::GrpcTransport::open(server, session.robot);
-  if (!transport.ok()) return transport.status();
-  return sink_of(publishing::Publisher::start(std::move(options), session, std::move(*transport)));
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session) {

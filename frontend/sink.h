@@ -32,10 +32,8 @@ class KeyframeSink {
   virtual void interrupt() = 0;  // thread-safe
 };
 
-Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(publishing::PublisherOptions options, const SessionHeader& session);
-// `server` is a data folder or HOST:PORT.
-Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, publishing::PublisherOptions options,
-                                                     const SessionHeader& session);
+// To the daemon, over the publisher's transport; or why there is no publisher.
+Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<publishing::Publisher>> publisher);
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session);
 
 // The default folder of a session's spool, below $XDG_STATE_HOME or ~/.local/state.

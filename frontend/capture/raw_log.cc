@@ -109,7 +109,7 @@ Result<RawLogHeader> decode_header(const Head& head, ByteSpan body) {
   header.rate_hz = in.get<double>();
   if (!in.ok() || crc32c(body) != head.crc) return {Reason::CORRUPT, "its header is damaged"};
   const StereoLayout& layout = header.layout;
-  if (layout.width <= 0 || layout.height <= 0 || layout.width > kMaxFrameSide || layout.height > kMaxSide ||
+  if (layout.width <= 0 || layout.height <= 0 || layout.width > kMaxFrameSide || layout.height > kMaxFrameSide ||
       layout.bytes() > kMaxFrameBytes)
     return {Reason::BAD_SIZE,
             "frames of " + std::to_string(layout.width) + " x " + std::to_string(layout.height) + " pixels"};

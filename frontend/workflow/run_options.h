@@ -1,17 +1,13 @@
-// One run of relmap-frontend: a source's pairs through the pipeline, or ready-made keyframes (a file's or a recorded
-// log's), into a sink.
+// What a run of relmap-frontend is asked for, as its command line says it.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <string>
 
-#include "frontend/console.h"
 #include "frontend/publishing/publisher.h"
 #include "frontend/tracking/keyframe_pictures.h"
-#include "proto/base/status.h"
 
-namespace relmap::frontend {
+namespace relmap::workflow {
 
 struct RunOptions {
   std::string source = "auto";  // kind, for open_source(), or log, or iidc: a camera
@@ -46,20 +42,4 @@ struct RunOptions {
   bool progress_json = false;  // on standard output, for programs
 };
 
-// `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it
-// ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink; INVALID_ARGUMENT: what would
-// be written over something that is needed, or no name for the robot; NOT_STEREO: one eye and not `mono`;
-// NOT_STEREO, ROWS_APART, EYE_DEAD: what the first pairs of a recording show is wrong (RigCheck), and nothing was
-// begun; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough: then nothing of a recording is sent.
-Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
-
-// What a recording is, on standard output, an object a line; no picture is read but the first. Of pairs and keyframes
-// one: "fingerprint", "count", "contents", "calibration" (RecordingIdentity), of pairs whose times nothing tells
-// "supposed_rate_hz", of keyframes "uuid", "robot" and "name" of their session, too. Of a log one for each session:
-// "uuid", "robot", "name", "first", "last". Of photographs (`mono`) one for each camera: "camera", "pictures", what
-// recordings of pairs have where they can be read at all, and what lies beside them, "folders_passed_over" and
-// "files_passed_over"; the heads of all are read. Reasons: open_source()'s, EventLog::open()'s, list_sessions()'s,
-// open_mono_images()'s, identity_of_keyframes()'s; INVALID_ARGUMENT: a camera.
-Status list_recording(const RunOptions& options);
-
-}  // namespace relmap::frontend
+}  // namespace relmap::workflow

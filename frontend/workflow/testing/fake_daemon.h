@@ -1,0 +1,118 @@
+// A daemon's end, for tests of workflows: takes keyframes, refuses them and tells of them as the test says.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "frontend/sink.h"
+#include "frontend/workflow/outside.h"
+#include "frontend/workflow/run_options.h"
+
+namespace relmap::workflow::testing_daemon {
+
+// Must outlive the sinks that it opens. What the test sets is set before the run; what it finds is read after it.
+class FakeDaemon {
+ public:
+  // What the test sets.
+  Status refuses_to_open, refuses_to_push;                      // not ok: the answer
+  std::size_t takes = std::numeric_limits<std::size_t>::max();  // keyframes, before it refuses one
+  std::vector<Status> maps;  // what await_map() answers, one after another, before it is content
+  bool answers = true, settles = true;
+  bool takes_after_interrupt = false;  // as a file does
+  Status trouble;
+  Status session;                                                    // of the summary at the end
+  publishing::PublishSummary at_end;                                 // what the summary has beside the counts
+  std::optional<Keyframe> last;                                      // in its spool
+  std::function<void(std::size_t)> pushed_one = [](std::size_t) {};  // so many keyframes have come
+
+  // What it finds.
+  std::vector<publishing::PublisherOptions> opened;
+  std::vector<Keyframe> pushed;
+  std::optional<bool> complete;  // of finish()
+  std::optional<double> patience;
+  int ends = 0;  // of the session
+  bool interrupted = false;
+
+  // News for who listens.
+  void tell(const PoseNews& news) {
+    const std::lock_guard lock(mutex_);
+    if (listener_) listener_(news);
+  }
+
+  // For Outside::open_daemon_sink.
+  auto opener() {
+    return [this](const RunOptions&, const publishing::PublisherOptions& publisher,
+                  const SessionHeader& session_header) -> Result<std::unique_ptr<frontend::KeyframeSink>> {
+      opened.push_back(publisher);
+      if (!refuses_to_open.ok()) return refuses_to_open;
+      return std::unique_ptr<frontend::KeyframeSink>(std::make_unique<Sink>(*this, session_header));
+    };
+  }
+
+ private:
+  class Sink : public frontend::KeyframeSink {
+   public:
+    Sink(FakeDaemon& daemon, SessionHeader session) : daemon_(daemon), session_(std::move(session)) {
+      if (session_.uuid.is_nil()) session_.uuid = SessionUuid::random();
+    }
+    const SessionHeader& session() const override { return session_; }
+    std::optional<Keyframe> last_keyframe() const override { return daemon_.last; }
+    Status await_map(double) override {
+      if (daemon_.maps.empty()) return {};
+      const Status answer = daemon_.maps.front();
+      daemon_.maps.erase(daemon_.maps.begin());
+      return answer;
+    }
+    Status push(const Keyframe& keyframe) override {
+      std::size_t count = 0;
+      {
+        const std::lock_guard lock(daemon_.mutex_);
+        if (daemon_.interrupted && !daemon_.takes_after_interrupt) return {Reason::SHUTTING_DOWN, "interrupted"};
+        if (daemon_.pushed.size() >= daemon_.takes) return daemon_.refuses_to_push;
+        daemon_.pushed.push_back(keyframe);
+        count = daemon_.pushed.size();
+      }
+      daemon_.pushed_one(count);
+      return {};
+    }
+    void hear(std::function<void(const PoseNews&)> listener) override {
+      const std::lock_guard lock(daemon_.mutex_);
+      daemon_.listener_ = std::move(listener);
+    }
+    publishing::PublishSummary progress() const override {
+      const std::lock_guard lock(daemon_.mutex_);
+      publishing::PublishSummary summary = daemon_.at_end;
+      summary.pushed = daemon_.pushed.size();
+      (daemon_.settles ? summary.settled : summary.unsettled) = summary.pushed;
+      summary.heard = daemon_.answers;
+      summary.session = daemon_.session;
+      return summary;
+    }
+    Result<publishing::PublishSummary> finish(double patience_s, bool complete) override {
+      daemon_.complete = complete;
+      daemon_.patience = patience_s;
+      return progress();
+    }
+    void end_session(double) override { ++daemon_.ends; }
+    Status trouble() const override { return daemon_.trouble; }
+    void interrupt() override {
+      const std::lock_guard lock(daemon_.mutex_);
+      daemon_.interrupted = true;
+    }
+
+   private:
+    FakeDaemon& daemon_;
+    SessionHeader session_;
+  };
+
+  std::mutex mutex_;
+  std::function<void(const PoseNews&)> listener_;
+};
+
+}  // namespace relmap::workflow::testing_daemon
