@@ -4,11 +4,17 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdio>
+#include <initializer_list>
 #include <iomanip>
+#include <optional>
 #include <sstream>
+#include <vector>
 
 #include "frontend/figures.h"
+#include "proto/base/hex.h"
+#include "proto/base/json.h"
 #include "proto/base/mutex.h"
 #include "proto/base/number_text.h"
 #include "proto/geometry/canonical_rotation.h"
@@ -17,26 +23,22 @@ namespace relmap::frontend {
 
 namespace {
 
-std::string json_string(const std::string& text) {
-  std::ostringstream out;
-  out << '"';
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      out << '\\' << c;
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out << "\\u" << std::hex << std::setw(4) << std::setfill('0') << static_cast<int>(c) << std::dec;
-    else
-      out << c;
-  }
-  out << '"';
-  return out.str();
+Json counts_json(const std::map<Reason, std::uint64_t>& counts) {
+  Json json;
+  for (const auto& [reason, count] : counts) json.add(reason_name(reason), count);
+  return json;
 }
 
-std::string json_counts(const std::map<Reason, std::uint64_t>& counts) {
-  std::string out = "{";
-  for (const auto& [reason, count] : counts)
-    out += (out.size() > 1 ? ", \"" : "\"") + std::string(reason_name(reason)) + "\": " + std::to_string(count);
-  return out + "}";
+Json status_json(const Status& status) {
+  return Json().add("reason", reason_name(status.reason())).add("message", status.message());
+}
+
+// Null where there is none.
+Json& add_object(Json& json, const char* key, const std::optional<Json>& object) {
+  return object ? json.add(key, *object) : json.add_null(key);
+}
+Json& add_text(Json& json, const char* key, const std::string& text) {
+  return text.empty() ? json.add_null(key) : json.add(key, text);
 }
 
 std::string text_counts(const std::map<Reason, std::uint64_t>& counts) {
@@ -65,24 +67,30 @@ std::string recognition_text(const RunSummary& s) {
   return out.str();
 }
 
-std::string recognition_json(const RunSummary& s) {
+Json recognition_json(const RunSummary& s) {
   const publishing::Localisation::Counts& c = s.recognised;
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(3) << "\"closures\": " << c.closures
-      << ", \"closures_withdrawn\": " << c.withdrawn << ", \"unmeasured_steps\": " << c.unmeasured_steps
-      << ", \"recovered_steps\": " << c.recovered_steps << ", \"place\": ";
-  if (!s.place) return out.str() + "null";
+  Json json;
+  json.add("closures", c.closures)
+      .add("closures_withdrawn", c.withdrawn)
+      .add("unmeasured_steps", c.unmeasured_steps)
+      .add("recovered_steps", c.recovered_steps);
+  if (!s.place) return json.add_null("place");
   const SE3& T = s.place->T_frame_newest;
   const QuaternionWxyz q = canonical_quaternion(T.R);
-  out << "{\"frame\": \"" << s.place->frame.to_string() << "\", \"recognised\": \"" << s.place->recognised.to_string()
-      << "\", \"translation\": [" << fixed(T.t.x(), 3) << ", " << fixed(T.t.y(), 3) << ", " << fixed(T.t.z(), 3)
-      << "], \"rotation_wxyz\": [" << fixed(q[0], 6) << ", " << fixed(q[1], 6) << ", " << fixed(q[2], 6) << ", "
-      << fixed(q[3], 6) << "]}";
-  return out.str();
+  const auto list = [](std::initializer_list<double> values, double scale) {
+    std::vector<double> rounded;
+    for (const double value : values) rounded.push_back(std::round(value * scale) / scale);
+    return rounded;
+  };
+  return json.add("place", Json()
+                               .add("frame", s.place->frame.to_string())
+                               .add("recognised", s.place->recognised.to_string())
+                               .add("translation", list({T.t.x(), T.t.y(), T.t.z()}, 1e3))
+                               .add("rotation_wxyz", list({q[0], q[1], q[2], q[3]}, 1e6)));
 }
 
-std::string json_share(std::uint64_t part, std::uint64_t whole) {
-  return whole == 0 ? "null" : std::to_string(share(part, whole));
+std::optional<double> share_of_any(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? std::nullopt : std::optional(share(part, whole));
 }
 
 // What the disparities were off by is learnt from pairs.
@@ -103,40 +111,30 @@ std::string waiting_text(const RunSummary& s) {
 
 double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / static_cast<double>(s.pairs); }
 
-std::string camera_json(const RunSummary& s) {
-  if (!s.camera) return "null";
+std::optional<Json> camera_json(const RunSummary& s) {
+  if (!s.camera) return std::nullopt;
   const RunSummary::Camera& c = *s.camera;
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(1) << "{\"serial\": " << json_string(c.serial) << ", \"frames\": " << c.frames
-      << ", \"lost\": " << c.lost << ", \"reopened\": " << c.reopened << ", \"begun_anew\": " << c.begun_anew
-      << ", \"drift_ppm\": ";
-  if (c.drift_ppm)
-    out << fixed(*c.drift_ppm, 1) << '}';
-  else
-    out << "null}";
-  return out.str();
+  return Json()
+      .add("serial", c.serial)
+      .add("frames", c.frames)
+      .add("lost", c.lost)
+      .add("reopened", c.reopened)
+      .add("begun_anew", c.begun_anew)
+      .add("drift_ppm", c.drift_ppm, 1);
 }
 
-std::string left_out_json(const std::vector<Status>& left_out) {
-  std::string out = "[";
-  for (const Status& status : left_out)
-    out += (out.size() > 1 ? ", " : "") + ("{\"reason\": \"" + std::string(reason_name(status.reason()))) +
-           "\", \"message\": " + json_string(status.message()) + '}';
-  return out + "]";
+std::vector<Json> left_out_json(const std::vector<Status>& left_out) {
+  std::vector<Json> list;
+  for (const Status& status : left_out) list.push_back(status_json(status));
+  return list;
 }
 
-std::string json_strings(const std::vector<std::string>& texts) {
-  std::string out = "[";
-  for (const std::string& text : texts) out += (out.size() > 1 ? ", " : "") + json_string(text);
-  return out + "]";
-}
-
-// Without its braces.
-std::string recording_members(const capture::RecordingIdentity& recording) {
-  char contents[9];
-  std::snprintf(contents, sizeof contents, "%08x", recording.contents);
-  return "\"fingerprint\": " + json_string(recording.fingerprint) + ", \"count\": " + std::to_string(recording.count) +
-         ", \"contents\": \"" + contents + "\", \"calibration\": " + json_string(recording.calibration);
+Json identity_json(const capture::RecordingIdentity& recording) {
+  return Json()
+      .add("fingerprint", recording.fingerprint)
+      .add("count", recording.count)
+      .add("contents", hex(recording.contents))
+      .add("calibration", recording.calibration);
 }
 
 // What a run is not to be trusted for, first of all.
@@ -158,51 +156,41 @@ std::string missing_text(const capture::MissingPictures& missing) {
   return text;
 }
 
-std::string findings_json(const std::vector<Status>& findings) {
-  std::string out = "[";
+std::vector<Json> findings_json(const std::vector<Status>& findings) {
+  std::vector<Json> list;
   for (const Status& finding : findings)
-    out += (out.size() > 1 ? ", " : "") + ("{\"reason\": \"" + std::string(reason_name(finding.reason()))) +
-           "\", \"message\": " + json_string(finding.message()) +
-           ", \"advice\": " + json_string(vision::rig_advice(finding.reason())) + "}";
-  return out + "]";
+    list.push_back(status_json(finding).add("advice", vision::rig_advice(finding.reason())));
+  return list;
 }
 
-std::string rig_json(const std::optional<vision::RigReport>& rig) {
-  if (!rig) return "null";
-  std::ostringstream out;
-  const auto angle = [&](const char* key, const std::optional<double>& degrees) {
-    out << ", \"" << key << "\": ";
-    if (degrees)
-      out << fixed(*degrees, 3);
-    else
-      out << "null";
-  };
-  out << std::fixed << std::setprecision(3) << "{\"pairs\": " << rig->pairs << ", \"matches\": " << rig->matches
-      << ", \"row_error_px\": " << rig->row_error << ", \"row_error_90_px\": " << rig->row_error_90
-      << ", \"row_offset_px\": " << fixed(rig->row_offset, 3) << ", \"row_slope_x_px\": " << fixed(rig->row_slope_x, 3)
-      << ", \"row_slope_y_px\": " << fixed(rig->row_slope_y, 3) << ", \"disparity_px\": " << fixed(rig->disparity, 3)
-      << ", \"positive_disparity\": " << rig->positive_disparity
-      << ", \"negative_disparity\": " << rig->negative_disparity;
-  angle("yaw_by_rows_degrees", rig->yaw_by_rows);
-  angle("yaw_by_motion_degrees", rig->yaw_by_motion);
-  out << ", \"motions\": " << rig->motions << '}';
-  return out.str();
+std::optional<Json> rig_json(const std::optional<vision::RigReport>& rig) {
+  if (!rig) return std::nullopt;
+  return Json()
+      .add("pairs", rig->pairs)
+      .add("matches", rig->matches)
+      .add("row_error_px", rig->row_error, 3)
+      .add("row_error_90_px", rig->row_error_90, 3)
+      .add("row_offset_px", rig->row_offset, 3)
+      .add("row_slope_x_px", rig->row_slope_x, 3)
+      .add("row_slope_y_px", rig->row_slope_y, 3)
+      .add("disparity_px", rig->disparity, 3)
+      .add("positive_disparity", rig->positive_disparity, 3)
+      .add("negative_disparity", rig->negative_disparity, 3)
+      .add("yaw_by_rows_degrees", rig->yaw_by_rows, 3)
+      .add("yaw_by_motion_degrees", rig->yaw_by_motion, 3)
+      .add("motions", rig->motions);
 }
 
-std::string trust_json(const RunSummary& s) {
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(6) << "\"trusted\": " << (s.trusted() ? "true" : "false")
-      << ", \"expected\": " << s.expected << ", \"seen\": " << s.seen << ", \"measured\": " << s.measured
-      << ", \"measured_share\": ";
-  if (const auto share = s.measured_share())
-    out << *share;
-  else
-    out << "null";
-  out << ", \"missing\": {\"count\": " << s.missing.count << ", \"first\": [";
-  for (const std::string& name : s.missing.first)
-    out << (&name == &s.missing.first.front() ? "" : ", ") << json_string(name);
-  out << "]}, \"findings\": " << findings_json(s.findings()) << ", \"rig\": " << rig_json(s.rig);
-  return out.str();
+Json trust_json(const RunSummary& s) {
+  Json json;
+  json.add("trusted", s.trusted())
+      .add("expected", s.expected)
+      .add("seen", s.seen)
+      .add("measured", s.measured)
+      .add("measured_share", s.measured_share(), 6)
+      .add("missing", Json().add("count", s.missing.count).add("first", s.missing.first))
+      .add("findings", findings_json(s.findings()));
+  return add_object(json, "rig", rig_json(s.rig));
 }
 
 }  // namespace
@@ -238,12 +226,15 @@ void ProgressLine::show_json(const RunSummary& so_far, const publishing::Publish
   const auto now = Clock::now();
   if (now - shown_ < std::chrono::milliseconds(250)) return;
   shown_ = now;
-  std::ostringstream line;
-  line << std::fixed << std::setprecision(3) << "{\"pairs\": " << so_far.pairs
-       << ", \"of\": " << (total_ > 0 ? std::to_string(total_) : "null") << ", \"keyframes\": " << so_far.keyframes
-       << ", \"settled\": " << publishing.settled << ", \"path_m\": " << so_far.path_m
-       << ", \"trouble\": " << (trouble.ok() ? "null" : json_string(trouble.to_string())) << "}\n";
-  std::fputs(line.str().c_str(), stdout);
+  Json json;
+  json.add("pairs", so_far.pairs);
+  if (total_ > 0)
+    json.add("of", total_);
+  else
+    json.add_null("of");
+  json.add("keyframes", so_far.keyframes).add("settled", publishing.settled).add("path_m", so_far.path_m, 3);
+  add_text(json, "trouble", trouble.ok() ? "" : trouble.to_string());
+  std::fputs((json.text() + '\n').c_str(), stdout);
   std::fflush(stdout);
 }
 
@@ -345,61 +336,83 @@ std::string summary_text(const RunSummary& s) {
 
 std::string summary_json(const RunSummary& s) {
   const publishing::PublishSummary& p = s.publishing;
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(3) << "{\"robot\": " << json_string(s.robot)
-      << ", \"session\": " << json_string(s.session) << ", \"uuid\": " << json_string(s.uuid)
-      << ", \"spool\": " << (s.spool.empty() ? "null" : json_string(s.spool))
-      << ", \"gone_on_after\": " << (s.gone_on ? std::to_string(*s.gone_on) : "null")
-      << ", \"mono\": " << (s.mono ? "true" : "false") << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked
-      << ", \"one_eyed\": " << s.one_eyed << ", \"repeated\": " << s.repeated << ", \"lost\": " << s.lost
-      << ", \"dropped\": " << s.dropped << ", \"unreadable\": " << json_counts(s.unreadable)
-      << ", \"stamps_refused\": " << json_counts(s.stamps_refused) << ", \"offset_px\": " << fixed(s.offset_px, 3)
-      << ", \"keyframes\": " << s.keyframes << ", \"metric_share\": " << json_share(s.metric_steps, s.steps)
-      << ", \"path_m\": " << s.path_m << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled
-      << ", \"unsettled\": " << p.unsettled << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent
-      << ", \"gaps\": " << p.gaps << ", \"lost_in_restores\": " << p.lost_in_restores << ", " << recognition_json(s)
-      << ", \"refused\": " << json_counts(p.refused) << ", \"restarts_seen\": " << p.restarts_seen
-      << ", \"slow_downs\": " << s.slow_downs << ", \"ms_per_pair\": " << mean_ms(s)
-      << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
-      << ", \"tracked_p50_ms\": " << s.tracked_p50_ms << ", \"tracked_p99_ms\": " << s.tracked_p99_ms
-      << ", \"recording\": " << (s.recording ? recording_json(*s.recording) : "null")
-      << ", \"left_out\": " << left_out_json(s.left_out) << ", \"camera\": " << camera_json(s) << ", " << trust_json(s)
-      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
-  if (s.failure.ok())
-    out << "null}";
+  Json json;
+  json.add("robot", s.robot).add("session", s.session).add("uuid", s.uuid);
+  add_text(json, "spool", s.spool);
+  if (s.gone_on)
+    json.add("gone_on_after", *s.gone_on);
   else
-    out << "{\"reason\": \"" << reason_name(s.failure.reason())
-        << "\", \"message\": " << json_string(s.failure.message()) << "}}";
-  return out.str();
+    json.add_null("gone_on_after");
+  json.add("mono", s.mono)
+      .add("pairs", s.pairs)
+      .add("tracked", s.tracked)
+      .add("one_eyed", s.one_eyed)
+      .add("repeated", s.repeated)
+      .add("lost", s.lost)
+      .add("dropped", s.dropped)
+      .add("unreadable", counts_json(s.unreadable))
+      .add("stamps_refused", counts_json(s.stamps_refused))
+      .add("offset_px", s.offset_px, 3)
+      .add("keyframes", s.keyframes)
+      .add("metric_share", share_of_any(s.metric_steps, s.steps), 6)
+      .add("path_m", s.path_m, 3)
+      .add("pushed", p.pushed)
+      .add("settled", p.settled)
+      .add("unsettled", p.unsettled)
+      .add("resent", p.resent)
+      .add("parts_resent", p.parts_resent)
+      .add("gaps", p.gaps)
+      .add("lost_in_restores", p.lost_in_restores)
+      .merge(recognition_json(s))
+      .add("refused", counts_json(p.refused))
+      .add("restarts_seen", p.restarts_seen)
+      .add("slow_downs", s.slow_downs)
+      .add("ms_per_pair", mean_ms(s), 3)
+      .add("latency_p50_ms", s.latency_p50_ms, 3)
+      .add("latency_p99_ms", s.latency_p99_ms, 3)
+      .add("tracked_p50_ms", s.tracked_p50_ms, 3)
+      .add("tracked_p99_ms", s.tracked_p99_ms, 3);
+  add_object(json, "recording", s.recording ? std::optional(identity_json(*s.recording)) : std::nullopt);
+  json.add("left_out", left_out_json(s.left_out));
+  add_object(json, "camera", camera_json(s));
+  json.merge(trust_json(s)).add("wall_s", s.wall_s, 3).add("interrupted", s.interrupted);
+  add_object(json, "error", s.failure.ok() ? std::nullopt : std::optional(status_json(s.failure)));
+  return json.text();
 }
 
 std::string recorded_session_json(const recording::RecordedSession& session) {
-  return "{\"uuid\": " + json_string(session.header.uuid.to_string()) +
-         ", \"robot\": " + json_string(session.header.robot) + ", \"name\": " + json_string(session.header.name) +
-         ", \"first\": " + std::to_string(session.first) + ", \"last\": " + std::to_string(session.last) + "}";
+  return Json()
+      .add("uuid", session.header.uuid.to_string())
+      .add("robot", session.header.robot)
+      .add("name", session.header.name)
+      .add("first", session.first)
+      .add("last", session.last)
+      .text();
 }
 
 std::string recording_json(const capture::RecordingIdentity& recording, double supposed_rate_hz) {
-  std::string out = "{" + recording_members(recording);
-  if (supposed_rate_hz > 0) out += ", \"supposed_rate_hz\": " + number_text(supposed_rate_hz);
-  return out + "}";
+  Json json = identity_json(recording);
+  if (supposed_rate_hz > 0) json.add("supposed_rate_hz", supposed_rate_hz);
+  return json.text();
 }
 
 std::string keyframe_file_json(const capture::KeyframeFileIdentity& file) {
-  return "{\"uuid\": " + json_string(file.session.uuid.to_string()) +
-         ", \"robot\": " + json_string(file.session.robot) + ", \"name\": " + json_string(file.session.name) + ", " +
-         recording_members(file.recording) + "}";
+  return Json()
+      .add("uuid", file.session.uuid.to_string())
+      .add("robot", file.session.robot)
+      .add("name", file.session.name)
+      .merge(identity_json(file.recording))
+      .text();
 }
 
 std::string photographs_json(const capture::PhotographFolder::Camera& camera, const capture::PassedOver& passed_over) {
-  std::string out = "{\"camera\": " + json_string(camera.name) + ", \"pictures\": " + std::to_string(camera.pictures);
+  Json json;
+  json.add("camera", camera.name).add("pictures", camera.pictures);
   if (camera.source.ok())
-    out += ", " + recording_members(capture::identity_of(**camera.source));
+    json.merge(identity_json(capture::identity_of(**camera.source)));
   else
-    out += ", \"error\": {\"reason\": \"" + std::string(reason_name(camera.source.reason())) +
-           "\", \"message\": " + json_string(camera.source.status().message()) + '}';
-  return out + ", \"folders_passed_over\": " + json_strings(passed_over.folders) +
-         ", \"files_passed_over\": " + json_strings(passed_over.files) + "}";
+    json.add("error", status_json(camera.source.status()));
+  return json.add("folders_passed_over", passed_over.folders).add("files_passed_over", passed_over.files).text();
 }
 
 }  // namespace relmap::frontend

@@ -232,7 +232,7 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
   const Finished listed = run({built_program("relmap-frontend"), "--source", "log", drives_[1], "--list"});
   EXPECT_EQ(listed.exit_code, 0) << listed.standard_error;
   for (const std::string& uuid : uuids)
-    EXPECT_THAT(listed.standard_output, ContainsRegex("\"uuid\": \"" + uuid + "\".*\"first\": 50, \"last\": 79"));
+    EXPECT_THAT(listed.standard_output, ContainsRegex("\"uuid\":\"" + uuid + "\".*\"first\":50,\"last\":79"));
 
   const auto expect_all_there = [&] {
     const auto sessions = daemon.client()->sessions().or_throw();

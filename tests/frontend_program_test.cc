@@ -58,7 +58,7 @@ TEST_F(FrontendProgram, WritesNothingOverItsSource) {
   // The robot is the one recorded.
   const Finished again = run({keyframes, "--out", file("again.bin"), "--json"});
   EXPECT_EQ(again.exit_code, 0) << again.standard_error;
-  EXPECT_NE(again.standard_output.find("\"robot\": \"r\""), std::string::npos) << again.standard_output;
+  EXPECT_NE(again.standard_output.find("\"robot\":\"r\""), std::string::npos) << again.standard_output;
 }
 
 TEST_F(FrontendProgram, RefusesWrongUse) {
@@ -112,9 +112,9 @@ TEST_F(FrontendProgram, ProgressIsAnObjectALine) {
   for (std::string line; std::getline(lines, line);) all.push_back(line);
   ASSERT_GE(all.size(), 3u) << done.standard_output;
   for (const std::string& line : all) EXPECT_TRUE(line.front() == '{' && line.back() == '}') << line;
-  for (const char* said : {"{\"pairs\": ", ", \"of\": 12, ", "\"keyframes\": ", "\"settled\": ", "\"path_m\": "})
+  for (const char* said : {"{\"pairs\":", ",\"of\":12,", "\"keyframes\":", "\"settled\":", "\"path_m\":"})
     EXPECT_NE(all.front().find(said), std::string::npos) << all.front();
-  EXPECT_NE(all.back().find("\"error\": null"), std::string::npos) << all.back();
+  EXPECT_NE(all.back().find("\"error\":null"), std::string::npos) << all.back();
 }
 
 TEST_F(FrontendProgram, ReplacesNoFileOfAnotherKind) {
@@ -149,7 +149,7 @@ TEST_F(FrontendProgram, LeavesAFileThatIsNotCompleteApart) {
 TEST_F(FrontendProgram, FailuresAreInItsJson) {
   const Finished failed = run({file("nowhere"), "--robot", "r", "--out", file("d"), "--json"});
   EXPECT_EQ(failed.exit_code, 1);
-  EXPECT_NE(failed.standard_output.find("\"error\": {\"reason\": \"NO_SUCH_FILE\""), std::string::npos)
+  EXPECT_NE(failed.standard_output.find("\"error\":{\"reason\":\"NO_SUCH_FILE\""), std::string::npos)
       << failed.standard_output;
   EXPECT_TRUE(says(run({drive("1"), "--robot", "a\xff", "--out", file("d")}), "BAD_NAME"));
 }
@@ -249,7 +249,7 @@ TEST_F(FrontendProgram, MakesAMonoSessionOfAFolderOfPictures) {
   EXPECT_EQ(done.exit_code, 0) << done.standard_error;
   EXPECT_TRUE(says(done, "pictures of one eye")) << done.standard_error;
   EXPECT_TRUE(says(done, "3.png: neither PNG nor JPEG")) << done.standard_error;
-  for (const char* said : {"\"mono\": true", "\"pairs\": 5", "\"keyframes\": 5", "\"NOT_A_PICTURE\": 1"})
+  for (const char* said : {"\"mono\":true", "\"pairs\":5", "\"keyframes\":5", "\"NOT_A_PICTURE\":1"})
     EXPECT_NE(done.standard_output.find(said), std::string::npos) << done.standard_output;
   EXPECT_NE(read_text(report).find("4\t4.png\t"), std::string::npos) << read_text(report);
   EXPECT_NE(read_text(report).find("# keyframes\t5"), std::string::npos) << read_text(report);
@@ -261,7 +261,7 @@ TEST_F(FrontendProgram, MakesAMonoSessionOfAFolderOfPictures) {
   fs::copy(drive("1") + "/image_0/000007.png", photos + "/7.png");
   const Finished more = take({"--lcm", "memq://", "--spool", spool, "--patience", "0"});
   EXPECT_TRUE(says(more, "goes on after keyframe 4")) << more.standard_error;
-  EXPECT_NE(more.standard_output.find("\"unsettled\": 6"), std::string::npos) << more.standard_output;
+  EXPECT_NE(more.standard_output.find("\"unsettled\":6"), std::string::npos) << more.standard_output;
 }
 
 TEST_F(FrontendProgram, RefusesWhatNeedsPairsOfReadyMadeKeyframes) {

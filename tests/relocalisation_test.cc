@@ -25,10 +25,10 @@ TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
   unsigned session = 0, index = 0;
   Vector3 t;
   const std::string& json = drive.summary_json();
-  const std::size_t frame_at = json.find("\"frame\": "), translation_at = json.find("\"translation\": ");
+  const std::size_t frame_at = json.find("\"frame\":"), translation_at = json.find("\"translation\":");
   ASSERT_NE(frame_at, std::string::npos) << json;
-  ASSERT_EQ(std::sscanf(json.c_str() + frame_at, "\"frame\": \"%u:%u\"", &session, &index), 2);
-  ASSERT_EQ(std::sscanf(json.c_str() + translation_at, "\"translation\": [%lf, %lf, %lf]", &t.x(), &t.y(), &t.z()), 3);
+  ASSERT_EQ(std::sscanf(json.c_str() + frame_at, "\"frame\":\"%u:%u\"", &session, &index), 2);
+  ASSERT_EQ(std::sscanf(json.c_str() + translation_at, "\"translation\":[%lf,%lf,%lf]", &t.x(), &t.y(), &t.z()), 3);
   const SE3 truth = drive.true_T_frame_pair({session, index}, drive.pair_of(drive.last()));
   EXPECT_LT(drive.pair_of({session, index}), 45u) << "a frame of before the blackness";
   EXPECT_LT((t - truth.t).norm(), 0.1) << t.transpose() << " for " << truth.t.transpose();

@@ -32,7 +32,7 @@ class ListRecordingTest : public WorkflowTest {
 
 TEST_F(ListRecordingTest, OfPairsSaysWhatTellsThemFromOthers) {
   options_.source = "kitti";
-  EXPECT_THAT(list(), StartsWith("{\"fingerprint\": \"street\", \"count\": 12, \"contents\": \""));
+  EXPECT_THAT(list(), StartsWith("{\"fingerprint\":\"street\",\"count\":12,\"contents\":\""));
   EXPECT_TRUE(status_.ok());
   no_recording_ = {Reason::NO_SUCH_FILE, "nowhere"};
   EXPECT_EQ(list(), "");
@@ -45,8 +45,8 @@ TEST_F(ListRecordingTest, OfKeyframesSaysWhoseTheyAre) {
   auto writer = capture::KeyframeFileWriter::create(options_.path).or_throw();
   ASSERT_TRUE(writer.write(keyframe).ok());
   ASSERT_TRUE(writer.close().ok());
-  EXPECT_THAT(list(), AllOf(StartsWith("{\"uuid\": \"" + keyframe.session.uuid.to_string() + "\", \"robot\": "),
-                            HasSubstr("\"name\": \"morning\""), HasSubstr("\"count\": 1")));
+  EXPECT_THAT(list(), AllOf(StartsWith("{\"uuid\":\"" + keyframe.session.uuid.to_string() + "\",\"robot\":"),
+                            HasSubstr("\"name\":\"morning\""), HasSubstr("\"count\":1")));
 }
 
 TEST_F(ListRecordingTest, OfALogHasALineASession) {
@@ -59,8 +59,8 @@ TEST_F(ListRecordingTest, OfALogHasALineASession) {
     if (!no_log.ok()) return no_log;
     return std::vector{session, session};
   };
-  const std::string line = "{\"uuid\": \"" + SessionUuid().to_string() +
-                           "\", \"robot\": \"\", \"name\": \"morning\", \"first\": 0, \"last\": 41}\n";
+  const std::string line =
+      "{\"uuid\":\"" + SessionUuid().to_string() + "\",\"robot\":\"\",\"name\":\"morning\",\"first\":0,\"last\":41}\n";
   EXPECT_EQ(list(), line + line);
   no_log = {Reason::BAD_SIZE, "nothing of relmap's"};
   EXPECT_EQ(list(), "");
@@ -73,8 +73,8 @@ TEST_F(ListRecordingTest, OfPhotographsHasALineACamera) {
   for (int i = 0; i < 2; ++i)
     capture::testing_files::write_picture(file("tower/" + std::to_string(i) + ".png"),
                                           capture::testing_files::noise(320, 240, CV_8UC1, i));
-  EXPECT_THAT(list(), AllOf(StartsWith("{\"camera\": "), HasSubstr("\"pictures\": 2"),
-                            HasSubstr("\"folders_passed_over\": []")));
+  EXPECT_THAT(list(),
+              AllOf(StartsWith("{\"camera\":"), HasSubstr("\"pictures\":2"), HasSubstr("\"folders_passed_over\":[]")));
 }
 
 TEST_F(ListRecordingTest, ALiveCameraIsNoRecording) {

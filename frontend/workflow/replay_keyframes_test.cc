@@ -75,7 +75,7 @@ TEST_F(ReplayKeyframesTest, EveryKeyframeOfAFileIsSentAsOneOfANewSession) {
   EXPECT_EQ(summary_.recording->count, 5u);
   EXPECT_EQ(daemon_.complete, true);
   EXPECT_EQ(exit_code(), kDone);
-  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"keyframes\": 5, "));
+  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"keyframes\":5,"));
 }
 
 TEST_F(ReplayKeyframesTest, TheRobotIsTheOneRecordedUnlessAnotherIsNamed) {

@@ -58,7 +58,7 @@ TEST_F(TakePhotographsTest, EachPictureBecomesAKeyframe) {
   EXPECT_EQ(lines[7], "# keyframes\t6");
   EXPECT_THAT(said_, HasSubstr("6 of 6 pictures"));
   EXPECT_EQ(exit_code(), kDone);
-  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"mono\": true, \"pairs\": 6, "));
+  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"mono\":true,\"pairs\":6,"));
 }
 
 TEST_F(TakePhotographsTest, AFolderWithoutPicturesIsTheEnd) {

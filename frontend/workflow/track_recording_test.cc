@@ -50,7 +50,7 @@ TEST_F(TrackRecordingTest, EveryPairIsTrackedAndItsKeyframesAreSent) {
   EXPECT_THAT(said_, StartsWith("a street\n"));
   EXPECT_THAT(said_, HasSubstr("12 of 12 pairs"));
   EXPECT_EQ(exit_code(), kDone);
-  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"error\": null"));
+  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"error\":null"));
 }
 
 TEST_F(TrackRecordingTest, ItsReportHasALineAPair) {
@@ -78,7 +78,7 @@ TEST_F(TrackRecordingTest, ARecordingThatCannotBeOpenedIsTheEnd) {
   EXPECT_EQ(daemon_.opened.size(), 0u);
   EXPECT_EQ(exit_code(), kFailed);
   EXPECT_THAT(frontend::summary_json(summary_),
-              HasSubstr("\"error\": {\"reason\": \"NO_CALIBRATION\", \"message\": \"there is none\"}"));
+              HasSubstr("\"error\":{\"reason\":\"NO_CALIBRATION\",\"message\":\"there is none\"}"));
 }
 
 TEST_F(TrackRecordingTest, PairsThatCannotBeReadAreLeftOutByName) {
@@ -120,7 +120,7 @@ TEST_F(TrackRecordingTest, AStopEndsItInOrder) {
   EXPECT_TRUE(daemon_.interrupted);
   EXPECT_EQ(lines_of(options_.report).at(summary_.pairs + 1), "# pairs\t" + std::to_string(summary_.pairs));
   EXPECT_EQ(exit_code(), kInterrupted);
-  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"interrupted\": true"));
+  EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"interrupted\":true"));
 }
 
 TEST_F(TrackRecordingTest, AStopBeforeItsFirstPairSendsNothing) {

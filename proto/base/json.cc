@@ -45,6 +45,17 @@ Json& Json::add(std::string_view key, std::string_view text) { return put(key, q
 
 Json& Json::add(std::string_view key, double value) { return put(key, number_of(value)); }
 
+Json& Json::add(std::string_view key, std::optional<double> value, int digits) {
+  if (!value) return add_null(key);
+  const double scale = std::pow(10.0, digits);
+  return add(key, std::round(*value * scale) / scale);
+}
+
+Json& Json::merge(const Json& other) {
+  members_.insert(members_.end(), other.members_.begin(), other.members_.end());
+  return *this;
+}
+
 Json& Json::add(std::string_view key, const std::vector<Json>& objects) {
   return put(key, list_of(objects, [](const Json& object) { return object.text(); }));
 }

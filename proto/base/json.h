@@ -3,6 +3,7 @@
 
 #include <concepts>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,11 +23,15 @@ class Json {
     return put(key, std::to_string(value));
   }
   Json& add(std::string_view key, double value);
+  // Rounded to so many digits behind the point; null where there is no value.
+  Json& add(std::string_view key, std::optional<double> value, int digits);
   Json& add(std::string_view key, const Json& object) { return put(key, object.text()); }
   Json& add(std::string_view key, const std::vector<Json>& objects);
   Json& add(std::string_view key, const std::vector<std::string>& texts);
   Json& add(std::string_view key, const std::vector<double>& numbers);
   Json& add_null(std::string_view key) { return put(key, "null"); }
+  // All members of the other, behind those that are there.
+  Json& merge(const Json& other);
 
   std::string text() const;        // on one line
   std::string text_lines() const;  // for people to read: each member on a line of its own, with a newline at the end

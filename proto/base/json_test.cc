@@ -33,6 +33,12 @@ TEST(Json, NumbersAreReadBackExactly) {
   EXPECT_EQ(Json().add("nan", std::numeric_limits<double>::quiet_NaN()).text(), R"({"nan":null})");
 }
 
+TEST(Json, RoundsAndMerges) {
+  EXPECT_EQ(Json().add("a", 1.23456, 3).add("b", -0.0004, 3).add("c", std::nullopt, 3).text(),
+            R"({"a":1.235,"b":0,"c":null})");
+  EXPECT_EQ(Json().add("a", 1).merge(Json().add("b", 2)).text(), R"({"a":1,"b":2})");
+}
+
 TEST(Json, ListsHoldObjectsOrTexts) {
   EXPECT_EQ(Json().add("l", std::vector<Json>{Json().add("a", 1), Json()}).text(), R"({"l":[{"a":1},{}]})");
   EXPECT_EQ(Json().add("l", std::vector<std::string>{"a", "\""}).text(), R"({"l":["a","\""]})");

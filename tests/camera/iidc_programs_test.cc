@@ -87,9 +87,9 @@ class Drive {
 };
 
 double number_of(const std::string& json, const std::string& key) {
-  const std::size_t at = json.find("\"" + key + "\": ");
+  const std::size_t at = json.find("\"" + key + "\":");
   if (at == std::string::npos) throw std::runtime_error("no " + key + " in " + json);
-  return std::stod(json.substr(at + key.size() + 4));
+  return std::stod(json.substr(at + key.size() + 3));
 }
 
 double cpu_of_children() {
@@ -154,7 +154,7 @@ TEST_F(IidcPrograms, WhatACameraShowsBecomesAMapThatClosesItsLoop) {
   EXPECT_EQ(frontend.wait(30s), 4) << read_text(folder_ / "errors");
   const std::string summary = read_text(folder_ / "summary");
   std::cout << summary;
-  EXPECT_NE(summary.find("\"lost\": 0, \"reopened\": 0, \"begun_anew\": 0"), std::string::npos);
+  EXPECT_NE(summary.find("\"lost\":0,\"reopened\":0,\"begun_anew\":0"), std::string::npos);
   EXPECT_GE(number_of(summary, "tracked"), 0.9 * kPairs);
   EXPECT_EQ(testbed.counters(camera).lost, 0u);
   const auto client = daemon->client();
@@ -188,7 +188,7 @@ TEST_F(IidcPrograms, TheFrontEndGoesOnWhereTheCameraIsPluggedInAgain) {
   const std::string summary = read_text(folder_ / "summary"), errors = read_text(folder_ / "errors");
   EXPECT_EQ(number_of(summary, "reopened"), 1) << summary;
   EXPECT_NE(errors.find("CAMERA_GONE"), std::string::npos) << errors;
-  EXPECT_NE(summary.find("\"CAMERA_GONE\": 1"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"CAMERA_GONE\":1"), std::string::npos) << summary;
   EXPECT_GE(number_of(summary, "pairs"), 45);
 }
 
@@ -212,8 +212,8 @@ TEST_F(IidcPrograms, ExchangedEyesAreReportedWhileTheCameraGoesOn) {
   frontend.signal(SIGINT);
   frontend.wait(20s);
   const std::string summary = read_text(folder_ / "summary");
-  EXPECT_NE(summary.find("\"findings\": [{\"reason\": \"NOT_STEREO\""), std::string::npos) << summary;
-  EXPECT_NE(summary.find("\"trusted\": false"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"findings\":[{\"reason\":\"NOT_STEREO\""), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"trusted\":false"), std::string::npos) << summary;
 }
 
 TEST_F(IidcPrograms, AMissingCameraIsReportedAtOnce) {

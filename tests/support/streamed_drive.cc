@@ -30,9 +30,9 @@ StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz, int e
 }
 
 double StreamedDrive::summary(const std::string& key) const {
-  const std::size_t at = summary_.find("\"" + key + "\": ");
+  const std::size_t at = summary_.find("\"" + key + "\":");
   if (at == std::string::npos) throw std::runtime_error("no " + key + " in " + summary_);
-  return std::stod(summary_.substr(at + key.size() + 4));
+  return std::stod(summary_.substr(at + key.size() + 3));
 }
 
 // Recordings may leave numbers out.

@@ -136,14 +136,12 @@ class Features {
   bool first_ = true;
 };
 
-double rounded(double value, double unit) { return std::round(value / unit) * unit; }
-
 std::string tear_json(const Tear& tear) {
   return Json()
       .add("edge", tear.edge.to_string())
-      .add("metres", rounded(tear.metres, 1e-4))
-      .add("degrees", rounded(tear.degrees, 1e-3))
-      .add("sigmas", rounded(tear.sigmas, 1e-2))
+      .add("metres", tear.metres, 4)
+      .add("degrees", tear.degrees, 3)
+      .add("sigmas", tear.sigmas, 2)
       .text();
 }
 
@@ -151,7 +149,7 @@ std::string step_json(const DoubtfulStep& step) {
   Json json;
   json.add("edge", step.edge.to_string());
   if (step.carried_by.empty()) {
-    json.add("guess", step.guess).add("sigma", rounded(step.sigma_m, 1e-3));
+    json.add("guess", step.guess).add("sigma", step.sigma_m, 3);
   } else {
     std::vector<std::string> carried_by;
     for (const EdgeId id : step.carried_by) carried_by.push_back(id.to_string());
