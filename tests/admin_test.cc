@@ -325,7 +325,7 @@ TEST_F(Admin, AnInterruptedBackupIsNeverMistakenForACompleteOne) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5 * attempt));
     const bool hard = attempt % 2 == 1;
     backup.signal(hard ? SIGKILL : SIGINT);
-    const int code = backup.wait(std::chrono::seconds(20)).value_or(-1);
+    const int code = backup.wait(std::chrono::seconds(60)).value_or(-1);
     EXPECT_THAT(code, ::testing::AnyOf(kFine, kInterrupted, 128 + SIGKILL)) << read_text(folder_ / "admin.err");
     interrupted += code != kFine;
     if (!hard) {
@@ -388,7 +388,7 @@ TEST_F(Admin, ReindexCompletesAfterAKillHalfWay) {
     while (reindex.running() && read_text(folder_ / "admin.err").find("words") == std::string::npos)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     reindex.kill();
-    return reindex.wait(std::chrono::seconds(20)) == 128 + SIGKILL;
+    return reindex.wait(std::chrono::seconds(60)) == 128 + SIGKILL;
   };
   int attempts = 0;  // it may be done before the kill comes
   while (!killed_half_way()) {

@@ -93,7 +93,7 @@ class BatchIngest : public ::testing::Test {
         batch.reset();
       } else if (interrupted % 3 == 1) {
         batch->signal(SIGTERM);
-        EXPECT_TRUE(batch->wait(seconds(20)));
+        EXPECT_TRUE(batch->wait(seconds(60)));
         batch.reset();
       } else {  // relmap goes on when it is back
         daemon->process().kill();
@@ -278,7 +278,7 @@ TEST_F(BatchIngest, TheSameCommandResumesWithAnyOptions) {
     const auto begun = [&] { return daemon.client()->sessions().or_throw().size(); };
     while (batch.running() && begun() < sessions + 2) std::this_thread::sleep_for(milliseconds(2));
     batch.signal(signal);
-    ASSERT_TRUE(batch.wait(seconds(20))) << text;
+    ASSERT_TRUE(batch.wait(seconds(60))) << text;
     const Finished rest = run(command(options.data, more));
     EXPECT_EQ(rest.exit_code, 0) << text << rest.standard_error;
     sessions += drives_.size();

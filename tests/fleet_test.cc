@@ -1,6 +1,6 @@
 // Twenty robots send to one daemon over a network that loses, delays and doubles datagrams: nothing is lost or doubled,
-// and keyframes are soon acknowledged, even if daemon and robots are killed or others make trouble. "Soon" is relative
-// to another run on the same machine in the same minute; the rate depends on what the machine can carry at that time.
+// little is sent again, and what a robot sent does not pile up, even if daemon and robots are killed or others make
+// trouble. How much is sent depends on the machine; latencies in seconds are measured by `relmap-bench fleet`.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/support/bench_figures.h"
+#include "tests/support/published.h"
 
 namespace relmap::testing {
 namespace {
@@ -54,22 +55,24 @@ void expect_all_there_once(const BenchFigures& figures) {
   EXPECT_EQ(figures["given_up"], 0);
 }
 
-bool at_most(double value, double times, double reference, const char* what) {
-  std::printf("%s: %.1f, %.1f times %.1f\n", what, value, value / reference, reference);
-  return value <= times * reference;
+// Whoever is starved has nearly all that it sent waiting; else it is what is on its way.
+bool piles_up(const BenchFigures& figures) {
+  std::printf("waiting at the end: %.0f of %.0f\n", figures["waiting_at_end"], figures["sent"]);
+  return figures["waiting_at_end"] > 0.25 * figures["sent"];
 }
 
 // Four of five keyframes lose a part, which is sent again.
 TEST(Fleet, LosesNothingOverABadNetwork) {
   expect_in_a_round([](double share) {
-    const double rate = kRate * share;
-    const BenchFigures good = fleet(5, rate, {"--loss", "0", "--reorder", "0", "--double", "0"});
-    const BenchFigures bad = fleet(15, rate);
+    const BenchFigures bad = fleet(15, kRate * share);
     expect_all_there_once(bad);
     EXPECT_GT(bad["resent_share"], 0.03) << "the network was not bad";
     EXPECT_GT(bad["closures"], 0) << "the map had nothing to do";
     EXPECT_LE(bad["daemon_resident_mb"], bad["memory_budget_mb"]);
-    return at_most(bad["ack_p99_ms"], 40, good["ack_p99_ms"], "acknowledged after, p99, bad and good network");
+    // Processor time of the daemon, in that of a fixed piece of work.
+    const double cost = published_figure("docs/figures.md", "over that of sorting a million numbers \\| ([0-9.]+) \\|");
+    const double again = published_figure("docs/figures.md", "share of bytes sent again \\| ([0-9.]+) %") / 100;
+    return !piles_up(bad) && bad["resent_share"] <= 1.5 * again && bad["cpu_over_sorting"] <= 1.5 * cost;
   });
 }
 
@@ -105,10 +108,7 @@ TEST(Fleet, WhoFloodsOrSendsGarbageHurtsNobodyElse) {
     const BenchFigures flooded = fleet(
         6, rate, {"--flood", std::to_string(100 * share * share), "--garbage", std::to_string(200 * share * share)});
     expect_all_there_once(flooded);
-    return flooded["sent"] >= 0.8 * quiet["sent"] &&
-           at_most(flooded["ack_p50_ms"], 3, quiet["ack_p50_ms"],
-                   "acknowledged after, p50, with a flood and without") &&
-           at_most(flooded["ack_p99_ms"], 3, quiet["ack_p99_ms"], "acknowledged after, p99, with a flood and without");
+    return flooded["sent"] >= 0.8 * quiet["sent"] && !piles_up(flooded);
   });
 }
 

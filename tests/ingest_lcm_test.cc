@@ -101,7 +101,7 @@ TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
         start_daemon();
       }
     }
-    const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + seconds(20));
+    const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + seconds(60));
     EXPECT_TRUE(summary.all_settled());
     EXPECT_EQ(summary.settled, 60u);
     EXPECT_TRUE(summary.refused.empty());
@@ -127,7 +127,7 @@ TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {
   EXPECT_EQ((*publisher)->last_keyframe()->sequence, 9u);
   EXPECT_EQ((*publisher)->progress().spooled, 10u);
   ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 10)).ok());
-  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + seconds(20)).all_settled());
+  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + seconds(60)).all_settled());
   EXPECT_EQ(sink_.journal().size(), 11u);
 }
 
@@ -142,7 +142,7 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
     heard.push_back(news);
   });
   ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
-  ASSERT_TRUE((*publisher)->finish(steady_clock::now() + seconds(20)).all_settled());
+  ASSERT_TRUE((*publisher)->finish(steady_clock::now() + seconds(60)).all_settled());
 
   storage::Edge closure;
   closure.a = {1, 3};

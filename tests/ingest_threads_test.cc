@@ -168,7 +168,7 @@ TEST_F(IngestThreadsTest, EverythingSettlesThroughLossAndRestarts) {
       start_daemon();
     }
   }
-  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(60));
   asking = false;
   reader.join();
   EXPECT_TRUE(summary.all_settled());
@@ -184,9 +184,9 @@ TEST_F(IngestThreadsTest, TheSessionEndIsRepeatedUntilItIsAcknowledged) {
   const auto publisher = start_publisher();
   start_daemon();
   ASSERT_TRUE(publisher->push(keyframe(publisher->session(), 0)).ok());
-  EXPECT_TRUE(publisher->finish(steady_clock::now() + seconds(30)).all_settled());
+  EXPECT_TRUE(publisher->finish(steady_clock::now() + seconds(60)).all_settled());
   const auto begin = steady_clock::now();
-  EXPECT_TRUE(publisher->end_session(begin + seconds(30)));
+  EXPECT_TRUE(publisher->end_session(begin + seconds(60)));
   EXPECT_GE(steady_clock::now() - begin, milliseconds(400));
 }
 
@@ -194,7 +194,7 @@ TEST_F(IngestThreadsTest, AnUnacknowledgedSessionEndDoesNotBlock) {
   const auto publisher = start_publisher();
   EXPECT_FALSE(publisher->end_session(steady_clock::now() + milliseconds(100)));
   publisher->interrupt();
-  EXPECT_FALSE(publisher->end_session(steady_clock::now() + seconds(30)));
+  EXPECT_FALSE(publisher->end_session(steady_clock::now() + seconds(60)));
 }
 
 TEST_F(IngestThreadsTest, WithoutADiskARunBeginsAnewAndSettlesTheRest) {
@@ -205,7 +205,7 @@ TEST_F(IngestThreadsTest, WithoutADiskARunBeginsAnewAndSettlesTheRest) {
   const auto run = [&](std::uint32_t keyframes) {
     const auto publisher = start_publisher(uuid);
     for (std::uint32_t s = 0; s < keyframes; ++s) EXPECT_TRUE(publisher->push(keyframe(publisher->session(), s)).ok());
-    const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+    const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(60));
     EXPECT_TRUE(summary.all_settled());
     EXPECT_EQ(summary.settled, keyframes);
     EXPECT_TRUE(summary.refused.empty());
@@ -223,7 +223,7 @@ TEST_F(IngestThreadsTest, LiveSourceGivesUpTheOldestAndSaysSo) {
     ASSERT_TRUE(publisher->push(keyframe(publisher->session(), s)).ok());
   EXPECT_GT(publisher->progress().gaps, 50u);
   start_daemon();
-  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(60));
   EXPECT_TRUE(summary.all_settled());
   EXPECT_EQ(summary.settled, 100u);
   EXPECT_EQ(server_->stats().sequences_given_up, summary.gaps);
@@ -248,7 +248,7 @@ TEST_F(IngestThreadsTest, SourceThatCanWaitIsPausedUntilInterrupted) {
   publisher->interrupt();
   source.join();
   EXPECT_EQ(last.reason(), Reason::SHUTTING_DOWN);
-  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));  // returns at once
+  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(60));  // returns at once
   EXPECT_FALSE(summary.all_settled());
   EXPECT_FALSE(summary.heard);
 }
@@ -264,7 +264,7 @@ TEST_F(IngestThreadsTest, PushRefusesOtherSessionsAndWrongOrder) {
   other.uuid.bytes.fill(1);
   EXPECT_EQ(publisher->push(keyframe(other, 6)).reason(), Reason::INVALID_ARGUMENT);
   start_daemon();
-  EXPECT_TRUE(publisher->finish(steady_clock::now() + seconds(30)).all_settled());
+  EXPECT_TRUE(publisher->finish(steady_clock::now() + seconds(60)).all_settled());
   EXPECT_EQ(server_->stats().sequences_given_up, 5u);
 }
 

@@ -40,7 +40,7 @@ TEST(StampFilter, ContinuesWhenTheClockWasSetBack) {
   Result<std::int64_t> admitted = filter.admit(stamp);
   for (; !admitted.ok() && refused < 20; ++refused) admitted = filter.admit(stamp += kStep);
   ASSERT_TRUE(admitted.ok());
-  EXPECT_LE(refused, 5);
+  EXPECT_EQ(refused, 4);  // the fifth is believed
   // The pairs refused took their time.
   EXPECT_EQ(admitted.value(), last + (refused + 1) * kStep);
   EXPECT_EQ(filter.admit(stamp + kStep).value(), last + (refused + 2) * kStep);

@@ -59,8 +59,8 @@ TEST(Template, IsGoodToATwentiethOfAPixelACoordinate) {
   const double rms_x = std::sqrt(squares_x / count), rms_y = std::sqrt(squares_y / count);
   RecordProperty("rms_x_px", std::to_string(rms_x));
   RecordProperty("rms_y_px", std::to_string(rms_y));
-  EXPECT_LE(rms_x, 0.05);
-  EXPECT_LE(rms_y, 0.05);
+  EXPECT_LE(rms_x, 0.045);  // 0.030 and 0.028 are published (docs/frontend.md)
+  EXPECT_LE(rms_y, 0.042);
 }
 
 TEST(Template, FollowsScaleAndTurnThroughTheWarp) {

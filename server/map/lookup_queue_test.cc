@@ -39,7 +39,7 @@ class LookupQueueTest : public ::testing::Test {
   }
   void wait() {
     std::unique_lock lock(mutex_);
-    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(50), [this] { return queue_.waiting() == 0; }));
+    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [this] { return queue_.waiting() == 0; }));
   }
   int lookups_of(FrameId frame) {
     const std::lock_guard lock(mutex_);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <cstdio>
 
 #include "storage/graph/observers.h"
 #include "storage/graph/precision.h"
@@ -164,21 +165,27 @@ TEST(Relax, RefreshesThePriorOfWellSupportedEdges) {
 }
 
 TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
-  testing::SimulatedDrive drive(circle(400, 120), RbaOptions());
-  drive.drive();
   double nees = 0;
   int edges = 0;
-  for (std::uint32_t i = 10; i < 115; ++i) {
-    const auto hot = drive.map().hot(drive.frame(i));
-    const storage::Edge& edge = hot->edges.front();
-    const SE3 truth = drive.world().T_world_frame(i - 1).inverse() * drive.world().T_world_frame(i);
-    const Vector6 error = (truth.inverse() * edge.T_ab).log();
-    nees += error.dot(edge.covariance.llt().solve(error));
-    ++edges;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    sim::PointsWorldOptions options = circle(400, 120);
+    options.noise_seed = seed;
+    testing::SimulatedDrive drive(options, RbaOptions());
+    drive.drive();
+    for (std::uint32_t i = 10; i < 115; ++i) {
+      const auto hot = drive.map().hot(drive.frame(i));
+      const storage::Edge& edge = hot->edges.front();
+      const SE3 truth = drive.world().T_world_frame(i - 1).inverse() * drive.world().T_world_frame(i);
+      const Vector6 error = (truth.inverse() * edge.T_ab).log();
+      nees += error.dot(edge.covariance.llt().solve(error));
+      ++edges;
+    }
   }
-  // Six expected; conservative estimates lie below. The covariance is that of the solve in which the edge was new.
-  EXPECT_LT(nees / edges, 12);
-  EXPECT_GT(nees / edges, 1.5);
+  // Six expected, of 525 edges with a deviation of 0.15; conservative estimates lie below. The covariance is that of
+  // the solve in which the edge was new. (docs/rba.md has 5.9 of the figure eight.)
+  std::printf("normalised squared error of %d edges: %.3f\n", edges, nees / edges);
+  EXPECT_LT(nees / edges, 7);
+  EXPECT_GT(nees / edges, 5);
 }
 
 // Errors of neighbours pull against each other: counted as independent, they would make chains look less certain.

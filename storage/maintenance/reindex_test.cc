@@ -149,7 +149,7 @@ TEST_F(ReindexTest, WhatTheJournalStillHoldsGetsItsWordsWhenItIsApplied) {
   const auto budget = std::make_shared<Budget>(std::size_t{256} << 20);
   EXPECT_EQ(map::Mapper::open(engine, budget, former_, {}).reason(), Reason::WRONG_VOCABULARY);
   const auto mapper = map::Mapper::open(engine, budget, other_, {}).or_throw();
-  ASSERT_TRUE(mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(30)).ok());
+  ASSERT_TRUE(mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(60)).ok());
   const auto last = mapper->view()->cold({map::kDriveSession, kFrames});
   ASSERT_TRUE(last);
   EXPECT_EQ(last->words, other_->words(last->appearance));

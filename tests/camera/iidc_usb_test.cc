@@ -264,12 +264,18 @@ TEST_F(LongIidcUsb, StreamsForAMinuteWithoutLossOrTear) {
   stream(testbed_, live.get(), camera, 60);
 }
 
+std::int64_t utc_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
 TEST_F(IidcUsb, StampsFramesByTheCamerasClock) {
   SimulatedCameraOptions options;
   options.clock_drift_ppm = 60;
   plug(options);
   LiveOptions wish;
   wish.wish.rate_hz = 20;
+  const std::int64_t begin = utc_us();
   const auto live = open(wish);
   ASSERT_TRUE(live);
   EXPECT_TRUE(live->stamped());
@@ -282,11 +288,8 @@ TEST_F(IidcUsb, StampsFramesByTheCamerasClock) {
   for (std::size_t i = 30; i < seen.times_us.size(); ++i)
     worst = std::max(worst, std::abs(static_cast<double>(seen.times_us[i] - seen.times_us[i - 1]) - interval));
   EXPECT_LT(worst, 2000) << "us";
-  const std::int64_t now =
-      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-          .count();
-  EXPECT_LT(now - seen.times_us.back(), 200'000);
-  EXPECT_GT(now - seen.times_us.back(), 0);
+  EXPECT_GT(seen.times_us.front(), begin) << "no frame was taken before the camera was asked for it";
+  EXPECT_LT(seen.times_us.back(), utc_us()) << "nor after it came";
 }
 
 struct Fault {
@@ -492,13 +495,14 @@ TEST_F(IidcUsb, StopsSoonWhileTheCameraIsAway) {
     std::this_thread::sleep_for(500ms);
     stop_ = true;
   });
-  const auto begin = std::chrono::steady_clock::now();
+  int asked_since = 0;  // while it is asked to stop
   for (;;) {
+    asked_since += stop_;
     const auto frame = live->next();
     if (frame.ok() && !frame->has_value()) break;
   }
   stopper.join();
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, 1500ms);
+  EXPECT_LE(asked_since, 1);
 }
 
 void replug(UsbTestbed& testbed, iidc::LiveCamera* live, const std::shared_ptr<SimulatedCamera>& camera, int cycles) {

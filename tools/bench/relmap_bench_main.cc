@@ -14,6 +14,8 @@ using relmap::bench::Subcommand;
 const Subcommand kSubcommands[] = {
     {"answers", "Ask a running daemon about the drive it has mapped, and compare with the truth",
      relmap::bench::declare_answers},
+    {"capture", "A live stereo camera: what a pair costs until it is recorded, until it is tracked, and what gets lost",
+     relmap::bench::declare_capture},
     {"closures", "Propose the loop closures of a pose graph, some of them false, to a map",
      relmap::bench::declare_closures},
     {"drive", "Compare the map of a recording, in the folder of a stopped daemon, with the truth",

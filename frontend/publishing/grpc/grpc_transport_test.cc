@@ -44,7 +44,7 @@ grpc::Status daemon_error(grpc::StatusCode code, Reason reason, const std::strin
 }
 
 template <typename Condition>
-bool eventually(Condition condition, milliseconds limit = seconds(10)) {
+bool eventually(Condition condition, milliseconds limit = seconds(60)) {
   for (const auto end = steady_clock::now() + limit; steady_clock::now() < end;
        std::this_thread::sleep_for(milliseconds(5)))
     if (condition()) return true;
@@ -72,7 +72,7 @@ class GrpcTransportTest : public testing::Test {
   static void push(Publisher& publisher, std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t s = first; s <= last; ++s) ASSERT_TRUE(publisher.push(keyframe(s)).ok());
   }
-  static PublishSummary finish(Publisher& publisher) { return publisher.finish(steady_clock::now() + seconds(20)); }
+  static PublishSummary finish(Publisher& publisher) { return publisher.finish(steady_clock::now() + seconds(60)); }
   void write_endpoint(const std::string& boot) const {
     std::ofstream(folder_ / "endpoint") << "address " << daemon_.address() << "\npid 1\nboot " << boot << "\n";
   }
@@ -297,7 +297,7 @@ TEST_F(GrpcTransportTest, TheEndOfASessionIsSentUntilItIsConfirmed) {
   push(*started, 0, 9);
   EXPECT_TRUE(finish(*started).all_settled());
   const auto begin = steady_clock::now();
-  EXPECT_TRUE(started->end_session(begin + seconds(10)));
+  EXPECT_TRUE(started->end_session(begin + seconds(60)));
   EXPECT_GE(steady_clock::now() - begin, milliseconds(400));
   {
     const auto held = daemon_.lock();
@@ -365,7 +365,7 @@ TEST_F(GrpcTransportTest, ADaemonOfAnotherMapGetsNothing) {
   EXPECT_FALSE(started->end_session(steady_clock::now() + milliseconds(500)));
   started.reset();
   started = publisher(folder());  // nor by the next process
-  EXPECT_EQ(started->await_map(steady_clock::now() + seconds(10)).reason(), Reason::WRONG_MAP);
+  EXPECT_EQ(started->await_map(steady_clock::now() + seconds(60)).reason(), Reason::WRONG_MAP);
   EXPECT_EQ(started->finish(steady_clock::now() + milliseconds(500)).unsettled, 20u);  // as far as it has heard
   {
     const auto held = daemon_.lock();
@@ -399,13 +399,13 @@ TEST_F(GrpcTransportTest, ARecordingMustBeginAnewInAnotherMap) {
   daemon_.start(2);
   {
     const auto second = publisher();
-    EXPECT_EQ(second->await_map(steady_clock::now() + seconds(10)).reason(), Reason::MAP_RESTORED);
+    EXPECT_EQ(second->await_map(steady_clock::now() + seconds(60)).reason(), Reason::MAP_RESTORED);
     EXPECT_EQ(second->push(keyframe(10)).reason(), Reason::MAP_RESTORED);
-    EXPECT_EQ(second->finish(steady_clock::now() + seconds(10)).session.reason(), Reason::MAP_RESTORED);
+    EXPECT_EQ(second->finish(steady_clock::now() + seconds(60)).session.reason(), Reason::MAP_RESTORED);
   }
   options_.begin_anew = true;
   const auto third = publisher();
-  EXPECT_TRUE(third->await_map(steady_clock::now() + seconds(10)).ok());
+  EXPECT_TRUE(third->await_map(steady_clock::now() + seconds(60)).ok());
   EXPECT_EQ(third->next_sequence(), 0u);
   EXPECT_EQ(third->session().uuid, header().uuid);
   push(*third, 0, 12);

@@ -55,7 +55,7 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
   index->start();
   std::mt19937 random(1);
   for (int round = 0; round < 30; ++round) {
-    ASSERT_TRUE(round % 3 || index->wait_current(Clock::now() + 30s));
+    ASSERT_TRUE(round % 3 || index->wait_current(Clock::now() + 60s));
     const auto map = index->snapshot();
     if (round % 3 == 0) {
       EXPECT_TRUE(map.stale.empty());
@@ -67,7 +67,7 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
     town.drive(90);
     town.change(random);
   }
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   EXPECT_EQ(index->snapshot().overlay->tree().chunks(), 4 * ((200 + 30 * 90 + 63) / storage::kFramesPerChunk));
   EXPECT_GT(town.budget().used(storage::Share::kRoutes), 0u);
 }
@@ -77,11 +77,11 @@ TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
   town.drive(1000);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   std::mt19937 random(4);
   for (std::uint32_t round = 0; town.map().session(2)->frames > 0; ++round) {
     town.remove_chunk(2);
-    ASSERT_TRUE(round % 2 == 0 || index->wait_current(Clock::now() + 30s));
+    ASSERT_TRUE(round % 2 == 0 || index->wait_current(Clock::now() + 60s));
     const auto map = index->snapshot();
     const auto some_frame = [&] {
       FrameId id = town.random_frame(random);
@@ -90,7 +90,7 @@ TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
     };
     for (int i = 0; i < 10; ++i) expect_as_dijkstra(map, random() % kMetrics.size(), some_frame(), some_frame());
   }
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   EXPECT_EQ(index->snapshot().overlay->outdated(), 0u);
 }
 
@@ -100,7 +100,7 @@ TEST(RouteIndex, IsRightWhileTheMapChanges) {
   town.drive(600);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   std::atomic<int> asked = 0;
   std::vector<std::thread> askers;
   for (int asker = 0; asker < 2; ++asker)
@@ -131,7 +131,7 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   std::mt19937 random(3);
   for (int i = 0; i < 60; ++i) {
     if (i % 10 == 0) town.change(random);
@@ -193,7 +193,7 @@ TEST(RouteIndex, HasNoCellsWhereNotEvenItsTablesFit) {
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   const auto map = index->snapshot();
   EXPECT_FALSE(map.overlay);
   EXPECT_NE(map.missing_because.find("memory_budget_mb"), std::string::npos) << map.missing_because;
@@ -208,10 +208,10 @@ TEST(RouteIndex, YieldsToOtherSharesAndComesBack) {
   town.drive(1000);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   ASSERT_TRUE(index->snapshot().overlay);
   const auto until = [&](bool there) {
-    for (const auto end = Clock::now() + 30s; Clock::now() < end; std::this_thread::sleep_for(1ms))
+    for (const auto end = Clock::now() + 60s; Clock::now() < end; std::this_thread::sleep_for(1ms))
       if (bool(index->snapshot().overlay) == there) return true;
     return false;
   };
@@ -232,10 +232,10 @@ TEST(RouteIndex, IsMadeAnewWhenMostOfTheMapIsNew) {
   town.drive(100);
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   town.drive(2500);
   std::mt19937 random(5);
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   for (int i = 0; i < 20; ++i)
     expect_as_dijkstra(index->snapshot(), 1, town.random_frame(random), town.random_frame(random));
 }
@@ -246,9 +246,9 @@ TEST(RouteIndex, TriesAgainWhenTheMapCannotBeRead) {
   const auto index = town.index();
   town.views_fail = true;
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   town.views_fail = false;
-  for (const auto end = Clock::now() + 30s; !index->snapshot().overlay && Clock::now() < end;)
+  for (const auto end = Clock::now() + 60s; !index->snapshot().overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
   ASSERT_TRUE(index->snapshot().overlay);
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 299});
@@ -262,16 +262,16 @@ TEST(RouteIndex, MakesDamagedCellsAnew) {
   town.drive(2000);
   const auto index = town.index(folder);
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   const std::string path = folder + "/routes/cells";
   const std::string nothing(std::filesystem::file_size(path), '\0');
   std::fstream(path, std::ios::in | std::ios::out | std::ios::binary) << nothing;
   const auto map = index->snapshot();
   EXPECT_THROW(expect_as_dijkstra(map, 0, {1, 0}, {4, 1999}), StatusError);
-  for (const auto end = Clock::now() + 30s; index->snapshot().overlay == map.overlay && Clock::now() < end;)
+  for (const auto end = Clock::now() + 60s; index->snapshot().overlay == map.overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
-  for (const auto end = Clock::now() + 30s; !index->snapshot().overlay && Clock::now() < end;)
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
+  for (const auto end = Clock::now() + 60s; !index->snapshot().overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 1999});
 }
@@ -295,7 +295,7 @@ TEST(RouteIndex, IsKeptAfterARunThatEndsInOrder) {
     return info.st_ino;
   };
   const auto await = [&](const RouteIndex& index) {
-    ASSERT_TRUE(index.wait_current(Clock::now() + 30s));
+    ASSERT_TRUE(index.wait_current(Clock::now() + 60s));
     ASSERT_TRUE(index.snapshot().overlay);
   };
   {
@@ -372,7 +372,7 @@ TEST(RouteIndex, HasNoCellsOnAFullDisk) {
   town.room_for_others = std::uint64_t{1} << 62;
   const auto index = town.index(folder);
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   const auto map = index->snapshot();
   EXPECT_FALSE(map.overlay);
   EXPECT_NE(map.missing_because.find("disk"), std::string::npos) << map.missing_because;
@@ -385,12 +385,12 @@ TEST(RouteIndex, GrowsFromAnEmptyMap) {
   LiveTown town;
   const auto index = town.index();
   index->start();
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   for (int i = 0; i < 10; ++i) {
     town.drive(40);
     expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {1, static_cast<std::uint32_t>(40 * i)});
   }
-  ASSERT_TRUE(index->wait_current(Clock::now() + 30s));
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 399});
 }
 

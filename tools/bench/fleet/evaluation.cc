@@ -63,6 +63,24 @@ std::vector<double> latencies_ms(const std::map<std::uint32_t, RobotDeeds>& robo
   return latencies;
 }
 
+std::uint64_t waiting_at(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t at_ns) {
+  std::uint64_t waiting = 0;
+  for (const auto& [number, robot] : robots)
+    for (const auto& [sequence, pushed] : robot.pushed_ns) {
+      if (pushed >= at_ns) continue;
+      const auto settled = robot.settled_ns(sequence);
+      waiting += !settled || *settled >= at_ns;
+    }
+  return waiting;
+}
+
+std::uint64_t pushed_since(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t from_ns) {
+  std::uint64_t count = 0;
+  for (const auto& [number, robot] : robots)
+    for (const auto& [sequence, pushed] : robot.pushed_ns) count += pushed >= from_ns;
+  return count;
+}
+
 double settled_after_s(const RobotDeeds& robot, std::int64_t at_ns) {
   double last = 0;
   for (const auto& [sequence, pushed] : robot.pushed_ns) {

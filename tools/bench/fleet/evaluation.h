@@ -33,6 +33,11 @@ std::map<std::uint32_t, RobotDeeds> by_robot(const std::vector<Deed>& deeds);
 std::vector<double> latencies_ms(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t from_ns,
                                  std::int64_t to_ns);
 
+// Keyframes pushed before `at_ns` that were not acknowledged by then.
+std::uint64_t waiting_at(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t at_ns);
+// Keyframes pushed from `from_ns` on.
+std::uint64_t pushed_since(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t from_ns);
+
 // Seconds from `at_ns` until everything pushed before it was settled; infinity if it never was.
 double settled_after_s(const RobotDeeds& robot, std::int64_t at_ns);
 double settled_after_s(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t at_ns);

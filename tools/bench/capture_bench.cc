@@ -1,0 +1,134 @@
+// relmap-bench capture: what a live stereo camera costs, on the way from the bus to a recording and to tracked pairs,
+// and what gets lost. The camera is simulated by a process of its own, which does not count.
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/simulated_recording.h"
+#include "tools/bench/subcommand.h"
+
+namespace relmap::bench {
+
+namespace {
+
+struct Options {
+  std::uint64_t pairs = 200;
+  double rate = 20;
+};
+
+// By key, of a flat JSON object or of the first one in it that has the key.
+double number_of(const std::string& json, const std::string& key) {
+  for (const std::string& label : {"\"" + key + "\": ", "\"" + key + "\":"})
+    if (const std::size_t at = json.find(label); at != std::string::npos)
+      return std::stod(json.substr(at + label.size()));
+  throw std::runtime_error("no " + key + " in " + json);
+}
+
+struct Cost {
+  double pairs = 0;  // that the program had
+  double cpu_s = 0;  // of the program
+  double lost = 0;   // on the bus
+  std::string output;
+};
+
+class CaptureBench {
+ public:
+  explicit CaptureBench(const Options& options) : options_(options) {
+    testing::record_simulation(folder_ / "drive", {"--seed", "5", "--pairs", "60", "--laps", "0.5", "--step", "0.25"});
+    std::filesystem::create_directories(folder_ / "cameras/12345678");
+    std::filesystem::copy_file(folder_ / "drive/calib.txt", folder_ / "cameras/12345678/calib.txt");
+  }
+
+  // 640 x 480 x 2: received, stamped, checksummed and written to a file.
+  Cost record(std::uint64_t pairs) {
+    Cost cost = at_camera({}, {testing::built_program("relmap-camera"), "--cameras", folder_ / "cameras", "--json",
+                               "--quiet", "record", file("raw"), "--frames", std::to_string(pairs)});
+    cost.pairs = number_of(cost.output, "frames");
+    cost.lost += number_of(cost.output, "lost") + number_of(cost.output, "dropped");
+    return cost;
+  }
+
+  // 512 x 384 x 2, a street: received, taken apart, tracked, keyframes described.
+  Cost track(std::uint64_t pairs) {
+    Cost cost = at_camera({"--drive", folder_ / "drive", "--pairs", std::to_string(pairs)},
+                          {testing::built_program("relmap-frontend"), "--source", "iidc", "--cameras",
+                           folder_ / "cameras", "--robot", "bench", "--out", file("keyframes"), "--json", "--quiet"});
+    cost.pairs = number_of(cost.output, "tracked");
+    // "lost" of the camera stands in its own object, behind that of pairs whose pose does not come from vision.
+    cost.lost +=
+        number_of(cost.output.substr(cost.output.find("\"camera\"")), "lost") + number_of(cost.output, "dropped");
+    return cost;
+  }
+
+ private:
+  std::string file(const std::string& ending) { return folder_ / (std::to_string(++runs_) + "." + ending); }
+
+  Cost at_camera(std::vector<std::string> camera, const std::vector<std::string>& command) {
+    const std::string output = file("out"), errors = file("err"), report = file("json");
+    std::vector<std::string> all{testing::built_program("relmap-simulated-camera"),
+                                 "--rate",
+                                 std::to_string(options_.rate),
+                                 "--output",
+                                 output,
+                                 "--errors",
+                                 errors,
+                                 "--report",
+                                 report};
+    all.insert(all.end(), camera.begin(), camera.end());
+    all.emplace_back("--");
+    all.insert(all.end(), command.begin(), command.end());
+    const testing::Finished done = testing::run_program(all, std::chrono::hours(1));
+    if (done.exit_code != 0) throw std::runtime_error(done.standard_error);
+    const std::string said = testing::read_text(report);
+    const double code = number_of(said, "exit_code");
+    if (code != 0 && code != 4)  // 4: interrupted
+      throw std::runtime_error(command.front() + ": " + testing::read_text(errors));
+    return {0, number_of(said, "cpu_s"), number_of(said, "lost"), testing::read_text(output)};
+  }
+
+  const Options options_;
+  const storage::TemporaryFolder folder_;
+  int runs_ = 0;
+};
+
+// What starting costs is left out: it is that of a short run.
+double ms_per_pair(const Cost& all, const Cost& start) {
+  return 1e3 * (all.cpu_s - start.cpu_s) / (all.pairs - start.pairs);
+}
+
+void run(const Options& options, Report& report) {
+  CaptureBench bench(options);
+  const std::uint64_t few = 20;
+  const Cost recorded_few = bench.record(few), recorded = bench.record(few + options.pairs);
+  const Cost tracked_few = bench.track(few), tracked = bench.track(few + options.pairs);
+  const double record_ms = ms_per_pair(recorded, recorded_few), track_ms = ms_per_pair(tracked, tracked_few);
+  report.add("rate_hz", options.rate, "of the camera");
+  report.add("record_pairs", recorded.pairs, "of 640 x 480 x 2, grey");
+  report.add("record_cpu_ms_per_pair", record_ms, "received, stamped, checksummed, written: relmap-camera record");
+  report.add("record_core_percent", record_ms * options.rate / 10, "of a core, at that rate");
+  report.add("record_lost_pairs", recorded_few.lost + recorded.lost, "on the bus, by the camera, for want of a disk");
+  report.add("track_pairs", tracked.pairs, "of 512 x 384 x 2, a street");
+  report.add("track_cpu_ms_per_pair", track_ms, "received, taken apart, tracked, keyframes described: relmap-frontend");
+  report.add("track_core_percent", track_ms * options.rate / 10, "of a core, at that rate");
+  report.add("track_lost_pairs", tracked_few.lost + tracked.lost, "on the bus, by the camera, for want of a processor");
+  report.add("tracked_p50_ms", number_of(tracked.output, "tracked_p50_ms"),
+             "from a frame's capture until it is tracked");
+  report.add("tracked_p99_ms", number_of(tracked.output, "tracked_p99_ms"), "");
+}
+
+}  // namespace
+
+Run declare_capture(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  app.add_option("--pairs", options->pairs, "by each way, but for those of the start")
+      ->check(CLI::Range(20, 1000000))
+      ->capture_default_str();
+  app.add_option("--rate", options->rate, "pairs a second")->check(CLI::Range(1.0, 48.0))->capture_default_str();
+  return [options](Report& report) { run(*options, report); };
+}
+
+}  // namespace relmap::bench
