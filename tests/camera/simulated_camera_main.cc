@@ -1,6 +1,6 @@
-// relmap-simulated-camera: runs a program at a camera that is not there, and says what the camera sent and what the
-// program cost. A program of its own: umockdev's library must be loaded before any other, and neither our allocator nor
-// every program goes together with it.
+// relmap-simulated-camera runs a program with a simulated camera, and reports what the camera sent and what the program
+// cost. It is a program of its own, since umockdev's library must be loaded before any other and does not work together
+// with jemalloc.
 #include <signal.h>
 #include <sys/resource.h>
 
@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "proto/base/json.h"
 #include "tests/camera/shown_drive.h"
 #include "tests/camera/simulated_camera.h"
 #include "tests/camera/under_mock.h"
@@ -58,8 +59,12 @@ int run(const Options& options) {
   }
   const UsbCounters sent = testbed.counters(camera);
   std::ofstream out(options.report);
-  out << "{\"exit_code\": " << *exit_code << ", \"frames\": " << sent.frames << ", \"lost\": " << sent.lost + sent.cut
-      << ", \"cpu_s\": " << processor_seconds_of_children() << "}\n";
+  out << Json()
+             .add("exit_code", *exit_code)
+             .add("frames", sent.frames)
+             .add("lost", sent.lost + sent.cut)
+             .add("cpu_s", processor_seconds_of_children())
+             .text_lines();
   return out.flush() ? 0 : 1;
 }
 

@@ -2,6 +2,7 @@
 // and what gets lost. The camera is simulated by a process of its own, which does not count.
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -20,19 +21,11 @@ struct Options {
   double rate = 20;
 };
 
-// By key, of a flat JSON object or of the first one in it that has the key.
-double number_of(const std::string& json, const std::string& key) {
-  for (const std::string& label : {"\"" + key + "\": ", "\"" + key + "\":"})
-    if (const std::size_t at = json.find(label); at != std::string::npos)
-      return std::stod(json.substr(at + label.size()));
-  throw std::runtime_error("no " + key + " in " + json);
-}
-
 struct Cost {
-  double pairs = 0;  // that the program had
-  double cpu_s = 0;  // of the program
-  double lost = 0;   // on the bus
-  std::string output;
+  double pairs = 0;        // that the program had
+  double cpu_s = 0;        // of the program
+  double lost = 0;         // on the bus
+  nlohmann::json summary;  // what the program printed
 };
 
 class CaptureBench {
@@ -47,8 +40,8 @@ class CaptureBench {
   Cost record(std::uint64_t pairs) {
     Cost cost = at_camera({}, {testing::built_program("relmap-camera"), "--cameras", folder_ / "cameras", "--json",
                                "--quiet", "record", file("raw"), "--frames", std::to_string(pairs)});
-    cost.pairs = number_of(cost.output, "frames");
-    cost.lost += number_of(cost.output, "lost") + number_of(cost.output, "dropped");
+    cost.pairs = cost.summary.at("frames");
+    cost.lost += cost.summary.at("lost").get<double>() + cost.summary.at("dropped").get<double>();
     return cost;
   }
 
@@ -57,10 +50,8 @@ class CaptureBench {
     Cost cost = at_camera({"--drive", folder_ / "drive", "--pairs", std::to_string(pairs)},
                           {testing::built_program("relmap-frontend"), "--source", "iidc", "--cameras",
                            folder_ / "cameras", "--robot", "bench", "--out", file("keyframes"), "--json", "--quiet"});
-    cost.pairs = number_of(cost.output, "tracked");
-    // "lost" of the camera stands in its own object, behind that of pairs whose pose does not come from vision.
-    cost.lost +=
-        number_of(cost.output.substr(cost.output.find("\"camera\"")), "lost") + number_of(cost.output, "dropped");
+    cost.pairs = cost.summary.at("tracked");
+    cost.lost += cost.summary.at("camera").at("lost").get<double>() + cost.summary.at("dropped").get<double>();
     return cost;
   }
 
@@ -83,11 +74,11 @@ class CaptureBench {
     all.insert(all.end(), command.begin(), command.end());
     const testing::Finished done = testing::run_program(all, std::chrono::hours(1));
     if (done.exit_code != 0) throw std::runtime_error(done.standard_error);
-    const std::string said = testing::read_text(report);
-    const double code = number_of(said, "exit_code");
+    const auto said = nlohmann::json::parse(testing::read_text(report));
+    const int code = said.at("exit_code");
     if (code != 0 && code != 4)  // 4: interrupted
       throw std::runtime_error(command.front() + ": " + testing::read_text(errors));
-    return {0, number_of(said, "cpu_s"), number_of(said, "lost"), testing::read_text(output)};
+    return {0, said.at("cpu_s"), said.at("lost"), nlohmann::json::parse(testing::read_text(output))};
   }
 
   const Options options_;
@@ -115,9 +106,8 @@ void run(const Options& options, Report& report) {
   report.add("track_cpu_ms_per_pair", track_ms, "received, taken apart, tracked, keyframes described: relmap-frontend");
   report.add("track_core_percent", track_ms * options.rate / 10, "of a core, at that rate");
   report.add("track_lost_pairs", tracked_few.lost + tracked.lost, "on the bus, by the camera, for want of a processor");
-  report.add("tracked_p50_ms", number_of(tracked.output, "tracked_p50_ms"),
-             "from a frame's capture until it is tracked");
-  report.add("tracked_p99_ms", number_of(tracked.output, "tracked_p99_ms"), "");
+  report.add("tracked_p50_ms", tracked.summary.at("tracked_p50_ms"), "from a frame's capture until it is tracked");
+  report.add("tracked_p99_ms", tracked.summary.at("tracked_p99_ms"), "");
 }
 
 }  // namespace
