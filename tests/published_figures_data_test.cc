@@ -18,11 +18,11 @@ TEST_F(PublishedFiguresData, RecordedMeasurementsEndWhereTheDocumentSays) {
   const char* const kDocument = "docs/rba.md";
   const auto street = published(kDocument,
                                 "([0-9]+) stereo cameras in a street \\(([0-9,]+) measurements\\) end at a "
-                                "Huber cost of ([0-9.,]*[0-9]) by both");
+                                "Huber cost of ([0-9.,]*[0-9]) in both");
   const auto kitti = published(kDocument,
                                "([0-9]+) keyframes that relmap's own front-end made of a KITTI drive "
-                               "\\(([0-9,]+) measurements\\) at ([0-9.,]*[0-9]) by both");
-  const auto grown = published(kDocument, "the map as it grew had ([0-9.,]*[0-9]) and ([0-9.,]*[0-9])\\.");
+                               "\\(([0-9,]+) measurements\\) at ([0-9.,]*[0-9]) in both");
+  const auto grown = published(kDocument, "the map as it grew has ([0-9.,]*[0-9]) and ([0-9.,]*[0-9])\\.");
   EXPECT_EQ(found["stereo_factors_frames"], street.at(0));
   EXPECT_EQ(found["stereo_factors_measurements"], street.at(1));
   EXPECT_NEAR(found["stereo_factors_cost_full"], street.at(2), 0.01);

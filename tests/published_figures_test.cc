@@ -49,7 +49,7 @@ TEST(PublishedFigures, OfAKeyframesUpdate) {
   EXPECT_EQ(found["unsupported_edges"], 0);
   EXPECT_EQ(found["allocations_per_update"], 0);
   EXPECT_EQ(found["numerical_failures"], 0);
-  EXPECT_NEAR(found["measurements_per_keyframe"], published_figure(kRba, "([0-9]+) measurements a keyframe\\. Eight"),
+  EXPECT_NEAR(found["measurements_per_keyframe"], published_figure(kRba, "([0-9]+) measurements per keyframe\\. Eight"),
               1);
   EXPECT_NEAR(found["active_mean"], 8, 0.5) << "eight frames move";
   expect_excess_about(found["registration_error_ceres_local_m"] / found["registration_error_m"],
@@ -59,7 +59,7 @@ TEST(PublishedFigures, OfAKeyframesUpdate) {
 
 // Medians of the same run: what disturbs one may leave the other alone, but not three times.
 TEST(PublishedFigures, OfASlidingWindowsTimeOverOurs) {
-  const double times = published_figure(kRba, "in the same run, ([0-9.]+) times as much");
+  const double times = published_figure(kRba, "in the same run, ([0-9.]+) times as long");
   double best = 0;
   for (int round = 0; round < 3 && best < times / kFactor; ++round)
     best = std::max(best, BenchFigures({"rba", "--seeds", "1", "--no-full"})["ceres_over_relmap"]);
@@ -137,8 +137,8 @@ TEST(PublishedFigures, OfTheFrontEndBesideAPlainPipeline) {
 
 TEST(PublishedFigures, OfTheBytesOfAKeyframe) {
   const auto kilobytes = published(kFrontEnd,
-                                   ": ([0-9]+) kB a keyframe on the simulated street\\. With `--picture small` "
-                                   "\\(a thumbnail, to be looked at\\) they are ([0-9]+) kB, with `none` "
+                                   "a keyframe has ([0-9]+) kB on the simulated street\\. With `--picture small` "
+                                   "\\(a thumbnail for display\\) it has ([0-9]+) kB, with `none` "
                                    "([0-9]+),");
   const storage::TemporaryFolder folder;
   const std::string drive = record_simulation(folder / "drive", {"--seed", "3", "--pairs", "24", "--laps", "0.02"});
