@@ -29,7 +29,7 @@ Result<std::unique_ptr<iidc::IidcSource>> open_or_await(const Run& run) {
   for (Reason told = Reason::OK; options.wait && !run.stop && may_come(opened.reason());
        opened = (*open)(iidc, run.stop)) {
     if (std::exchange(told, opened.reason()) != opened.reason())
-      std::fprintf(stderr, "%s; it is waited for\n", opened.status().to_string().c_str());
+      std::fprintf(stderr, "%s; waiting for it\n", opened.status().to_string().c_str());
     for (auto looks = run.waits.camera / run.waits.look; looks > 0 && !run.stop; --looks)
       std::this_thread::sleep_for(run.waits.look);
   }

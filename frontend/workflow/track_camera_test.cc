@@ -82,8 +82,8 @@ TEST_F(TrackCameraTest, IsWaitedForWhereThatIsAskedFor) {
   absent_ = {{Reason::NO_CAMERA, "none"}, {Reason::NO_CAMERA, "none"}, {Reason::CAMERA_BUSY, "another program has it"}};
   ASSERT_TRUE(run(track_camera).ok());
   EXPECT_EQ(tries_, 4);
-  EXPECT_THAT(said_, ::testing::StartsWith("NO_CAMERA: none; it is waited for\n"
-                                           "CAMERA_BUSY: another program has it; it is waited for\n"))
+  EXPECT_THAT(said_, ::testing::StartsWith("NO_CAMERA: none; waiting for it\n"
+                                           "CAMERA_BUSY: another program has it; waiting for it\n"))
       << "each reason once";
   EXPECT_GE(summary_.pairs, 1u);
 }

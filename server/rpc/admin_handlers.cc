@@ -140,7 +140,7 @@ Result<Producer<v1::VerifyReply>> verify_request(const v1::VerifyRequest& reques
 }
 
 Result<Producer<v1::VerifyReply>> repair_request(const v1::RepairRequest&, const Deadline&, const DaemonFacts& facts) {
-  return only_without_a_daemon(facts, "mended", "repair");
+  return only_without_a_daemon(facts, "repaired", "repair");
 }
 
 Result<Producer<v1::Progress>> reindex_request(const v1::ReindexRequest&, const Deadline&, const DaemonFacts& facts) {

@@ -41,8 +41,8 @@ namespace {
 std::string doubt(const storage::Edge& step) {
   const std::string way = step.a.to_string() + " to " + step.b.to_string();
   if (!step.carried_by.empty())
-    return "# carried: " + way + ", says closure " + step.carried_by.front().to_string() +
-           "; the odometry does not tell of it\n";
+    return "# carried: " + way + ", according to closure " + step.carried_by.front().to_string() +
+           "; the odometry did not notice it\n";
   char sigma[32];
   std::snprintf(sigma, sizeof sigma, "%.2g", std::sqrt(step.covariance.topLeftCorner<3, 3>().trace() / 3));
   return "# not measured: " + way + " (" +

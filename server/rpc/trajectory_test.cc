@@ -50,7 +50,7 @@ TEST_F(Trajectory, MarksStepsThatNothingMeasured) {
   EXPECT_EQ(reader.next().or_throw()->doubtful_step, nullptr);
   EXPECT_EQ(reader.next().or_throw()->doubtful_step->id, (EdgeId{map_.id('B'), 0}));
   EXPECT_NE(trajectory_line(TrajectoryFormat::kTum, *reader.next().or_throw())
-                .find("# carried: 1:1 to 1:2, says closure 1:2/1;"),
+                .find("# carried: 1:1 to 1:2, according to closure 1:2/1;"),
             std::string::npos);
 
   step.support = storage::kMinSupport;

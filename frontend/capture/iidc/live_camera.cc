@@ -324,7 +324,7 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
     if (status.reason() == Reason::CAMERA_GONE) {
       close();
       next_try_ = Clock::now() + kLook;
-      return fault({Reason::CAMERA_GONE, status.message() + "; it is waited for"});
+      return fault({Reason::CAMERA_GONE, status.message() + "; waiting for it"});
     }
     const bool silent = status.reason() == Reason::CAMERA_SILENT;
     if (!silent) {
