@@ -16,8 +16,8 @@ class ImuFeed {
  public:
   explicit ImuFeed(ImuRecording recording) : recording_(std::move(recording)) {}
   // `wanted` is a file or folder, "none", or "auto" for the data set's recording. Nothing if there is none, or if the
-  // recording found by "auto" cannot be read, which is reported on standard error unless `quiet`. The reasons of
-  // read_imu().
+  // recording found by "auto" cannot be read, which is reported on standard error. `quiet` silences what else is said
+  // of the recording. The reasons of read_imu().
   static Result<std::optional<ImuFeed>> open(const std::string& wanted, const capture::StereoSource& source,
                                              bool quiet);
 

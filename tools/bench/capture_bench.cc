@@ -106,8 +106,9 @@ void run(const Options& options, Report& report) {
   report.add("track_cpu_ms_per_pair", track_ms, "received, taken apart, tracked, keyframes described: relmap-frontend");
   report.add("track_core_percent", track_ms * options.rate / 10, "of a core, at that rate");
   report.add("track_lost_pairs", tracked_few.lost + tracked.lost, "on the bus, by the camera, for want of a processor");
-  report.add("tracked_p50_ms", tracked.summary.at("tracked_p50_ms"), "from a frame's capture until it is tracked");
-  report.add("tracked_p99_ms", tracked.summary.at("tracked_p99_ms"), "");
+  report.add("tracked_p50_ms", tracked.summary.at("tracked_p50_ms").get<double>(),
+             "from a frame's capture until it is tracked");
+  report.add("tracked_p99_ms", tracked.summary.at("tracked_p99_ms").get<double>(), "");
 }
 
 }  // namespace
