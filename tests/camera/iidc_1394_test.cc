@@ -177,8 +177,7 @@ TEST_F(Iidc1394Test, AProcessThatIsKilledIsReplaced) {
       const auto frame = live->next();
       if (!frame.ok()) gone = frame.status();
     }
-    EXPECT_EQ("CAMERA_GONE: the process that serves IEEE 1394 has ended (signal 9); waiting for it",
-              gone.to_string());
+    EXPECT_EQ("CAMERA_GONE: the process that serves IEEE 1394 has ended (signal 9); waiting for it", gone.to_string());
     Watched after;
     watch(*live, after, [&] { return after.frames() >= 1; });
     std::printf("back after %.0f ms\n",
