@@ -2,7 +2,9 @@
 // map, the robot hears of it and knows where it is again.
 #include <gtest/gtest.h>
 
-#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "tests/support/simulated_recording.h"
 #include "tests/support/streamed_drive.h"
@@ -22,15 +24,13 @@ TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
   EXPECT_GT(drive.summary("closures"), 5);
   EXPECT_EQ(drive.summary("closures_withdrawn"), 0);
 
-  unsigned session = 0, index = 0;
-  Vector3 t;
-  const std::string& json = drive.summary_json();
-  const std::size_t frame_at = json.find("\"frame\":"), translation_at = json.find("\"translation\":");
-  ASSERT_NE(frame_at, std::string::npos) << json;
-  ASSERT_EQ(std::sscanf(json.c_str() + frame_at, "\"frame\":\"%u:%u\"", &session, &index), 2);
-  ASSERT_EQ(std::sscanf(json.c_str() + translation_at, "\"translation\":[%lf,%lf,%lf]", &t.x(), &t.y(), &t.z()), 3);
-  const SE3 truth = drive.true_T_frame_pair({session, index}, drive.pair_of(drive.last()));
-  EXPECT_LT(drive.pair_of({session, index}), 45u) << "a frame of before the blackness";
+  const auto place = nlohmann::json::parse(drive.summary_json()).at("place");
+  const FrameId frame = FrameId::parse(place.at("frame").get<std::string>()).value();
+  const auto translation = place.at("translation").get<std::vector<double>>();
+  ASSERT_EQ(translation.size(), 3u);
+  const Vector3 t(translation[0], translation[1], translation[2]);
+  const SE3 truth = drive.true_T_frame_pair(frame, drive.pair_of(drive.last()));
+  EXPECT_LT(drive.pair_of(frame), 45u) << "a frame of before the blackness";
   EXPECT_LT((t - truth.t).norm(), 0.1) << t.transpose() << " for " << truth.t.transpose();
 }
 

@@ -9,6 +9,7 @@
 
 #include "frontend/capture/contents_checksum.h"
 #include "frontend/capture/keyframe_file.h"
+#include "proto/base/hex.h"
 #include "proto/base/number_text.h"
 
 namespace relmap::capture {
@@ -67,11 +68,11 @@ std::string calibration_text(const StereoCalibration& calibration) {
     checksum.add(static_cast<double>(value));
   char text[128];
   if (calibration.mono())
-    std::snprintf(text, sizeof text, "focal length %.6g px, checksum %08x", calibration.left.fx, checksum.value());
+    std::snprintf(text, sizeof text, "focal length %.6g px", calibration.left.fx);
   else
-    std::snprintf(text, sizeof text, "focal length %.6g px, baseline %.6g m, checksum %08x", calibration.left.fx,
-                  calibration.T_right_left.t.norm(), checksum.value());
-  return text;
+    std::snprintf(text, sizeof text, "focal length %.6g px, baseline %.6g m", calibration.left.fx,
+                  calibration.T_right_left.t.norm());
+  return text + (", checksum " + hex(checksum.value()));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/hex.h"
 #include "proto/base/mutex.h"
 #include "server/map/background_work.h"
 #include "server/map/commit_scheduler.h"
@@ -30,9 +31,6 @@ namespace relmap::map {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// The format of relmap-vocab info.
-std::string hexadecimal(std::uint32_t crc) { return spdlog::fmt_lib::format("{:08x}", crc); }
 
 // Pauses before a record is submitted again.
 constexpr std::chrono::milliseconds kQueueFull{5};
@@ -217,9 +215,8 @@ Status Mapper::Impl::load() {
             (state.vocabulary_crc == 0
                  ? "of which vocabulary the map's words are is not known: a reindex was interrupted, or "
                    "a repair lost the map's state (given crc "
-                 : "the map's words were made with another vocabulary (crc " + hexadecimal(state.vocabulary_crc) +
-                       ", given ") +
-                hexadecimal(crc) + "; relmap-vocab info tells a file's)"};
+                 : "the map's words were made with another vocabulary (crc " + hex(state.vocabulary_crc) + ", given ") +
+                hex(crc) + "; relmap-vocab info tells a file's)"};
   state.vocabulary_crc = crc;
   give_identity();
   recover();
@@ -562,6 +559,8 @@ Result<std::unique_ptr<Mapper>> Mapper::open(std::shared_ptr<storage::Engine> en
     if (Status loaded = impl->load(); !loaded.ok()) return loaded;
   } catch (const StatusError& error) {
     return error.status();
+  } catch (const std::exception& error) {
+    return Status(Reason::INTERNAL, error.what());
   }
   impl->start();
   return std::unique_ptr<Mapper>(new Mapper(std::move(impl)));

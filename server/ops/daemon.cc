@@ -77,13 +77,6 @@ void log(const intake::RobotEvent& event) {
   }
 }
 
-Status make_folder(const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return {Reason::IO_ERROR, "cannot make the data folder " + folder + ": " + error.message()};
-  return {};
-}
-
 }  // namespace
 
 struct Daemon::Impl {
@@ -121,7 +114,8 @@ struct Daemon::Impl {
 Status Daemon::Impl::open_map() {
   auto vocabulary = load_vocabulary(config);
   if (!vocabulary.ok()) return vocabulary.status();
-  if (Status made = make_folder(config.data); !made.ok()) return made;
+  if (Status made = storage::create_durable_directories(*storage::posix_file_system(), config.data); !made.ok())
+    return made;
   budget = std::make_shared<storage::Budget>(config.memory_budget_mb << 20);
   storage::RocksDbOptions options;
   options.cache_bytes = budget->allowance(storage::Share::kEngine);

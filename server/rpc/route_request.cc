@@ -6,6 +6,7 @@
 #include "proto/base/bytes.h"
 #include "proto/base/crc32c.h"
 #include "proto/wire/convert.h"
+#include "server/route/refusal.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/place_messages.h"
@@ -81,8 +82,7 @@ Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
     const v1::RouteWeights& given = request.weights();
     const route::RouteWeights weights{given.metre(), given.driven_second(), given.standing_second(),
                                       given.square_metre_of_variance()};
-    if (!weights.valid())
-      return {Reason::INVALID_ARGUMENT, "each weight must be 0 or between 1e-9 and 1e9, and not all may be 0"};
+    if (Status valid = route::check_weights(weights); !valid.ok()) return valid;
     return weights;
   }
   switch (request.by()) {

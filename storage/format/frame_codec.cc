@@ -7,16 +7,16 @@
 #include <memory>
 
 #include "proto/keyframe/extension_codec.h"
-#include "storage/format/compact.h"
 #include "storage/format/extension_tags.h"
+#include "storage/format/varint.h"
 #include "storage/graph/precision.h"
 
 namespace relmap::storage {
 namespace {
 
-using compact::get_count;
-using compact::get_unsigned;
-using compact::put_unsigned;
+using varint::get_count;
+using varint::get_unsigned;
+using varint::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
 static_assert(sizeof(Edge) == 1056 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 288 && sizeof(Observation) == 40);
@@ -51,13 +51,13 @@ template <typename Id>
 void put_ids(ByteWriter& w, const std::vector<Id>& ids, FrameId near) {
   put_unsigned(w, ids.size());
   for (const Id& id : ids) {
-    compact::put(w, id, near);
+    varint::put(w, id, near);
     near = frame_of(id);
   }
 }
 
-FrameId get_id(ByteReader& r, FrameId near, FrameId*) { return compact::get_frame(r, near); }
-EdgeId get_id(ByteReader& r, FrameId near, EdgeId*) { return compact::get_edge(r, near); }
+FrameId get_id(ByteReader& r, FrameId near, FrameId*) { return varint::get_frame(r, near); }
+EdgeId get_id(ByteReader& r, FrameId near, EdgeId*) { return varint::get_edge(r, near); }
 
 template <typename Id>
 void get_ids(ByteReader& r, std::vector<Id>& ids, FrameId near) {
@@ -90,7 +90,7 @@ void put_history(ByteWriter& w, const Edge& e) {
     before = event.journal_sequence;
     w.put(static_cast<std::uint8_t>(event.state));
     put_unsigned(w, static_cast<std::uint64_t>(event.reason));
-    compact::put(w, event.cause, e.id.frame);
+    varint::put(w, event.cause, e.id.frame);
     w.put_string(event.note);
   }
 }
@@ -103,7 +103,7 @@ void get_history(ByteReader& r, Edge& e) {
     sequence += get_unsigned(r);
     const auto state = r.get<EdgeState>();
     const auto reason = static_cast<Reason>(get_unsigned(r));
-    const EdgeId cause = compact::get_edge(r, e.id.frame);
+    const EdgeId cause = varint::get_edge(r, e.id.frame);
     e.history.push_back({sequence, state, reason, cause, r.get_string()});
   }
 }
@@ -137,15 +137,15 @@ void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   put_unsigned(w, static_cast<std::uint64_t>(e.reason));
   put_unsigned(w, e.id.ordinal);
   if (!ends_here) {
-    compact::put(w, e.id.frame, id);
-    compact::put(w, e.b, id);
+    varint::put(w, e.id.frame, id);
+    varint::put(w, e.b, id);
   }
-  compact::put(w, e.a, id);
+  varint::put(w, e.a, id);
   put_unsigned(w, e.support);
-  compact::put(w, e.T_ab);
-  compact::put(w, e.prior_T_ab);
-  compact::put(w, e.prior_covariance, Matrix6::Identity());
-  compact::put(w, e.covariance, e.prior_covariance);
+  varint::put(w, e.T_ab);
+  varint::put(w, e.prior_T_ab);
+  varint::put(w, e.prior_covariance, Matrix6::Identity());
+  varint::put(w, e.covariance, e.prior_covariance);
   if (correlated) w.put_array(e.correlation_with_previous.data(), 36);
   w.put(e.driven_s);
   w.put(e.standing_s);
@@ -180,15 +180,15 @@ Edge get_edge(ByteReader& r, FrameId id) {
   e.id = {id, get_u32(r)};
   e.b = id;
   if (!flag(byte, 0)) {
-    e.id.frame = compact::get_frame(r, id);
-    e.b = compact::get_frame(r, id);
+    e.id.frame = varint::get_frame(r, id);
+    e.b = varint::get_frame(r, id);
   }
-  e.a = compact::get_frame(r, id);
+  e.a = varint::get_frame(r, id);
   e.support = get_u32(r);
-  e.T_ab = compact::get_se3(r);
-  e.prior_T_ab = compact::get_se3(r);
-  e.prior_covariance = compact::get_matrix6(r, Matrix6::Identity());
-  e.covariance = compact::get_matrix6(r, e.prior_covariance);
+  e.T_ab = varint::get_se3(r);
+  e.prior_T_ab = varint::get_se3(r);
+  e.prior_covariance = varint::get_matrix6(r, Matrix6::Identity());
+  e.covariance = varint::get_matrix6(r, e.prior_covariance);
   if (flag(byte, 4)) r.get_array(e.correlation_with_previous.data(), 36);
   e.driven_s = r.get<float>();
   e.standing_s = r.get<float>();
@@ -236,8 +236,8 @@ void put_landmarks(ByteWriter& w, const std::vector<Landmark>& landmarks, FrameI
     if (!l.claims.empty()) {
       put_unsigned(w, l.claims.size());
       for (const AliasClaim& claim : l.claims) {
-        compact::put(w, claim.target, id);
-        compact::put(w, claim.closure, id);
+        varint::put(w, claim.target, id);
+        varint::put(w, claim.closure, id);
       }
     }
     put_ids(w, l.observers, id);
@@ -272,8 +272,8 @@ void get_landmarks(ByteReader& r, std::vector<Landmark>& landmarks, FrameId id) 
       l.claims.reserve(claims);
       for (std::size_t i = 0; i < claims; ++i) {
         AliasClaim claim;
-        claim.target = compact::get_landmark(r, id);
-        claim.closure = compact::get_edge(r, id);
+        claim.target = varint::get_landmark(r, id);
+        claim.closure = varint::get_edge(r, id);
         l.claims.push_back(claim);
       }
     }
@@ -292,8 +292,8 @@ void put_observation(ByteWriter& w, const Observation& o, FrameId id) {
   const std::uint8_t level = std::min(o.level, kLevelInFlags);
   w.put(static_cast<std::uint8_t>(flags(bound, mono) | (level << 2) | (o.aligned ? kAligned : 0)));
   if (level == kLevelInFlags) w.put(o.level);
-  compact::put(w, o.landmark, id);
-  if (bound) compact::put(w, o.origin, id);
+  varint::put(w, o.landmark, id);
+  if (bound) varint::put(w, o.origin, id);
   w.put(o.u_left);
   w.put(o.v);
   if (!mono) w.put(o.u_right);
@@ -305,8 +305,8 @@ Observation get_observation(ByteReader& r, FrameId id) {
   o.level = (byte >> 2) & 31;
   o.aligned = (byte & kAligned) != 0;
   if (o.level == kLevelInFlags) o.level = r.get<std::uint8_t>();
-  o.landmark = compact::get_landmark(r, id);
-  if (flag(byte, 0)) o.origin = compact::get_edge(r, id);
+  o.landmark = varint::get_landmark(r, id);
+  if (flag(byte, 0)) o.origin = varint::get_edge(r, id);
   o.u_left = r.get<float>();
   o.v = r.get<float>();
   o.u_right = flag(byte, 1) ? std::bit_cast<float>(kMono) : r.get<float>();
@@ -320,7 +320,7 @@ void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
   w.put(f.time_us);
   put_unsigned(w, f.journal_sequence);
   w.put(f.payload_crc);
-  compact::put(w, f.T_odom_frame);
+  varint::put(w, f.T_odom_frame);
   w.put(f.mean_error);
   put_unsigned(w, f.error_terms);
   put_unsigned(w, f.appearance_count);
@@ -333,7 +333,7 @@ void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
     put_unsigned(w, f.unreached.size());
     for (const Unreached& item : f.unreached) {
       put_unsigned(w, item.slot);
-      compact::put(w, item.observer, id);
+      varint::put(w, item.observer, id);
     }
   }
   put_unsigned(w, f.labels.size());
@@ -353,7 +353,7 @@ std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id) {
   f.time_us = r.get<std::int64_t>();
   f.journal_sequence = get_unsigned(r);
   f.payload_crc = r.get<std::uint32_t>();
-  f.T_odom_frame = compact::get_se3(r);
+  f.T_odom_frame = varint::get_se3(r);
   f.mean_error = r.get<float>();
   f.error_terms = get_u32(r);
   f.appearance_count = get_u32(r);
@@ -367,7 +367,7 @@ std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id) {
   if (flag(byte, 1))
     for (std::size_t left = get_count(r); left > 0 && r.ok(); --left) {
       const std::uint32_t slot = get_u32(r);
-      f.unreached.push_back({slot, compact::get_frame(r, id)});
+      f.unreached.push_back({slot, varint::get_frame(r, id)});
     }
   for (std::size_t left = get_count(r); left > 0; --left) {
     const ByteSpan label = r.get_bytes(get_unsigned(r));

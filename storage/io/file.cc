@@ -1,8 +1,23 @@
 #include "storage/io/file.h"
 
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
 namespace relmap::storage {
 
-std::string folder_of(const std::string& path) {
+namespace {
+
+// "map/" is the folder "map".
+std::string without_last_slash(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
+}  // namespace
+
+std::string folder_of(const std::string& file) {
+  const std::string path = without_last_slash(file);
   const std::size_t slash = path.find_last_of('/');
   return slash == std::string::npos ? "." : slash == 0 ? "/" : path.substr(0, slash);
 }
@@ -10,6 +25,16 @@ std::string folder_of(const std::string& path) {
 Status create_durable_directory(FileSystem& files, const std::string& path) {
   if (Status made = files.create_directory(path); !made.ok()) return made;
   return files.sync_directory(folder_of(path));
+}
+
+Status create_durable_directories(FileSystem& files, const std::string& path) {
+  std::error_code error;
+  std::vector<std::string> missing;
+  for (std::string above = without_last_slash(path); !std::filesystem::exists(above, error); above = folder_of(above))
+    missing.push_back(above);
+  for (auto above = missing.rbegin(); above != missing.rend(); ++above)
+    if (Status made = create_durable_directory(files, *above); !made.ok()) return made;
+  return {};
 }
 
 }  // namespace relmap::storage

@@ -65,5 +65,7 @@ std::string folder_of(const std::string& path);
 // Creates the folder if it is missing and makes its name durable, even where a process that was killed had created it
 // and not synced it. The parent folder must exist.
 Status create_durable_directory(FileSystem& files, const std::string& path);
+// The same for all folders of `path` that are missing, the outermost first.
+Status create_durable_directories(FileSystem& files, const std::string& path);
 
 }  // namespace relmap::storage

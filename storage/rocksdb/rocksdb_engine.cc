@@ -350,15 +350,10 @@ bool journal_goes_on(const rocksdb::Options& options, const std::string& directo
 // take away all that was acknowledged.
 Status create_folder(const std::string& directory, FileSystem& files) {
   std::error_code error;
-  std::vector<std::string> missing;
-  for (std::string path = directory; !std::filesystem::exists(path, error); path = folder_of(path))
-    missing.push_back(path);
-  for (auto path = missing.rbegin(); path != missing.rend(); ++path)
-    if (Status made = create_durable_directory(files, *path); !made.ok()) return made;
+  if (!std::filesystem::exists(directory, error)) return create_durable_directories(files, directory);
   // Whoever made the folder may have been killed before its name was durable. An error is ignored: if the folder above
   // is somebody else's and we may not read it, the name is not ours to sync.
-  if (missing.empty() && !std::filesystem::exists(directory + "/FORMAT", error))
-    (void)files.sync_directory(folder_of(directory));
+  if (!std::filesystem::exists(directory + "/FORMAT", error)) (void)files.sync_directory(folder_of(directory));
   return {};
 }
 

@@ -66,6 +66,21 @@ TEST(ForgetfulFiles, AFolderMayBeGoneWithAllThatIsInItUntilTheOneAboveIsSynced) 
   EXPECT_EQ(count(100, kept), 100);
 }
 
+TEST(ForgetfulFiles, KeepsAFolderAndAllAboveItThatWereMissing) {
+  const auto kept = [&](std::uint64_t seed) {
+    const auto disk = ForgetfulFiles::create(seed);
+    EXPECT_TRUE(create_durable_directories(*disk, "above/a/b/c/").ok());
+    auto file = disk->open_append("above/a/b/c/f").value();
+    EXPECT_TRUE(file->append(Bytes(768, 1)).ok() && file->sync().ok() && disk->sync_directory("above/a/b/c").ok());
+    disk->restart();
+    return read(*disk, "above/a/b/c/f").size() == 768;
+  };
+  EXPECT_EQ(count(100, kept), 100);
+  EXPECT_EQ(folder_of("a/b/"), "a");
+  EXPECT_EQ(folder_of("a/"), ".");
+  EXPECT_EQ(folder_of("/"), "/");
+}
+
 TEST(ForgetfulFiles, ALaterSectorMayBeThereWithoutAnEarlierOne) {
   const auto out_of_order = [](std::uint64_t seed) {
     const auto disk = disk_with_a_file(seed);

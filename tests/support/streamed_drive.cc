@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "storage/graph/path_tree.h"
@@ -29,11 +30,7 @@ StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz, int e
     frame_times_.push_back(client_->frame({session_.number, i}).or_throw().time_us - session_.first_time_us);
 }
 
-double StreamedDrive::summary(const std::string& key) const {
-  const std::size_t at = summary_.find("\"" + key + "\":");
-  if (at == std::string::npos) throw std::runtime_error("no " + key + " in " + summary_);
-  return std::stod(summary_.substr(at + key.size() + 3));
-}
+double StreamedDrive::summary(const std::string& key) const { return nlohmann::json::parse(summary_).at(key); }
 
 // Recordings may leave numbers out.
 std::string StreamedDrive::picture(const char* eye, std::size_t pair) const {

@@ -1,4 +1,7 @@
 // relmap-bench: the benchmarks behind the figures that relmap states of itself.
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
@@ -39,6 +42,8 @@ const Subcommand kSubcommands[] = {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // The map logs; standard output is for figures.
+  spdlog::set_default_logger(spdlog::stderr_color_mt("relmap-bench"));
   CLI::App app("Benchmarks of relmap.", "relmap-bench");
   app.require_subcommand(1);
   bool json = false;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/base/hex.h"
 #include "server/place/vocabulary.h"
 #include "server/place/vocabulary_training.h"
 #include "tools/terminal/command_line.h"
@@ -77,7 +78,7 @@ int info(const std::string& path) {
   const auto marginal = v.marginal();
   const auto [rarest, commonest] = std::minmax_element(marginal.begin(), marginal.end());
   std::printf("file           %s (%s)\n", path.c_str(), terminal::bytes_text(std::filesystem::file_size(path)).c_str());
-  std::printf("identity       %08x\n", v.crc());
+  std::printf("identity       %s\n", hex(v.crc()).c_str());
   std::printf("source         %s\n", v.source().c_str());
   std::printf("words          %s\n", count_text(v.size()).c_str());
   std::printf("p(word)        %.4f .. %.4f, mean %.4f\n", static_cast<double>(*rarest), static_cast<double>(*commonest),

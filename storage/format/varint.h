@@ -7,7 +7,7 @@
 #include "proto/base/ids.h"
 #include "proto/geometry/geometry.h"
 
-namespace relmap::storage::compact {
+namespace relmap::storage::varint {
 
 void put_unsigned(ByteWriter& w, std::uint64_t value);  // seven bits a byte, low ones first
 std::uint64_t get_unsigned(ByteReader& r);
@@ -32,4 +32,4 @@ SE3 get_se3(ByteReader& r);
 void put(ByteWriter& w, const Matrix6& m, const Matrix6& known);
 Matrix6 get_matrix6(ByteReader& r, const Matrix6& known);
 
-}  // namespace relmap::storage::compact
+}  // namespace relmap::storage::varint

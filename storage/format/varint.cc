@@ -1,10 +1,10 @@
-#include "storage/format/compact.h"
+#include "storage/format/varint.h"
 
 #include <cstring>
 
 #include "storage/graph/precision.h"
 
-namespace relmap::storage::compact {
+namespace relmap::storage::varint {
 
 namespace {
 
@@ -161,4 +161,4 @@ Matrix6 get_matrix6(ByteReader& r, const Matrix6& known) {
   return m;
 }
 
-}  // namespace relmap::storage::compact
+}  // namespace relmap::storage::varint
