@@ -33,7 +33,7 @@ Json status_json(const Status& status) {
   return Json().add("reason", reason_name(status.reason())).add("message", status.message());
 }
 
-// Null where there is none.
+// Adds null if there is no object.
 Json& add_object(Json& json, const char* key, const std::optional<Json>& object) {
   return object ? json.add(key, *object) : json.add_null(key);
 }
@@ -54,7 +54,7 @@ std::uint64_t total(const std::map<Reason, std::uint64_t>& counts) {
   return sum;
 }
 
-// What the daemon said of places.
+// What the daemon recognised.
 std::string recognition_text(const RunSummary& s) {
   const publishing::Localisation::Counts& c = s.recognised;
   std::ostringstream out;
@@ -93,14 +93,14 @@ std::optional<double> share_of_any(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? std::nullopt : std::optional(share(part, whole));
 }
 
-// What the disparities were off by is learnt from pairs.
+// The error of disparities is known only if pairs were tracked.
 std::string path_text(const RunSummary& s) {
   std::string text = fixed(s.path_m, 1) + " m";
   if (!s.ready_made) text += "; disparities were " + fixed(s.offset_px, 2) + " px off";
   return text;
 }
 
-// What becomes of keyframes that are not settled.
+// What happens to keyframes that are not settled.
 std::string waiting_text(const RunSummary& s) {
   const std::string keyframes = std::to_string(s.publishing.unsettled) + " keyframes";
   if (s.failure.reason() == Reason::SESSION_DELETED)
@@ -137,7 +137,7 @@ Json identity_json(const capture::RecordingIdentity& recording) {
       .add("calibration", recording.calibration);
 }
 
-// What a run is not to be trusted for, first of all.
+// Why the run is not to be trusted. Comes first in the summary.
 std::string distrust_text(const RunSummary& s) {
   if (s.trusted()) return {};
   std::ostringstream out;

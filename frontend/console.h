@@ -1,4 +1,4 @@
-// What relmap-frontend says: progress while it works, a summary at the end.
+// The output of relmap-frontend: progress while it runs, and a summary at the end.
 #pragma once
 
 #include <chrono>
@@ -21,66 +21,68 @@
 namespace relmap::frontend {
 
 struct RunSummary {
-  // Whose keyframes they are. What follows is of this run, which may go on with a session that another began.
+  // The session of the keyframes. The other fields describe this run only, which may continue a session that another
+  // run began.
   std::string robot, session, uuid;
-  std::string spool;  // folder where keyframes wait until they are settled; empty: in memory, or they go into a file
-  std::optional<std::uint32_t> gone_on;  // the keyframe that this run goes on after
-  bool ready_made = false;               // keyframes came in: there were no pairs to track
-  bool mono = false;                     // pictures of one camera, each a keyframe: `pairs` counts them
-  std::uint64_t pairs = 0;               // given to the tracker; each is one of the next three
-  std::uint64_t tracked = 0;             // with a pose from vision; the first one too
-  std::uint64_t repeated = 0;            // the camera gave the picture before once more
+  std::string spool;  // folder where keyframes wait until they are settled; empty if in memory, and for a file
+  std::optional<std::uint32_t> gone_on;  // the keyframe after which this run continues
+  bool ready_made = false;               // the input was keyframes, so there were no pairs to track
+  bool mono = false;                     // the input was pictures of one camera; `pairs` counts them
+  std::uint64_t pairs = 0;               // given to the tracker: tracked + repeated + lost
+  std::uint64_t tracked = 0;             // with a pose from vision, and the first one
+  std::uint64_t repeated = 0;            // the camera sent the previous picture again
   std::uint64_t lost = 0;
-  std::uint64_t one_eyed = 0;  // of those tracked
-  std::uint64_t dropped = 0;   // pairs of a live source that came too fast
-  // Pairs that the source tells of: of a run that goes on or was interrupted those that it came to. 0: there are none.
+  std::uint64_t one_eyed = 0;  // tracked with one eye only
+  std::uint64_t dropped = 0;   // pairs of a live source that were dropped to keep up
+  // Pairs that there should have been: those that the source has, or those that the run reached if it continues another
+  // run or was interrupted. 0 if there are no pairs.
   std::uint64_t expected = 0;
-  std::uint64_t seen = 0;                // of which both pictures came
-  std::uint64_t measured = 0;            // of those seen, tracked
-  capture::MissingPictures missing;      // of those expected
-  std::optional<vision::RigReport> rig;  // the eyes, as the first pairs show them
+  std::uint64_t seen = 0;                // pairs of which both pictures came
+  std::uint64_t measured = 0;            // seen pairs that were tracked
+  capture::MissingPictures missing;      // pictures of expected pairs
+  std::optional<vision::RigReport> rig;  // check of the stereo camera on the first pairs
   std::uint64_t keyframes = 0;
   std::uint64_t metric_steps = 0;  // keyframes whose step vision measured
   std::uint64_t steps = 0;         // keyframes that have a step
-  double path_m = 0;               // of the odometry
-  double tracking_ms = 0;          // all pairs together; of pictures of one camera: describing them
+  double path_m = 0;               // length of the odometry
+  double tracking_ms = 0;          // sum over all pairs; for mono, of describing the pictures
   double wall_s = 0;
-  double offset_px = 0;                            // of all disparities, as learnt: what the calibration left
-  double latency_p50_ms = 0, latency_p99_ms = 0;   // of keyframes: from the captured pair to publishing
-  double tracked_p50_ms = 0, tracked_p99_ms = 0;   // of all pairs: until they were tracked
-  std::map<Reason, std::uint64_t> unreadable;      // pictures that the source could not give
-  std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
-  std::vector<Status> left_out;  // of these two the pictures and pairs of a recording, one by one, with their files
-  std::optional<capture::RecordingIdentity> recording;  // what was read; nothing: a camera, or a log
+  double offset_px = 0;                                 // learnt error of all disparities that the calibration left
+  double latency_p50_ms = 0, latency_p99_ms = 0;        // of keyframes: from the pair's arrival to publishing
+  double tracked_p50_ms = 0, tracked_p99_ms = 0;        // of all pairs: from arrival until tracked
+  std::map<Reason, std::uint64_t> unreadable;           // pictures that could not be read
+  std::map<Reason, std::uint64_t> stamps_refused;       // pairs left out for their time stamp
+  std::vector<Status> left_out;                         // of a recording: each item of the two above, with its file
+  std::optional<capture::RecordingIdentity> recording;  // what was read; not set for a camera or a log
   publishing::Localisation::Counts recognised;
   std::optional<publishing::Localisation::Place> place;  // at the end
   publishing::PublishSummary publishing;
-  std::uint64_t slow_downs = 0;  // times that the daemon asked for fewer keyframes
-  struct Camera {                // a live one
+  std::uint64_t slow_downs = 0;  // times that the daemon began to ask for fewer keyframes
+  struct Camera {                // of a live source
     std::string serial;
-    std::uint64_t frames = 0, lost = 0;          // that came, that did not
-    std::uint64_t reopened = 0, begun_anew = 0;  // plugged in again; its stream, for another reason
-    std::optional<double> drift_ppm;             // of its clock
+    std::uint64_t frames = 0, lost = 0;          // frames that arrived, and that did not
+    std::uint64_t reopened = 0, begun_anew = 0;  // times it was opened again, its stream restarted
+    std::optional<double> drift_ppm;             // of the camera's clock relative to the host's
   };
   std::optional<Camera> camera;
   bool interrupted = false;
-  Status failure;  // ok: none
+  Status failure;  // ok if the run did not fail
 
-  // Of the pairs expected, but for those that the camera gave twice. Nothing: none was expected.
+  // measured / (expected - repeated), at most 1. nullopt if no pairs were expected.
   std::optional<double> measured_share() const;
-  // What is wrong with the eyes. What there was too little to see for is no finding.
+  // What is wrong with the stereo camera. Leaves out TOO_FEW_FEATURES, which means that it could not be checked.
   std::vector<Status> findings() const;
-  // Nothing was found wrong, and kMinMeasured of the pairs expected were measured.
+  // Whether there are no findings, and measured_share(), if there is one, is at least kMinMeasured.
   bool trusted() const;
 };
 
 inline constexpr double kMinMeasured = 0.8;
 
-// Says on standard error why something was left out: each reason's first few times, and then ever more rarely. From any
-// thread.
+// Reports on standard error why something was left out. Each reason is printed the first few times, and then more and
+// more rarely. Thread-safe.
 class Refusals {
  public:
-  // So many are kept for all().
+  // `max_kept` is the number of refusals that are kept for all().
   explicit Refusals(std::size_t max_kept = 0) : max_kept_(max_kept) {}
   void say(const Status& status);
   std::vector<Status> all() const;
@@ -94,17 +96,17 @@ class Refusals {
 
 enum class ProgressStyle { kNone, kText, kJson };
 
-// Text: a bar that redraws itself on a terminal, a line for every twentieth otherwise, on standard error. JSON: an
-// object a line on standard output, four times a second, for programs. Not thread-safe.
+// Shows progress. As text on standard error: a bar on a terminal, otherwise a line for every twentieth of the total. As
+// JSON on standard output, for programs: one object a line, four times a second. Not thread-safe.
 class ProgressLine {
  public:
   ProgressLine(std::uint64_t total, ProgressStyle style, const char* what = "pairs");
   ~ProgressLine() { end(); }
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
-  // `trouble`: why nothing gets to the daemon.
+  // `trouble` is the reason why nothing reaches the daemon; ok if there is none.
   void show(const RunSummary& so_far, const publishing::PublishSummary& publishing, const Status& trouble);
-  void end();  // of the bar: something else is written
+  void end();  // ends the line of the bar, so that other text can follow
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -120,9 +122,9 @@ class ProgressLine {
 
 std::string summary_text(const RunSummary& summary);
 std::string summary_json(const RunSummary& summary);
-// For who wants to know what a recording is before it is read.
+// One line of list_recording() each.
 std::string recorded_session_json(const recording::RecordedSession& session);
-// `supposed_rate_hz`: StereoSource's.
+// `supposed_rate_hz` is that of StereoSource.
 std::string recording_json(const capture::RecordingIdentity& recording, double supposed_rate_hz = 0);
 std::string keyframe_file_json(const capture::KeyframeFileIdentity& file);
 std::string photographs_json(const capture::PhotographFolder::Camera& camera, const capture::PassedOver& passed_over);

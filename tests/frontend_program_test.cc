@@ -143,7 +143,7 @@ TEST_F(FrontendProgram, LeavesAFileThatIsNotCompleteApart) {
   }
   EXPECT_TRUE(fs::exists(keyframes + ".part"));
   EXPECT_GT(fs::file_size(keyframes), fs::file_size(keyframes + ".part"));
-  EXPECT_NE(read_text(error).find("cut.bin.part has what came before"), std::string::npos) << read_text(error);
+  EXPECT_NE(read_text(error).find("cut.bin.part has the keyframes so far"), std::string::npos) << read_text(error);
 }
 
 TEST_F(FrontendProgram, FailuresAreInItsJson) {

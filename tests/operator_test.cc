@@ -255,7 +255,7 @@ TEST_F(Operator, IsAskedWhichSessionOfANameIsMeant) {
   EXPECT_THAT(relmap({"session", "freeze", "anna/" + name}).standard_output, HasSubstr("session 2 is frozen"));
   // One that is deleted is not meant.
   ASSERT_EQ(relmap({"session", "delete", "1", "--yes"}).exit_code, 0);
-  EXPECT_THAT(relmap({"session", "thaw", name}).standard_output, HasSubstr("session 2 is what it was"));
+  EXPECT_THAT(relmap({"session", "thaw", name}).standard_output, HasSubstr("session 2 is thawed"));
 }
 
 TEST_F(Operator, IsToldThatAnAnswerCannotBeWritten) {

@@ -1,6 +1,6 @@
-// The short form of what README.md and docs/ publish of the benchmarks: counts as they are there, ratios and errors
-// within one and a half times the published ones. Figures are read from the documents, so that neither they nor the
-// code can change without the other. Times are no test's: `relmap-bench` measures them.
+// Checks the figures that docs/ publish of the benchmarks, with shorter runs: counts must be equal, ratios and errors
+// may be 1.5 times the published ones. The figures are read from the documents, so that these and the code cannot
+// change without each other. Times are not tested, except for one ratio; `relmap-bench` measures them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ const char* const kFigures = "docs/figures.md";
 const char* const kFrontEnd = "docs/frontend.md";
 constexpr double kFactor = 1.5;
 
-// What may be less than published, and what must be about as much.
+// expect_at_most() allows smaller values than published, expect_about() does not.
 void expect_at_most(double value, double published, const std::string& what) {
   std::printf("%s: %g, published %g\n", what.c_str(), value, published);
   EXPECT_LE(value, kFactor * published) << what;
@@ -33,15 +33,15 @@ void expect_about(double value, double published, const std::string& what) {
   expect_at_most(value, published, what);
   EXPECT_GE(value, published / kFactor) << what;
 }
-// By how much something is more than 1, or less.
+// Compares by how much a ratio exceeds 1.
 void expect_excess_about(double ratio, double published, const std::string& what) {
   expect_about(ratio - 1, published - 1, what + ", beyond 1");
 }
 
-TEST(PublishedFigures, OfAKeyframesUpdate) {
+TEST(PublishedFigures, HoldForTheUpdateOfAKeyframe) {
   const BenchFigures found({"rba", "--seeds", "3", "--no-full"});
-  // Seeds differ by 0.3 in the first, and by 0.1 and 0.3 in the others; without what neighbouring edges have in common
-  // the chains have half.
+  // Between seeds, the first figure varies by 0.3, and the others by 0.1 and 0.3. If the correlation of neighbouring
+  // edges were left out, those of the chains would be half as large.
   EXPECT_NEAR(found["nees_mean"], published_figure(kRba, "normalised squared error is ([0-9.]+) \\+-"), 0.7);
   const auto chains = published(kRba, "and ([0-9.]+) and ([0-9.]+) of its degrees of freedom over chains");
   expect_about(found["nees_chain_10_over_dof"], chains.at(0), "chains of ten edges");
@@ -57,8 +57,8 @@ TEST(PublishedFigures, OfAKeyframesUpdate) {
                       "error of a sliding window over relmap's");
 }
 
-// Medians of the same run: what disturbs one may leave the other alone, but not three times.
-TEST(PublishedFigures, OfASlidingWindowsTimeOverOurs) {
+// Both times are medians of the same run. A disturbance may affect only one of them, but hardly in three runs.
+TEST(PublishedFigures, HoldForTheTimeOfASlidingWindow) {
   const double times = published_figure(kRba, "in the same run, ([0-9.]+) times as long");
   double best = 0;
   for (int round = 0; round < 3 && best < times / kFactor; ++round)
@@ -67,7 +67,7 @@ TEST(PublishedFigures, OfASlidingWindowsTimeOverOurs) {
   EXPECT_GE(best, times / kFactor);
 }
 
-TEST(PublishedFigures, OfALoopsClosingWhateverItsLength) {
+TEST(PublishedFigures, HoldForClosingALoopOfAnyLength) {
   std::vector<double> work;
   for (const std::string frames : {"250", "500"}) {
     const BenchFigures found({"rba", "--scenario", "loop", "--frames", frames, "--seeds", "1"});
@@ -84,7 +84,7 @@ TEST(PublishedFigures, OfALoopsClosingWhateverItsLength) {
   EXPECT_NEAR(work[1] / work[0], 1, 0.3) << "a loop that is twice as long";
 }
 
-TEST(PublishedFigures, OfLandmarksThatGrowWithWhatThereIsToSeeAndNotWithTheLaps) {
+TEST(PublishedFigures, HoldForLandmarksThatDoNotGrowWithTheLaps) {
   const auto of_thousand = published(kRba, "([0-9,]+) are in force for the ([0-9,]+) points that the drive saw");
   const BenchFigures found({"rba", "--scenario", "laps", "--laps", "15"});
   expect_at_most(found["landmarks_in_force"] / found["points_seen"] - 1, of_thousand.at(0) / of_thousand.at(1) - 1,
@@ -92,7 +92,7 @@ TEST(PublishedFigures, OfLandmarksThatGrowWithWhatThereIsToSeeAndNotWithTheLaps)
   EXPECT_EQ(found["unsupported_edges"], 0);
 }
 
-TEST(PublishedFigures, OfThePlaceIndex) {
+TEST(PublishedFigures, HoldForThePlaceIndex) {
   const BenchFigures found({"places", "--places", "30000"});
   const auto row = published(kFigures, "\\| 100,000 \\| [^|]* \\| [^|]* \\| ([0-9]+) \\| ([0-9]+) \\|");
   expect_at_most(found["bytes_per_place"], row.at(0), "resident bytes a place");
@@ -100,8 +100,8 @@ TEST(PublishedFigures, OfThePlaceIndex) {
   EXPECT_EQ(found["restored"], 30000);
 }
 
-// A light load of the shortest length; what the documents say is of a million.
-TEST(PublishedFigures, OfWhatAMapTakesOnDisk) {
+// A light load of the minimum length. The published figures are of a million frames.
+TEST(PublishedFigures, HoldForTheMapOnDisk) {
   const BenchFigures found({"storage", "--light", "--frames", "20000", "--memory-budget-mb", "256"});
   expect_about(found["disk_bytes_per_frame"] / found["payload_zstd_bytes_per_frame"],
                published_figure(kFigures, "disk over payload after zstd \\| ([0-9.]+) \\|"), "disk over payload");
@@ -109,7 +109,7 @@ TEST(PublishedFigures, OfWhatAMapTakesOnDisk) {
                  published_figure(kFigures, "bytes written over payload \\| ([0-9.]+) \\|"), "written over payload");
 }
 
-TEST(PublishedFigures, OfRoutesByCells) {
+TEST(PublishedFigures, HoldForRoutesByCells) {
   const BenchFigures found({"routes", "--frames", "20000", "--queries", "200", "--live-seconds", "1"});
   EXPECT_EQ(found["mismatches"], 0);
   const auto row = published(kFigures,
@@ -119,8 +119,8 @@ TEST(PublishedFigures, OfRoutesByCells) {
   expect_at_most(found["overlay_bytes_per_frame"], row.at(1), "bytes of cells a frame");
 }
 
-// A quarter of the drive that the documents have.
-TEST(PublishedFigures, OfTheFrontEndBesideAPlainPipeline) {
+// A quarter of the published drive.
+TEST(PublishedFigures, HoldForTheFrontEndAgainstAPlainPipeline) {
   const BenchFigures found({"frontend", "--seed", "3", "--frames", "250", "--exposure", "0.008", "--exposure-jumps",
                             "2", "--reference", "klt"});
   const auto row = published(kFrontEnd,
@@ -135,7 +135,7 @@ TEST(PublishedFigures, OfTheFrontEndBesideAPlainPipeline) {
   EXPECT_EQ(found["lost_pairs"], 0);
 }
 
-TEST(PublishedFigures, OfTheBytesOfAKeyframe) {
+TEST(PublishedFigures, HoldForTheBytesOfAKeyframe) {
   const auto kilobytes = published(kFrontEnd,
                                    "a keyframe has ([0-9]+) kB on the simulated street\\. With `--picture small` "
                                    "\\(a thumbnail for display\\) it has ([0-9]+) kB, with `none` "

@@ -1,4 +1,4 @@
-// What there is to tell people while no daemon takes what a run sends.
+// The lines that tell the user when the daemon does not answer, and when it answers again.
 #pragma once
 
 #include <chrono>
@@ -9,25 +9,27 @@
 
 namespace relmap::workflow {
 
-// "WHAT on DAEMON", and why, where that is known.
+// Returns "WHAT on DAEMON (TROUBLE)", without the brackets if `trouble` is ok.
 std::string silence_of(const std::string& daemon, const std::string& what, const Status& trouble);
 
-// A daemon that is silent for long is told of once, and so is that it answers again. What is wrong for good, the map of
-// a live source's session, is told of at once. Time is an argument. Not thread-safe.
+// Reports once that the daemon has been silent for longer than `patience`, and once that it answers again. A daemon
+// that serves another map than that of a live session is reported without this delay, since waiting does not help.
+// Callers pass the time, so that tests can choose it. Not thread-safe.
 class DaemonSilence {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
   struct Options {
-    std::string daemon;   // where it is looked for
-    std::string kept_in;  // folder where keyframes wait; empty: in memory
+    std::string daemon;   // its address, for the messages
+    std::string kept_in;  // folder where keyframes wait; empty if they wait in memory
     bool live = false;    // the source cannot be read again
     std::chrono::milliseconds patience{5000};
   };
-  // Nothing has been heard since `begin`.
+  // The daemon counts as silent since `begin`.
   DaemonSilence(Options options, Time begin);
 
-  // `heard`: it has answered at least once. A line for people, if there is one to be said now.
+  // Returns a line for the user if there is something new to report. `heard` says that the daemon has answered at least
+  // once; `trouble` is KeyframeSink::trouble().
   std::optional<std::string> look(Time now, bool heard, const Status& trouble);
 
  private:

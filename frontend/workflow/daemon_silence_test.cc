@@ -11,7 +11,7 @@ const Status kUnreachable{Reason::UNREACHABLE, "nobody listens"};
 const Status kOtherMap{Reason::WRONG_MAP, "another map"};
 constexpr DaemonSilence::Time kStart{};
 
-TEST(DaemonSilence, IsToldOnceAfterAWhileAndSoIsItsEnd) {
+TEST(DaemonSilence, IsReportedOnceAfterItsPatienceAndSoIsItsEnd) {
   DaemonSilence silence({.daemon = "map.lab", .kept_in = "/spool"}, kStart);
   EXPECT_FALSE(silence.look(kStart + seconds(5), false, {}));
   EXPECT_EQ(silence.look(kStart + seconds(6), false, kUnreachable),
@@ -21,7 +21,7 @@ TEST(DaemonSilence, IsToldOnceAfterAWhileAndSoIsItsEnd) {
   EXPECT_FALSE(silence.look(kStart + seconds(62), true, {}));
 }
 
-TEST(DaemonSilence, OfADaemonThatHasAnsweredIsCountedFromItsTrouble) {
+TEST(DaemonSilence, BeginsWithTheTroubleOfADaemonThatHasAnswered) {
   DaemonSilence silence({.daemon = "map.lab", .kept_in = ""}, kStart);
   EXPECT_FALSE(silence.look(kStart + seconds(30), true, {}));
   EXPECT_FALSE(silence.look(kStart + seconds(40), true, kUnreachable));
@@ -30,7 +30,7 @@ TEST(DaemonSilence, OfADaemonThatHasAnsweredIsCountedFromItsTrouble) {
             "relmapd does not answer any more on map.lab (UNREACHABLE: nobody listens); keyframes wait in memory");
 }
 
-TEST(DaemonSilence, TheWrongMapOfALiveSessionIsToldAtOnce) {
+TEST(DaemonSilence, ReportsTheWrongMapOfALiveSessionAtOnce) {
   DaemonSilence live({.daemon = "map.lab", .kept_in = "/spool", .live = true}, kStart);
   EXPECT_EQ(live.look(kStart, true, kOtherMap),
             "nothing is sent on map.lab (WRONG_MAP: another map); keyframes wait in /spool for their own map; another "

@@ -47,7 +47,7 @@ Status Delivery::open_sink_in_its_map(publishing::PublisherOptions options, cons
   }
 }
 
-// Not longer than the run is wanted.
+// Ends early if the run is to stop.
 Status Delivery::await_map() {
   const std::jthread watcher([this](const std::stop_token& done) {
     while (!done.stop_requested() && !run_.stop) std::this_thread::sleep_for(run_.waits.look);
@@ -71,7 +71,7 @@ void Delivery::begin() {
                  last_keyframe_->sequence, summary.spool.c_str());
 }
 
-// By a thread of the transport's.
+// Called on a thread of the transport.
 void Delivery::hear(const PoseNews& news) {
   if (const auto line = pace_.hear(news, Clock::now()); line && !run_.options.quiet)
     std::fprintf(stderr, "%s\n", line->c_str());
@@ -82,7 +82,7 @@ void Delivery::hear(const PoseNews& news) {
                  printed(recovery->steps));
 }
 
-// Tells the sink when the run is to stop, and the user when no daemon listens.
+// Interrupts the sink when the run is to stop, and tells the user when the daemon does not answer.
 void Delivery::watch(const std::stop_token& done) {
   DaemonSilence silence(
       {.daemon = daemon(), .kept_in = run_.summary.spool, .live = run_.options.live, .patience = run_.waits.silence},
@@ -102,7 +102,7 @@ const std::string& Delivery::daemon() const {
 }
 
 Status Delivery::push(const Keyframe& keyframe) {
-  localisation_.publishing(keyframe);  // before anybody can answer
+  localisation_.publishing(keyframe);  // before the daemon can answer
   if (Status status = sink_->push(keyframe); !status.ok()) return status;
   frontend::RunSummary& summary = run_.summary;
   ++summary.keyframes;
@@ -128,10 +128,10 @@ void Delivery::show_progress() { progress_->show(run_.summary, sink_->progress()
 Status Delivery::finish(bool complete) {
   frontend::RunSummary& summary = run_.summary;
   if (!complete && !sends() && summary.keyframes > 0)
-    std::fprintf(stderr, "not all is written: %s.part has what came before\n", run_.options.out.c_str());
+    std::fprintf(stderr, "the file is incomplete: %s.part has the keyframes so far\n", run_.options.out.c_str());
   auto published = settle(complete);
   if (published.ok() && published->heard && published->all_settled()) {
-    // What an operator has closed is not ended by its robot, and the daemon says nothing to it.
+    // The daemon does not confirm the end of a session that an operator has frozen or deleted.
     if (!run_.stop && published->session.ok())
       sink_->end_session(run_.options.publisher.in_memory ? run_.options.patience_s : run_.waits.end_s);
     await_news();
@@ -148,7 +148,7 @@ Status Delivery::finish(bool complete) {
   return session.reason() == Reason::SESSION_DELETED ? session : Status();
 }
 
-// Settling may take longer than tracking did.
+// Shows progress while it waits, since settling may take longer than tracking did.
 Result<publishing::PublishSummary> Delivery::settle(bool complete) {
   std::jthread teller([this](const std::stop_token& done) {
     for (; progress_ && !done.stop_requested(); std::this_thread::sleep_for(run_.waits.look)) show_progress();
@@ -159,7 +159,8 @@ Result<publishing::PublishSummary> Delivery::settle(bool complete) {
   return published;
 }
 
-// Keyframes are looked up after they are settled: until that has been silent for a while.
+// The daemon looks keyframes up after they are settled, so news of them comes later. Waits until there has been none
+// for a while.
 void Delivery::await_news() const {
   const auto deadline = Clock::now() + run_.waits.news_most;
   auto heard = localisation_.counts().heard;

@@ -1,5 +1,5 @@
-// A run's keyframes on their way out: into a file, or to a daemon, with what the daemon says meanwhile and what people
-// are told of it.
+// Delivers a run's keyframes to a file or to a daemon, takes in the daemon's news, and tells the user what matters of
+// it.
 #pragma once
 
 #include <cstdint>
@@ -21,33 +21,35 @@
 
 namespace relmap::workflow {
 
-// Fills in what the run's summary says of the session and its keyframes. From its opening on a thread of its own tells
-// the sink when the run is to stop. Functions are called by one thread at a time, wanted_hz() by any.
+// Fills in the parts of the run's summary that describe the session and its keyframes. A thread of its own interrupts
+// the sink when the run is to stop. Its functions must be called by one thread at a time, except wanted_hz(), which is
+// thread-safe.
 class Delivery {
  public:
-  // `session`: its names hold where the options ask for no others. `recording`: what it is made of, for
-  // publisher_options(), and so is `spool_suffix`. A recording that was begun in another map than the daemon's, or in
-  // one that has lost what came after a backup, is published to it from its beginning. Reasons: session_header()'s, the
-  // sink's.
+  // Opens the sink. `session` has the names that are used unless the options give others. `recording` and
+  // `spool_suffix` are those of publisher_options(). A repeatable source whose session was begun in another map than
+  // the daemon's, or whose map was restored from a backup, is published again from its beginning. The reasons of
+  // session_header() and of the sink.
   static Result<std::unique_ptr<Delivery>> open(Run& run, const SessionHeader& session, const std::string& recording,
                                                 const std::string& spool_suffix = {});
   Delivery(const Delivery&) = delete;
   Delivery& operator=(const Delivery&) = delete;
 
   const SessionHeader& session() const { return sink_->session(); }
-  // Where a session that is continued goes on.
+  // The keyframe after which a continued session goes on; nullopt for a new session.
   const std::optional<Keyframe>& last_keyframe() const { return last_keyframe_; }
-  // What a source that cannot wait is to keep to; 0: as many as there are.
+  // The keyframe rate that the daemon asks a live source not to exceed, in Hz; 0 if there is no limit.
   double wanted_hz() const { return pace_.hz(); }
 
   Status push(const Keyframe& keyframe);
 
-  // Of `total` of those that the run reads; 0: nobody knows.
+  // `total` is the number of pairs or pictures (`what`) that the run reads; 0 if it is not known.
   void begin_progress(std::uint64_t total, const char* what = "pairs");
   void show_progress();
 
-  // No more keyframes. `complete`: there is nothing left to read, as far as can be told. Waits until all is settled and
-  // the news of it is heard, as long as the options have patience; once. SESSION_DELETED; the sink's reasons.
+  // Ends the delivery. Must be called at most once. `complete` says that the source was read to its end, as far as that
+  // is known. Waits until all keyframes are settled, or until options.patience_s has passed without progress, and then
+  // for the daemon's news of them. SESSION_DELETED, and the sink's reasons.
   Status finish(bool complete);
 
  private:

@@ -23,7 +23,7 @@ constexpr const char* kRecorded = "street";
 
 class DeliveryTest : public WorkflowTest {
  protected:
-  // `count` keyframes, a metre apart, of a session called morning; then the end.
+  // Delivers `count` keyframes, a metre apart, of a session called morning, and finishes.
   Status deliver(workflow::Run& run, std::uint32_t count, bool complete = true) {
     auto delivery = Delivery::open(run, session_called("morning"), kRecorded);
     if (!delivery.ok()) return delivery.status();
@@ -61,21 +61,21 @@ TEST_F(DeliveryTest, EveryKeyframeIsCountedSentAndSettled) {
   EXPECT_THAT(said_, IsEmpty());
 }
 
-TEST_F(DeliveryTest, WhatASinkRefusesToOpenIsTheEnd) {
+TEST_F(DeliveryTest, FailsIfTheSinkDoesNotOpen) {
   daemon_.refuses_to_open = {Reason::CALIBRATION_CHANGED, "another camera"};
   EXPECT_EQ(deliver_all(3).reason(), Reason::CALIBRATION_CHANGED);
   EXPECT_EQ(summary_.keyframes, 0u);
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(DeliveryTest, ARobotWithoutANameOpensNothing) {
+TEST_F(DeliveryTest, OpensNothingForARobotWithoutAName) {
   options_.robot.clear();
   EXPECT_EQ(deliver_all(3).reason(), Reason::INVALID_ARGUMENT);
   EXPECT_EQ(daemon_.opened.size(), 0u);
   EXPECT_EQ(exit_code(), kUsage);
 }
 
-TEST_F(DeliveryTest, OfAnotherMapARecordingIsSentFromItsBeginning) {
+TEST_F(DeliveryTest, SendsARecordingOfAnotherMapFromItsBeginning) {
   daemon_.maps = {{Reason::WRONG_MAP, "the daemon serves another map"}};
   ASSERT_TRUE(deliver_all(1).ok());
   ASSERT_EQ(daemon_.opened.size(), 2u);
@@ -84,7 +84,7 @@ TEST_F(DeliveryTest, OfAnotherMapARecordingIsSentFromItsBeginning) {
   EXPECT_EQ(said_, "the daemon serves another map: the recording is sent to it from its beginning\n");
 }
 
-TEST_F(DeliveryTest, OfAnotherMapALiveSessionStays) {
+TEST_F(DeliveryTest, DoesNotBeginALiveSessionOfAnotherMapAnew) {
   daemon_.maps = {{Reason::WRONG_MAP, "the daemon serves another map"}};
   options_.live = true;
   ASSERT_TRUE(deliver_all(1).ok());
@@ -119,7 +119,7 @@ TEST_F(DeliveryTest, AStopInterruptsTheSinkAndWaitsForNothing) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
-TEST_F(DeliveryTest, WhatADaemonTakesNoMoreIsNamed) {
+TEST_F(DeliveryTest, DoesNotEndASessionThatAnOperatorHasClosed) {
   daemon_.session = {Reason::SESSION_DELETED, "by its operator"};
   EXPECT_EQ(deliver_all(2).to_string(), "SESSION_DELETED: by its operator");
   EXPECT_EQ(daemon_.ends, 0) << "what an operator has closed is not ended by its robot";
@@ -129,7 +129,7 @@ TEST_F(DeliveryTest, WhatADaemonTakesNoMoreIsNamed) {
   EXPECT_EQ(daemon_.ends, 0);
 }
 
-TEST_F(DeliveryTest, WhatIsMissingInTheMapIsTold) {
+TEST_F(DeliveryTest, ReportsWhatIsMissingInTheMap) {
   daemon_.settles = false;
   daemon_.answers = false;
   daemon_.trouble = {Reason::UNREACHABLE, "nobody listens"};
@@ -145,7 +145,7 @@ TEST_F(DeliveryTest, WhatIsMissingInTheMapIsTold) {
   EXPECT_EQ(exit_code(), kUnsettled);
 }
 
-TEST_F(DeliveryTest, WhatTheDaemonAsksForIsKeptAndCounted) {
+TEST_F(DeliveryTest, KeepsAndCountsTheRateThatTheDaemonAsksFor) {
   options_.quiet = false;
   const Status status = run([&](workflow::Run& run) {
     auto delivery = Delivery::open(run, session_called("morning"), kRecorded).or_throw();
@@ -168,7 +168,7 @@ TEST_F(DeliveryTest, AFileGetsItsNameOnlyWhenItIsComplete) {
   options_.to = "file";
   options_.out = file("keyframes.bin");
   ASSERT_TRUE(deliver_all(2, false).ok());
-  EXPECT_EQ(said_, "not all is written: " + options_.out + ".part has what came before\n");
+  EXPECT_EQ(said_, "the file is incomplete: " + options_.out + ".part has the keyframes so far\n");
   EXPECT_TRUE(std::filesystem::exists(options_.out + ".part"));
   EXPECT_FALSE(std::filesystem::exists(options_.out));
   ASSERT_TRUE(deliver_all(2).ok());
@@ -179,14 +179,14 @@ TEST_F(DeliveryTest, AFileGetsItsNameOnlyWhenItIsComplete) {
   EXPECT_EQ(exit_code(), kDone);
 }
 
-TEST_F(DeliveryTest, AFileThatCannotBeWrittenIsTheEnd) {
+TEST_F(DeliveryTest, FailsIfTheFileCannotBeWritten) {
   options_.to = "file";
   options_.out = file("no such folder") + "/keyframes.bin";
   EXPECT_EQ(deliver_all(2).reason(), Reason::IO_ERROR);
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-// Nobody at its other end, and why.
+// A transport without a daemon at its other end.
 class DeadTransport final : public publishing::PublishTransport {
  public:
   Status trouble() const override { return {Reason::UNREACHABLE, "nobody listens"}; }
@@ -197,7 +197,7 @@ class DeadTransport final : public publishing::PublishTransport {
   void stop() override {}
 };
 
-TEST_F(DeliveryTest, APublisherWithoutADaemonKeepsWhatItHas) {
+TEST_F(DeliveryTest, LeavesKeyframesUnsettledWithoutADaemon) {
   options_.publisher.in_memory = true;
   options_.patience_s = 0;
   waits_.map_s = 0;

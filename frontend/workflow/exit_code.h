@@ -1,4 +1,4 @@
-// What relmap-frontend's exit code says of a run.
+// The exit codes of relmap-frontend.
 #pragma once
 
 #include "frontend/console.h"
@@ -9,13 +9,13 @@ namespace relmap::workflow {
 enum ExitCode {
   kDone = 0,
   kFailed = 1,
-  kUsage = 2,      // what was asked for is wrong
-  kUnsettled = 3,  // keyframes are left, were refused or given up
+  kUsage = 2,      // wrong arguments
+  kUnsettled = 3,  // keyframes are unsettled, were refused, or were given up as gaps
   kInterrupted = 4,
-  kUntrusted = 5,  // RunSummary::trusted()
+  kUntrusted = 5,  // not RunSummary::trusted()
 };
 
-// `status`: what run_frontend() returned. 1, 2 and 4 go before 3, and 3 before 5.
+// `status` is what run_frontend() returned. If several codes apply, 1 or 2 takes precedence, then 4, then 3, then 5.
 ExitCode exit_code_of(const Status& status, const frontend::RunSummary& summary);
 
 }  // namespace relmap::workflow

@@ -5,7 +5,7 @@
 namespace relmap::workflow {
 namespace {
 
-TEST(ExitCode, SaysTheWorstOfARun) {
+TEST(ExitCode, IsThatOfTheMostSeriousOutcome) {
   frontend::RunSummary summary;
   EXPECT_EQ(exit_code_of({}, summary), 0);
   summary.expected = 10;

@@ -1,4 +1,4 @@
-// The first keyframes of a recording, till it is known that it can be tracked.
+// Holds back the first keyframes of a recording until it is known that the recording can be tracked.
 #pragma once
 
 #include <cstddef>
@@ -13,17 +13,17 @@ namespace relmap::workflow {
 
 inline constexpr std::size_t kMaxHeldBack = 256;  // keyframes
 
-// A session begins with its first keyframe, and would stay in the map: of a recording of which no pair follows from
-// another none is sent. Not thread-safe.
+// A session exists in the map from its first keyframe on. So no keyframe is sent of a recording in which no pair could
+// be tracked from another. Not thread-safe.
 class HeldBack {
  public:
-  // Both must outlive it; `summary` counts the pairs that are tracked.
+  // Both must outlive this. `summary.tracked` is the number of pairs tracked so far; the first pair always counts.
   HeldBack(Delivery& delivery, const frontend::RunSummary& summary) : delivery_(delivery), summary_(summary) {}
 
-  // On to the delivery, in order, once two pairs hang together. untracked()'s reasons: none does, and kMaxHeldBack
-  // wait.
+  // Holds the keyframe back until a pair was tracked from another one; from then on passes all keyframes to the
+  // delivery, in order. untracked()'s reasons if kMaxHeldBack keyframes are held and no pair was; the delivery's.
   Status push(Keyframe keyframe);
-  // All that wait: of a single pair there is nothing to hold it back for.
+  // Passes on all keyframes that are held. For the end of a recording that has only one pair.
   Status release();
 
  private:

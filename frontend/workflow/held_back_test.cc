@@ -26,7 +26,7 @@ class HeldBackTest : public WorkflowTest {
   HeldBack held_back_{*delivery_, summary_};
 };
 
-TEST_F(HeldBackTest, KeyframesGoOnInOrderOnceTwoPairsHangTogether) {
+TEST_F(HeldBackTest, PassesKeyframesOnInOrderOnceAPairIsTrackedFromAnother) {
   summary_.tracked = 1;
   ASSERT_TRUE(held_back_.push(next_keyframe()).ok());
   ASSERT_TRUE(held_back_.push(next_keyframe()).ok());
@@ -37,7 +37,7 @@ TEST_F(HeldBackTest, KeyframesGoOnInOrderOnceTwoPairsHangTogether) {
   for (std::uint32_t i = 0; i < 3; ++i) EXPECT_EQ(daemon_.pushed[i].sequence, i);
 }
 
-TEST_F(HeldBackTest, OfASinglePairTheyAreReleased) {
+TEST_F(HeldBackTest, ReleasesTheKeyframeOfASinglePair) {
   summary_.tracked = 1;
   ASSERT_TRUE(held_back_.push(next_keyframe()).ok());
   ASSERT_TRUE(held_back_.release().ok());
@@ -46,7 +46,7 @@ TEST_F(HeldBackTest, OfASinglePairTheyAreReleased) {
   EXPECT_EQ(daemon_.pushed.size(), 1u) << "each once";
 }
 
-TEST_F(HeldBackTest, NotMoreThanSoManyWait) {
+TEST_F(HeldBackTest, FailsWhenTheMaximumIsHeld) {
   summary_.tracked = 1;
   summary_.pairs = 300;
   for (std::size_t i = 1; i < kMaxHeldBack; ++i) ASSERT_TRUE(held_back_.push(next_keyframe()).ok()) << i;
@@ -56,7 +56,7 @@ TEST_F(HeldBackTest, NotMoreThanSoManyWait) {
   EXPECT_EQ(daemon_.pushed.size(), 0u);
 }
 
-TEST_F(HeldBackTest, WhatTheDaemonRefusesIsToldOf) {
+TEST_F(HeldBackTest, ReturnsTheRefusalOfTheDaemon) {
   daemon_.takes = 0;
   daemon_.refuses_to_push = {Reason::SESSION_DELETED, "by its operator"};
   summary_.tracked = 2;

@@ -1,4 +1,4 @@
-// What a run reads, told by its options and by what lies at their path.
+// The kind of input that a run reads. It follows from the options and from what is at their path.
 #pragma once
 
 #include <string>
@@ -8,20 +8,20 @@
 
 namespace relmap::workflow {
 
-// Each has a workflow of its own.
+// There is one workflow for each.
 enum class Input {
-  kCamera,       // a live one
+  kCamera,       // a live stereo camera
   kPairs,        // a recording of stereo pairs
   kPhotographs,  // pictures of one camera, for a mono session
-  kKeyframes,    // a file of them, or a folder with one
+  kKeyframes,    // a keyframe file, or a folder that has one
   kLog,          // keyframes that lcm-logger recorded
 };
 Input input_of(const RunOptions& options, const Logs& logs);
 
-// Where the path's keyframes are, if it has any: the file itself, or keyframes.bin in the folder.
+// Where the keyframe file is, if there is one: the path itself, or keyframes.bin if the path is a folder.
 std::string keyframe_file(const RunOptions& options);
 
-// The last part of the path: what a session is called unless it has another name.
+// The last component of the path, which is the default name of a session.
 std::string name_of_path(const RunOptions& options);
 
 }  // namespace relmap::workflow

@@ -12,7 +12,7 @@
 namespace relmap::workflow {
 namespace {
 
-TEST(Input, IsToldByItsSourceOrByWhatLiesThere) {
+TEST(Input, FollowsFromTheSourceOrFromWhatIsAtThePath) {
   const capture::testing_files::TemporaryFolder folder;
   auto writer = capture::KeyframeFileWriter::create((folder.path() / "keyframes.bin").string()).or_throw();
   ASSERT_TRUE(writer.write(KeyframeSampler(1).keyframe()).ok());

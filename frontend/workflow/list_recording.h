@@ -1,4 +1,4 @@
-// What a recording is, without tracking it.
+// Describes a recording without tracking it.
 #pragma once
 
 #include "frontend/workflow/outside.h"
@@ -7,13 +7,17 @@
 
 namespace relmap::workflow {
 
-// What a recording is, on standard output, an object a line; no picture is read but the first. Of pairs and keyframes
-// one: "fingerprint", "count", "contents", "calibration" (RecordingIdentity), of pairs whose times nothing tells
-// "supposed_rate_hz", of keyframes "uuid", "robot" and "name" of their session, too. Of a log one for each session:
-// "uuid", "robot", "name", "first", "last". Of photographs (`mono`) one for each camera: "camera", "pictures", what
-// recordings of pairs have where they can be read at all, and what lies beside them, "folders_passed_over" and
-// "files_passed_over"; the heads of all are read. Reasons: open_source()'s, EventLog::open()'s, list_sessions()'s,
-// open_mono_images()'s, identity_of_keyframes()'s; INVALID_ARGUMENT: a camera.
+// Prints one JSON object a line on standard output. No picture but the first is read, except for the headers of all
+// photographs. Members of the objects:
+// - pairs, one object: "fingerprint", "count", "contents", "calibration" (RecordingIdentity), and "supposed_rate_hz" if
+//   the recording has no times;
+// - a keyframe file, one object: "uuid", "robot" and "name" of its session, and the RecordingIdentity;
+// - a log, one object a session: "uuid", "robot", "name", "first", "last";
+// - photographs (`mono`), one object a camera: "camera", "pictures", the RecordingIdentity if they can be read and
+//   otherwise "error", and what else is in the folder, "folders_passed_over" and "files_passed_over".
+//
+// The reasons of open_source(), EventLog::open(), list_sessions(), open_mono_images() and identity_of_keyframes();
+// INVALID_ARGUMENT for a camera.
 Status list_recording(const RunOptions& options, const Outside& outside);
 
 }  // namespace relmap::workflow

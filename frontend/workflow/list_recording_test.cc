@@ -20,7 +20,7 @@ using ::testing::StartsWith;
 
 class ListRecordingTest : public WorkflowTest {
  protected:
-  // What it writes on standard output.
+  // Returns what list_recording() writes on standard output.
   std::string list() {
     ::testing::internal::CaptureStdout();
     status_ = list_recording(options_, outside_);
@@ -30,7 +30,7 @@ class ListRecordingTest : public WorkflowTest {
   Status status_;
 };
 
-TEST_F(ListRecordingTest, OfPairsSaysWhatTellsThemFromOthers) {
+TEST_F(ListRecordingTest, PrintsTheIdentityOfPairs) {
   options_.source = "kitti";
   EXPECT_THAT(list(), StartsWith("{\"fingerprint\":\"street\",\"count\":12,\"contents\":\""));
   EXPECT_TRUE(status_.ok());
@@ -39,7 +39,7 @@ TEST_F(ListRecordingTest, OfPairsSaysWhatTellsThemFromOthers) {
   EXPECT_EQ(status_.reason(), Reason::NO_SUCH_FILE);
 }
 
-TEST_F(ListRecordingTest, OfKeyframesSaysWhoseTheyAre) {
+TEST_F(ListRecordingTest, PrintsTheSessionOfKeyframes) {
   options_.path = file("keyframes.bin");
   Keyframe keyframe = KeyframeSampler(1).keyframe();
   auto writer = capture::KeyframeFileWriter::create(options_.path).or_throw();
@@ -49,7 +49,7 @@ TEST_F(ListRecordingTest, OfKeyframesSaysWhoseTheyAre) {
                             HasSubstr("\"name\":\"morning\""), HasSubstr("\"count\":1")));
 }
 
-TEST_F(ListRecordingTest, OfALogHasALineASession) {
+TEST_F(ListRecordingTest, PrintsALineForEachSessionOfALog) {
   options_.source = "log";
   recording::RecordedSession session;
   session.header = session_called("morning");
@@ -67,7 +67,7 @@ TEST_F(ListRecordingTest, OfALogHasALineASession) {
   EXPECT_EQ(status_.reason(), Reason::BAD_SIZE);
 }
 
-TEST_F(ListRecordingTest, OfPhotographsHasALineACamera) {
+TEST_F(ListRecordingTest, PrintsALineForEachCameraOfPhotographs) {
   options_.mono = true;
   options_.path = file("tower");
   for (int i = 0; i < 2; ++i)
@@ -77,7 +77,7 @@ TEST_F(ListRecordingTest, OfPhotographsHasALineACamera) {
               AllOf(StartsWith("{\"camera\":"), HasSubstr("\"pictures\":2"), HasSubstr("\"folders_passed_over\":[]")));
 }
 
-TEST_F(ListRecordingTest, ALiveCameraIsNoRecording) {
+TEST_F(ListRecordingTest, RefusesALiveCamera) {
   options_.source = "iidc";
   EXPECT_EQ(list(), "");
   EXPECT_EQ(status_.to_string(), "INVALID_ARGUMENT: a live camera is no recording");

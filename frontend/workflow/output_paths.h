@@ -1,4 +1,4 @@
-// Nothing is written over what a run is made from, nor over something else that it writes.
+// Checks that a run overwrites neither its own inputs nor its other outputs.
 #pragma once
 
 #include "frontend/workflow/run_options.h"
@@ -6,7 +6,8 @@
 
 namespace relmap::workflow {
 
-// INVALID_ARGUMENT, naming the file. Files are the same whatever their paths look like.
+// INVALID_ARGUMENT, naming the file, if an output is also an input or another output. Different paths to one file are
+// recognised.
 Status check_output_paths(const RunOptions& options);
 
 }  // namespace relmap::workflow

@@ -10,7 +10,7 @@
 namespace relmap::workflow {
 namespace {
 
-TEST(OutputPaths, NothingIsWrittenOverWhatItIsMadeFrom) {
+TEST(OutputPaths, AreRefusedIfTheyAreInputs) {
   const capture::testing_files::TemporaryFolder folder;
   const std::string input = (folder.path() / "keyframes.bin").string();
   capture::testing_files::write_text(input, "anything");
@@ -30,7 +30,7 @@ TEST(OutputPaths, NothingIsWrittenOverWhatItIsMadeFrom) {
   EXPECT_TRUE(check_output_paths(options).ok());
 }
 
-TEST(OutputPaths, NothingIsWrittenTwice) {
+TEST(OutputPaths, AreRefusedIfTwoAreTheSame) {
   RunOptions options;
   options.path = "/street";
   options.report = "/tmp/./pairs";

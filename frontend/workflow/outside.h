@@ -1,4 +1,4 @@
-// What a run reaches outside its own process. A program gives it the real things, a test others.
+// What a run uses outside its own process: the daemon, recordings, logs and cameras. Tests replace these with fakes.
 #pragma once
 
 #include <atomic>
@@ -20,10 +20,11 @@
 
 namespace relmap::workflow {
 
-// The next of several keyframes; nothing at the end.
+// Returns the next keyframe; nullopt at the end.
 using NextKeyframe = std::function<Result<std::optional<Keyframe>>()>;
 
-// Logs of keyframes as robots published them. To read one takes LCM's messages, which not every build has.
+// Reads logs of keyframes that robots published. Logs consist of LCM messages, which not every build can read; by
+// default no file is a log.
 struct Logs {
   struct Session {
     SessionHeader header;
@@ -31,22 +32,22 @@ struct Logs {
     std::function<std::map<Reason, std::uint64_t>()> left_out;  // KeyframeLog::left_out()
   };
   std::function<bool(const std::string& path)> is_log = [](const std::string&) { return false; };
-  // `choice`: KeyframeLog::open()'s.
+  // `choice` is that of KeyframeLog::open().
   std::function<Result<Session>(const std::string& path, const std::string& choice)> open = {};
   std::function<Result<std::vector<recording::RecordedSession>>(const std::string& path)> list = {};
 };
 
-// Takes a camera that is there into use. May be called again where it was not.
+// Opens a camera. May be called again if the camera was not available.
 using OpenCamera =
     std::function<Result<std::unique_ptr<iidc::IidcSource>>(const iidc::IidcOptions&, const std::atomic<bool>& stop)>;
 
-// capture::open_source() of what the options name.
+// Calls capture::open_source() for the path in the options.
 Result<std::unique_ptr<capture::StereoSource>> open_recording(const RunOptions& options);
-// On the buses of that name; open_camera_buses()'s reason where there are none.
+// Opens the buses named `bus` and returns what opens cameras on them. The reasons of open_camera_buses().
 Result<OpenCamera> find_cameras(const std::string& bus);
 
 struct Outside {
-  // The way to the daemon that the options name, for what goes into no file. Must be set.
+  // Opens the sink to the daemon that the options name. Not used for output to a file. Must be set.
   std::function<Result<std::unique_ptr<frontend::KeyframeSink>>(const RunOptions&, const publishing::PublisherOptions&,
                                                                 const SessionHeader&)>
       open_daemon_sink;

@@ -13,7 +13,7 @@ void count_left_out(frontend::RunSummary& summary, Reason reason, std::uint64_t 
 
 Status untracked(const frontend::RunSummary& summary, const std::string& which) {
   const std::string none = which + std::to_string(summary.pairs) + " pairs could be tracked from the one before it";
-  if (summary.rig && summary.rig->wrong) {  // it follows from that
+  if (summary.rig && summary.rig->wrong) {  // a faulty rig explains it
     const Status finding = vision::with_advice(summary.rig->findings.front());
     return {finding.reason(), none + ": " + finding.message()};
   }
@@ -53,8 +53,8 @@ void PairCounts::expect(const capture::StereoSource& source, std::size_t every, 
   summary_.missing = source.missing();
   const std::uint64_t told = (source.expected() + every - 1) / every;
   if (to_its_end && told > 0)
-    summary_.expected = std::max(told, summary_.dropped) - summary_.dropped;  // what is dropped to keep up is no miss
-  else  // of a pair that came with one picture the other was left out
+    summary_.expected = std::max(told, summary_.dropped) - summary_.dropped;  // dropped to keep up is not missing
+  else  // if one picture of a pair came, the other is in left_out_
     summary_.expected = summary_.pairs + left_out_ - std::min(left_out_, one_came_);
 }
 

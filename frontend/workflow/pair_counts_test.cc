@@ -24,7 +24,7 @@ class PairCountsTest : public ::testing::Test {
  protected:
   frontend::RunSummary summary_;
   PairCounts counts_{summary_};
-  testing_pairs::FakePairs<> source_{testing_pairs::Script()};  // of twelve pairs
+  testing_pairs::FakePairs<> source_{testing_pairs::Script()};  // has twelve pairs
 };
 
 TEST_F(PairCountsTest, EachPairIsTrackedRepeatedOrLost) {
@@ -42,7 +42,7 @@ TEST_F(PairCountsTest, EachPairIsTrackedRepeatedOrLost) {
   EXPECT_EQ(summary_.tracking_ms, 8);
 }
 
-TEST_F(PairCountsTest, WhatIsLeftOutForItsStampIsCountedApart) {
+TEST_F(PairCountsTest, CountsPairsLeftOutForTheirStampSeparately) {
   tracking::PipelineSummary done;
   done.refused = {{Reason::TIME_AHEAD, 1}, {Reason::TIME_BACKWARDS, 2}, {Reason::PICTURE_DAMAGED, 3}};
   done.dropped = 4;
@@ -52,7 +52,7 @@ TEST_F(PairCountsTest, WhatIsLeftOutForItsStampIsCountedApart) {
   EXPECT_EQ(summary_.dropped, 4u);
 }
 
-TEST_F(PairCountsTest, OfAWholeRecordingItsOwnNumberIsExpected) {
+TEST_F(PairCountsTest, ExpectsAllPairsOfARecordingReadToItsEnd) {
   counts_.expect(source_, 1, true);
   EXPECT_EQ(summary_.expected, 12u);
   counts_.expect(source_, 5, true);
@@ -62,7 +62,7 @@ TEST_F(PairCountsTest, OfAWholeRecordingItsOwnNumberIsExpected) {
   EXPECT_EQ(summary_.expected, 1u) << "what was dropped to keep up is not missing";
 }
 
-TEST_F(PairCountsTest, OfARunThatEndedEarlyWhatItCameToIsExpected) {
+TEST_F(PairCountsTest, ExpectsThePairsThatARunReachedIfItEndedEarly) {
   counts_.add(counted(true));
   counts_.add(counted(true, false));
   tracking::PipelineSummary done;
@@ -72,7 +72,7 @@ TEST_F(PairCountsTest, OfARunThatEndedEarlyWhatItCameToIsExpected) {
   EXPECT_EQ(summary_.expected, 4u);
 }
 
-TEST_F(PairCountsTest, WhyNothingIsTrackedFollowsFromTheEyesIfTheyAreWrong) {
+TEST_F(PairCountsTest, ExplainsThatNothingIsTrackedByAFaultyRig) {
   summary_.pairs = 12;
   EXPECT_EQ(
       untracked(summary_, "none of ").to_string(),

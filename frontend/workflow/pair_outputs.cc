@@ -8,11 +8,11 @@ namespace relmap::workflow {
 
 namespace {
 
-constexpr double kFilmRate = 10;  // pairs a second where no rate is asked for
+constexpr double kFilmRate = 10;  // pairs a second, unless the options give a rate
 
 }  // namespace
 
-// The report, which may be emptied, comes last.
+// Opens the report last, since opening may empty it.
 Result<PairOutputs> PairOutputs::open(const RunOptions& options, bool goes_on) {
   PairOutputs outputs;
   if (!options.show.empty()) {

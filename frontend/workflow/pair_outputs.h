@@ -1,4 +1,4 @@
-// What a run writes of every pair that is tracked: a table of figures, and pictures of the tracks.
+// The optional outputs for each tracked pair: a table of figures (--report) and pictures of the tracks (--show).
 #pragma once
 
 #include <memory>
@@ -12,15 +12,17 @@
 
 namespace relmap::workflow {
 
-// Those that the options name. Not thread-safe.
+// Not thread-safe.
 class PairOutputs {
  public:
-  // `goes_on`: what an interrupted run left is added to. Reasons: open_track_show()'s, ReportFile::open()'s.
+  // Opens the outputs that the options name. If `goes_on`, the run continues an interrupted one, and its outputs are
+  // appended to. The reasons of open_track_show() and ReportFile::open().
   static Result<PairOutputs> open(const RunOptions& options, bool goes_on);
 
-  // In order; before the keyframe is taken out of the pair. Reasons: TrackShow::show()'s.
+  // Must be called in the order of the pairs, before the keyframe is moved out of the pair. TrackShow::show()'s
+  // reasons.
   Status add(const tracking::TrackedPair& pair);
-  Status close();  // IO_ERROR: not all of it is there
+  Status close();  // IO_ERROR if something could not be written
 
  private:
   PairOutputs() = default;

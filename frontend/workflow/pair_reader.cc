@@ -29,7 +29,7 @@ tracking::StampFilter PairReader::go_on_at(std::int64_t time_us) {
     source_.skip_before(time_us);
     return tracking::StampFilter(time_us - 1);
   }
-  // By how much the stamps after a clock was set are moved follows from all those before, as it did the first time.
+  // Where a clock was set, the offset of the stamps depends on all stamps before it. So they are filtered again.
   for (tracking::StampFilter stamps;;) {
     const tracking::StampFilter before = stamps;
     auto pair = read();

@@ -1,4 +1,4 @@
-// Pairs out of a source, at the run's rate and every n-th only, for the tracker.
+// Reads every n-th pair of a source for the tracker, at the run's rate.
 #pragma once
 
 #include <cstddef>
@@ -17,18 +17,18 @@ namespace relmap::workflow {
 // Not thread-safe.
 class PairReader {
  public:
-  // Both must outlive it.
+  // Both must outlive this.
   PairReader(Run& run, capture::StereoSource& source) : run_(run), source_(source) {}
 
-  // The next pair when it is due; nothing at the end, and once the run is to stop. An error is one pair that cannot be
-  // had.
+  // Waits until the next pair is due and returns it; nullopt at the end, and when the run is to stop. An error concerns
+  // one pair, and the next call continues after it.
   Result<std::optional<tracking::CapturedPair>> next();
 
-  // Passes over the pairs that an interrupted run had, up to the one of its last keyframe, of `time_us`: returns how
-  // stamps go on from there. Before the first next().
+  // Continues an interrupted run: passes over the pairs before that of its last keyframe, whose time is `time_us`.
+  // Returns the stamp filter to continue with. Must be called before the first next().
   tracking::StampFilter go_on_at(std::int64_t time_us);
 
-  // From now on it sees each pair as it is read.
+  // From now on, `seen` is called with each pair as it is read.
   void show_to(std::function<void(const capture::StereoFrame&)> seen) { seen_ = std::move(seen); }
 
  private:

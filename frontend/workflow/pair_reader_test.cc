@@ -11,7 +11,7 @@ namespace {
 
 class PairReaderTest : public WorkflowTest {
  protected:
-  // The indices of the pairs that come, -1 for one that cannot be had.
+  // Returns the indices of all pairs, with -1 for a pair that cannot be read.
   std::vector<int> read_all(PairReader& reader) {
     std::vector<int> read;
     for (;;) {
@@ -35,7 +35,7 @@ TEST_F(PairReaderTest, GivesEveryNthPair) {
   EXPECT_EQ(seen, 3);
 }
 
-TEST_F(PairReaderTest, GoesOnAfterAPairThatCannotBeHad) {
+TEST_F(PairReaderTest, ContinuesAfterAPairThatCannotBeRead) {
   script_.pairs[1] = Status(Reason::PICTURE_DAMAGED, "1.png");
   script_.pairs.resize(3, Status(Reason::CORRUPT, ""));
   testing_pairs::FakePairs<> source(script_);
@@ -50,7 +50,7 @@ TEST_F(PairReaderTest, EndsWhenTheRunIsToStop) {
   EXPECT_EQ(read_all(reader), (std::vector<int>{0, 1, 2, 3}));
 }
 
-TEST_F(PairReaderTest, BeginsAtTheLastKeyframeOfARunThatGoesOn) {
+TEST_F(PairReaderTest, BeginsAtTheLastKeyframeOfAnInterruptedRun) {
   testing_pairs::FakePairs<> source(script_);
   PairReader reader(run_, source);
   tracking::StampFilter stamps = reader.go_on_at(time_of(9));
@@ -58,12 +58,12 @@ TEST_F(PairReaderTest, BeginsAtTheLastKeyframeOfARunThatGoesOn) {
   EXPECT_EQ(stamps.admit(time_of(9)).or_throw(), time_of(9));
 }
 
-TEST_F(PairReaderTest, FollowsAClockThatWasSetUpToTheLastKeyframe) {
+TEST_F(PairReaderTest, FindsTheLastKeyframeBehindAClockThatWasSet) {
   const std::int64_t hour = 3'600'000'000;
   script_.stamps_rise = false;
   for (std::size_t i = 4; i < script_.pairs.size(); ++i) script_.pairs[i]->time_us -= hour;
   testing_pairs::FakePairs<> whole(script_), rest(script_);
-  // What the stamps of all pairs become when none is passed over.
+  // The filtered stamps of all pairs, when none is passed over.
   std::vector<std::pair<int, std::int64_t>> admitted;
   PairReader all(run_, whole);
   tracking::StampFilter from_the_start;

@@ -13,9 +13,9 @@ namespace relmap::workflow {
 namespace {
 
 struct ReadyMade {
-  std::string path;  // what they come out of
+  std::string path;  // where they come from
   NextKeyframe next;
-  std::string name;               // of the session, unless the options give one
+  std::string name;               // the session's, unless the options give one
   std::string spool_suffix = {};  // publisher_options()
 };
 
@@ -58,7 +58,7 @@ Status replay_file(Run& run) {
   const std::string path = keyframe_file(run.options);
   auto file = capture::KeyframeFileReader::open(path);
   if (!file.ok()) return file.status();
-  // What is wrong with the file is next()'s to name.
+  // If the file is damaged, next() returns the reason.
   if (auto identity = capture::identity_of_keyframes(path); identity.ok())
     run.summary.recording = std::move(identity->recording);
   return replay(run, {.path = path, .next = [&] { return file->next(); }, .name = name_of_path(run.options)});

@@ -1,4 +1,4 @@
-// The workflows of keyframes that are ready made: out of a file of them, or out of a log of what a robot published.
+// The workflows that send existing keyframes, from a keyframe file or from a log of what a robot published.
 #pragma once
 
 #include "frontend/workflow/run.h"
@@ -6,9 +6,10 @@
 
 namespace relmap::workflow {
 
-// At the run's rate, as a session of their own unless they are sent as recorded. What a spool knows already is passed
-// over. Reasons: those of who reads them, after what came before is sent; BAD_SIZE: there is none; UNSUPPORTED: a
-// report, tracks to be shown or all pairs are asked for, and there are no pairs; Delivery's.
+// Both send the keyframes at the run's rate, as a new session unless options.as_recorded. Keyframes up to the last one
+// in the spool are passed over. If reading fails, the keyframes before are sent, and the reader's reason is returned.
+// BAD_SIZE if there is no keyframe; UNSUPPORTED if a report, pictures of tracks or all pairs are asked for, since there
+// are no pairs; Delivery's reasons.
 Status replay_file(Run& run);
 Status replay_log(Run& run);
 

@@ -22,7 +22,7 @@ namespace {
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
-// Five keyframes of one session, which is called morning.
+// Five keyframes of one session called morning.
 std::vector<Keyframe> recorded_keyframes() {
   KeyframeSampler sampler(3);
   std::vector<Keyframe> keyframes;
@@ -78,13 +78,13 @@ TEST_F(ReplayKeyframesTest, EveryKeyframeOfAFileIsSentAsOneOfANewSession) {
   EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"keyframes\":5,"));
 }
 
-TEST_F(ReplayKeyframesTest, TheRobotIsTheOneRecordedUnlessAnotherIsNamed) {
+TEST_F(ReplayKeyframesTest, UsesTheRecordedRobotUnlessAnotherIsGiven) {
   options_.robot.clear();
   ASSERT_TRUE(run(replay_file).ok());
   EXPECT_EQ(summary_.robot, keyframes_[0].session.robot);
 }
 
-TEST_F(ReplayKeyframesTest, WhatIsBehindADamageIsNamedAfterWhatCameBefore) {
+TEST_F(ReplayKeyframesTest, SendsTheKeyframesBeforeADamageAndFails) {
   std::filesystem::resize_file(options_.path, std::filesystem::file_size(options_.path) - 3);
   const Status status = run(replay_file);
   EXPECT_EQ(status.reason(), Reason::TRUNCATED);
@@ -109,7 +109,7 @@ TEST_F(ReplayKeyframesTest, KeyframesHaveNoPairsToReport) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(ReplayKeyframesTest, AStopEndsItInOrder) {
+TEST_F(ReplayKeyframesTest, EndsInOrderWhenStopped) {
   daemon_.pushed_one = [this](std::size_t count) { stop_ = stop_ || count == 3; };
   ASSERT_TRUE(run(replay_file).ok());
   EXPECT_EQ(daemon_.pushed.size(), 3u);
@@ -118,7 +118,7 @@ TEST_F(ReplayKeyframesTest, AStopEndsItInOrder) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
-TEST_F(ReplayKeyframesTest, WhatTheDaemonRefusesEndsIt) {
+TEST_F(ReplayKeyframesTest, EndsWhenAKeyframeIsRefused) {
   daemon_.takes = 2;
   daemon_.refuses_to_push = {Reason::IO_ERROR, "the spool is full"};
   EXPECT_EQ(run(replay_file).reason(), Reason::IO_ERROR);
@@ -127,7 +127,7 @@ TEST_F(ReplayKeyframesTest, WhatTheDaemonRefusesEndsIt) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(ReplayKeyframesTest, PassesOverWhatTheSpoolKnows) {
+TEST_F(ReplayKeyframesTest, PassesOverKeyframesThatTheSpoolKnows) {
   daemon_.last = keyframes_[2];
   ASSERT_TRUE(run(replay_file).ok());
   ASSERT_EQ(daemon_.pushed.size(), 2u);
@@ -135,7 +135,7 @@ TEST_F(ReplayKeyframesTest, PassesOverWhatTheSpoolKnows) {
   EXPECT_EQ(summary_.gone_on, 2u);
 }
 
-TEST_F(ReplayKeyframesTest, OfALogTheSessionThatIsChosenIsSent) {
+TEST_F(ReplayKeyframesTest, SendsTheChosenSessionOfALog) {
   options_.recorded = "morning";
   options_.as_recorded = true;
   ASSERT_TRUE(run(replay_log).ok());
@@ -155,7 +155,7 @@ TEST_F(ReplayKeyframesTest, ASessionThatALogDoesNotHoldIsWrongUsage) {
   EXPECT_EQ(exit_code(), kUsage);
 }
 
-TEST_F(ReplayKeyframesTest, TheDamagedEndOfALogIsNamedAfterWhatCameBefore) {
+TEST_F(ReplayKeyframesTest, SendsTheKeyframesBeforeTheDamagedEndOfALogAndFails) {
   log_end_ = {Reason::CORRUPT, "damaged to its end"};
   EXPECT_EQ(run(replay_log).reason(), Reason::CORRUPT);
   EXPECT_EQ(daemon_.pushed.size(), 5u);

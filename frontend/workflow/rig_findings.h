@@ -1,4 +1,4 @@
-// What people are told of a stereo camera's eyes.
+// Messages about a stereo camera that does not agree with its calibration (RigCheck).
 #pragma once
 
 #include "frontend/console.h"
@@ -6,11 +6,12 @@
 
 namespace relmap::workflow {
 
-// On standard error, what the check of the eyes found; that they could not be checked, unless `quiet`. The summary has
-// its rig.
+// Prints the findings about the stereo camera on standard error and, unless `quiet`, that it could not be checked.
+// summary.rig must be set.
 void tell_rig_findings(const frontend::RunSummary& summary, bool quiet);
 
-// What is plainly wrong, all of it in the message, with what helps; the reason is the first one's.
+// The status that refuses a recording with findings. The message has all findings with advice; the reason is that of
+// the first. There must be at least one.
 Status refusal_of_rig(const frontend::RunSummary& summary);
 
 }  // namespace relmap::workflow

@@ -1,4 +1,4 @@
-// What the parts of one run share: what it is asked for, what it reaches, when it is to stop, and what it has to tell.
+// What the parts of one run share: its options, the outside, the stop flag, and the summary.
 #pragma once
 
 #include <atomic>
@@ -12,22 +12,22 @@
 
 namespace relmap::workflow {
 
-// How long a run waits for others. Tests wait less.
+// Intervals and time limits of a run. Tests use shorter ones.
 struct Waits {
-  std::chrono::milliseconds look{50};           // between two looks at what may have changed
-  std::chrono::milliseconds camera{1000};       // between two tries to open one
-  std::chrono::milliseconds silence{5000};      // of a daemon, until that is said
-  std::chrono::milliseconds slowed{15'000};     // for a daemon to ask again for fewer keyframes
-  std::chrono::milliseconds news_silence{500};  // after which no more news is expected
-  std::chrono::milliseconds news_most{10'000};  // for news, if there is no such silence
-  double map_s = 5;                             // for a daemon to say which map it serves
-  double end_s = 2;                             // for word that the end of a session is noted
+  std::chrono::milliseconds look{50};           // interval of polling
+  std::chrono::milliseconds camera{1000};       // interval of attempts to open a camera
+  std::chrono::milliseconds silence{5000};      // a daemon silent for so long is reported
+  std::chrono::milliseconds slowed{15'000};     // a daemon's limit on the rate expires if not repeated
+  std::chrono::milliseconds news_silence{500};  // after such a silence no more news is expected
+  std::chrono::milliseconds news_most{10'000};  // maximum wait for news at the end
+  double map_s = 5;                             // seconds for a daemon to say which map it serves
+  double end_s = 2;                             // seconds for a daemon to confirm the end of a session
 };
 
-inline constexpr std::size_t kMaxNamedLeftOut = 100'000;  // pictures and pairs of a recording
+inline constexpr std::size_t kMaxNamedLeftOut = 100'000;  // pictures and pairs of a recording that the summary names
 
 struct Run {
-  // All of these must outlive it. The rate of its pairs counts from here.
+  // The arguments must outlive this, except `run_waits`. Pairs are paced from the construction on.
   Run(const RunOptions& run_options, const Outside& run_outside, const std::atomic<bool>& run_stop,
       frontend::RunSummary& run_summary, const Waits& run_waits = {})
       : options(run_options),
@@ -39,8 +39,8 @@ struct Run {
         refusals(is_camera() ? 0 : kMaxNamedLeftOut) {}
 
   bool is_camera() const { return options.source == "iidc"; }
-  // Whether `status` says no more than that the run was to stop: then the sink takes nothing more, and the session goes
-  // on there the next time.
+  // Whether `status` is only the consequence of the run being stopped: the sink takes nothing more, and the next run
+  // continues the session.
   bool was_interrupted(const Status& status) const { return stop && status.reason() == Reason::SHUTTING_DOWN; }
 
   const RunOptions& options;

@@ -15,7 +15,7 @@ class RunFrontendTest : public WorkflowTest {
   Status run_all() { return run_frontend(options_, outside_, stop_, summary_, waits_); }
 };
 
-TEST_F(RunFrontendTest, TheSummaryIsFilledHoweverItEnds) {
+TEST_F(RunFrontendTest, FillsInTheSummaryEvenIfTheRunFails) {
   ASSERT_TRUE(run_all().ok());
   EXPECT_EQ(summary_.tracked, 12u);
   EXPECT_GT(summary_.wall_s, 0);

@@ -27,7 +27,7 @@ publishing::PublisherOptions publisher_options(const RunOptions& options, const 
   publisher.live = options.live;
   publisher.recording = recording;
   if (options.all_keyframes) publisher.recording += ", all keyframes";
-  // Whole ones, the default, are not named.
+  // The default, whole pictures, is not named.
   if (options.picture == tracking::KeyframePicture::kSmall) publisher.recording += ", small pictures";
   if (options.picture == tracking::KeyframePicture::kNone) publisher.recording += ", no pictures";
   if (options.every > 1) publisher.recording += ", every " + std::to_string(options.every);

@@ -1,4 +1,4 @@
-// Which session a run publishes, and how, by its options and by what it reads.
+// The session that a run publishes and the publisher's options, derived from the run's options and its input.
 #pragma once
 
 #include <string>
@@ -10,12 +10,14 @@
 
 namespace relmap::workflow {
 
-// What `recorded` has holds where the options ask for nothing else; a uuid only as recorded, else a nil one is left for
-// the sink to choose. INVALID_ARGUMENT: the robot has no name; BAD_NAME.
+// Returns `recorded` with the robot and session names of the options, where these are given. The uuid is that of
+// `recorded` if options.as_recorded; otherwise it is options.uuid, or nil if that is empty, for which the sink chooses
+// a random one. INVALID_ARGUMENT if the robot has no name; BAD_NAME.
 Result<SessionHeader> session_header(const RunOptions& options, const SessionHeader& recorded);
 
-// `recording`: what the session is made of (DiskSpool::open()), to which is added what makes other keyframes of it.
-// `spool_suffix`: of the default spool, where a robot's session of one name may be several.
+// Completes options.publisher. `recording` identifies the source of the session (DiskSpool::open()); the options that
+// make other keyframes of the same source are added to it. `spool_suffix` is appended to the default spool folder, for
+// inputs in which several sessions of a robot may have the same name.
 publishing::PublisherOptions publisher_options(const RunOptions& options, const SessionHeader& session,
                                                const std::string& recording, const std::string& spool_suffix);
 

@@ -14,7 +14,7 @@ SessionHeader recorded_header() {
   return header;
 }
 
-TEST(SessionOptions, NamesHoldAsRecordedUnlessOthersAreAskedFor) {
+TEST(SessionOptions, KeepRecordedNamesUnlessOthersAreGiven) {
   RunOptions options;
   EXPECT_EQ(session_header(options, recorded_header())->robot, "recorded");
   EXPECT_EQ(session_header(options, recorded_header())->name, "morning");
@@ -37,7 +37,7 @@ TEST(SessionOptions, ARobotWithoutANameIsWrongUsage) {
   EXPECT_EQ(session_header(options, recorded_header()).reason(), Reason::BAD_NAME);
 }
 
-TEST(SessionOptions, ASessionIsItselfOnlyAsRecorded) {
+TEST(SessionOptions, KeepTheRecordedUuidOnlyIfAsked) {
   RunOptions options;
   EXPECT_TRUE(session_header(options, recorded_header())->uuid.is_nil()) << "a new one";
   options.uuid = "7a0c1f52-5f0e-4c7d-9d43-0a8f6b1f2e11";
@@ -47,7 +47,7 @@ TEST(SessionOptions, ASessionIsItselfOnlyAsRecorded) {
   EXPECT_EQ(session_header(options, recorded_header())->uuid, recorded_header().uuid);
 }
 
-TEST(SessionOptions, WhatMakesOtherKeyframesOfARecordingNamesIt) {
+TEST(SessionOptions, AddToTheRecordingWhatMakesOtherKeyframesOfIt) {
   RunOptions options;
   const auto named = [&] { return publisher_options(options, recorded_header(), "street", "").recording; };
   EXPECT_EQ(named(), "street");
@@ -60,7 +60,7 @@ TEST(SessionOptions, WhatMakesOtherKeyframesOfARecordingNamesIt) {
   EXPECT_EQ(named(), "street, no pictures");
 }
 
-TEST(SessionOptions, TheSpoolIsTheSessionsOwnUnlessItIsNamed) {
+TEST(SessionOptions, GiveEachSessionASpoolUnlessOneIsNamed) {
   RunOptions options;
   options.patience_s = 2.5;
   options.live = true;

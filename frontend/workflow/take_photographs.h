@@ -1,4 +1,4 @@
-// The workflow of pictures of one camera: each becomes a keyframe of a mono session by itself.
+// The workflow for pictures of one camera: each picture becomes a keyframe of a mono session.
 #pragma once
 
 #include "frontend/workflow/run.h"
@@ -6,8 +6,8 @@
 
 namespace relmap::workflow {
 
-// Reasons: open_mono_images()'s, Delivery's, PictureReport::open()'s; where no picture became a keyframe, why one of
-// them did not, or NO_SUCH_FILE.
+// The reasons of open_mono_images(), Delivery and PictureReport::open(). If no picture became a keyframe, the reason
+// why one of them did not, or NO_SUCH_FILE.
 Status take_photographs(Run& run);
 
 }  // namespace relmap::workflow

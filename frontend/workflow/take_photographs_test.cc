@@ -61,14 +61,14 @@ TEST_F(TakePhotographsTest, EachPictureBecomesAKeyframe) {
   EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"mono\":true,\"pairs\":6,"));
 }
 
-TEST_F(TakePhotographsTest, AFolderWithoutPicturesIsTheEnd) {
+TEST_F(TakePhotographsTest, FailsOnAFolderWithoutPictures) {
   options_.path = file("nowhere");
   EXPECT_EQ(run(take_photographs).reason(), Reason::NO_SUCH_FILE);
   EXPECT_EQ(daemon_.opened.size(), 0u);
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TakePhotographsTest, APictureThatCannotBeReadIsLeftOutByName) {
+TEST_F(TakePhotographsTest, NamesAPictureThatCannotBeRead) {
   capture::testing_files::write_text(picture(3), "no picture");
   ASSERT_TRUE(run(take_photographs).ok());
   EXPECT_EQ(summary_.keyframes, 5u);
@@ -78,7 +78,7 @@ TEST_F(TakePhotographsTest, APictureThatCannotBeReadIsLeftOutByName) {
   EXPECT_EQ(exit_code(), kDone);
 }
 
-TEST_F(TakePhotographsTest, WhereNoneBecomesAKeyframeItSaysWhy) {
+TEST_F(TakePhotographsTest, SaysWhyNoPictureBecameAKeyframe) {
   for (int i = 0; i < kPictures; ++i) {
     const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(90 + i));
     capture::testing_files::write_picture(picture(i), grey);
@@ -88,7 +88,7 @@ TEST_F(TakePhotographsTest, WhereNoneBecomesAKeyframeItSaysWhy) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TakePhotographsTest, AStopEndsItInOrder) {
+TEST_F(TakePhotographsTest, EndsInOrderWhenStopped) {
   for (int i = kPictures; i < 20; ++i) take(i);  // more than are described at once
   daemon_.pushed_one = [this](std::size_t count) { stop_ = stop_ || count == 2; };
   daemon_.takes_after_interrupt = true;
@@ -101,7 +101,7 @@ TEST_F(TakePhotographsTest, AStopEndsItInOrder) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
-TEST_F(TakePhotographsTest, WhatTheDaemonRefusesEndsIt) {
+TEST_F(TakePhotographsTest, EndsWhenAKeyframeIsRefused) {
   daemon_.takes = 2;
   daemon_.refuses_to_push = {Reason::SESSION_DELETED, "by its operator"};
   EXPECT_EQ(run(take_photographs).reason(), Reason::SESSION_DELETED);
@@ -109,7 +109,7 @@ TEST_F(TakePhotographsTest, WhatTheDaemonRefusesEndsIt) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TakePhotographsTest, GoesOnAfterTheLastPictureOfAnInterruptedRun) {
+TEST_F(TakePhotographsTest, ContinuesAfterTheLastPictureOfAnInterruptedRun) {
   ASSERT_TRUE(run(take_photographs).ok());
   daemon_.last = daemon_.pushed.at(3);
   daemon_.pushed.clear();

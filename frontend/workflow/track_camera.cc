@@ -14,7 +14,7 @@ namespace relmap::workflow {
 
 namespace {
 
-// Of a camera that was not there when it was looked for.
+// Whether a camera that could not be opened for this reason may become available.
 bool may_come(Reason reason) {
   return reason == Reason::NO_CAMERA || reason == Reason::CAMERA_GONE || reason == Reason::CAMERA_BUSY ||
          reason == Reason::CAMERA_FORBIDDEN;

@@ -1,4 +1,4 @@
-// The workflow of a live stereo camera: waited for, tracked until the run is to stop, its eyes checked meanwhile.
+// The workflow for a live stereo camera: waits for it, tracks it until the run is to stop, and checks its calibration.
 #pragma once
 
 #include "frontend/workflow/run.h"
@@ -6,9 +6,9 @@
 
 namespace relmap::workflow {
 
-// With options.wait a camera that is not there yet, or not to be had, is waited for. Reasons: open_camera_buses()'s,
-// IidcSource::open()'s; NOT_STEREO: one eye; those of track_pairs(). What is wrong with its eyes is told, and it goes
-// on.
+// With options.wait, waits for a camera that is not connected yet or not available. If the camera does not agree with
+// its calibration, this is reported and tracking continues. The reasons of open_camera_buses(), IidcSource::open() and
+// track_pairs(); NOT_STEREO if the camera has one eye.
 Status track_camera(Run& run);
 
 }  // namespace relmap::workflow

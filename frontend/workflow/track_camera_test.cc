@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// One that sends the street's pairs, and then the run is to stop.
+// A camera that sends the street's pairs and then stops the run.
 class TrackCameraTest : public WorkflowTest {
  protected:
   TrackCameraTest() {
@@ -49,14 +49,14 @@ class TrackCameraTest : public WorkflowTest {
   }
 
   Status no_bus_;
-  std::vector<Status> absent_;  // what it answers, one after another, before it is there
+  std::vector<Status> absent_;  // what opening answers, one after another, before it succeeds
   bool for_good_ = false, stop_when_absent_ = false;
   int tries_ = 0;
   iidc::IidcOptions asked_;
   iidc::LiveCounts counts_{.frames = 12, .lost = 3, .faults = {}, .reopened = 1, .begun_anew = 2, .drift_ppm = 4.5};
 };
 
-TEST_F(TrackCameraTest, IsTrackedUntilTheRunIsToStop) {
+TEST_F(TrackCameraTest, TracksUntilTheRunIsStopped) {
   options_.camera_folder = "/cameras";
   ASSERT_TRUE(run(track_camera).ok());
   EXPECT_EQ(asked_.rate_hz, 20);
@@ -77,7 +77,7 @@ TEST_F(TrackCameraTest, IsTrackedUntilTheRunIsToStop) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
-TEST_F(TrackCameraTest, IsWaitedForWhereThatIsAskedFor) {
+TEST_F(TrackCameraTest, WaitsForTheCameraIfAsked) {
   options_.wait = true;
   absent_ = {{Reason::NO_CAMERA, "none"}, {Reason::NO_CAMERA, "none"}, {Reason::CAMERA_BUSY, "another program has it"}};
   ASSERT_TRUE(run(track_camera).ok());
@@ -88,14 +88,14 @@ TEST_F(TrackCameraTest, IsWaitedForWhereThatIsAskedFor) {
   EXPECT_GE(summary_.pairs, 1u);
 }
 
-TEST_F(TrackCameraTest, IsNotWaitedForOtherwise) {
+TEST_F(TrackCameraTest, DoesNotWaitForTheCameraUnlessAsked) {
   absent_ = {{Reason::NO_CAMERA, "none"}};
   EXPECT_EQ(run(track_camera).to_string(), "NO_CAMERA: none");
   EXPECT_EQ(tries_, 1);
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TrackCameraTest, WhatIsWrongForGoodIsNotWaitedFor) {
+TEST_F(TrackCameraTest, DoesNotWaitAfterAPermanentError) {
   options_.wait = true;
   absent_ = {{Reason::BAD_CONFIG, "no such mode"}};
   EXPECT_EQ(run(track_camera).reason(), Reason::BAD_CONFIG);
@@ -112,7 +112,7 @@ TEST_F(TrackCameraTest, AStopEndsTheWait) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TrackCameraTest, GoesOnAfterItsFaults) {
+TEST_F(TrackCameraTest, ContinuesAfterAFaultOfTheCamera) {
   script_.pairs[5] = Status(Reason::CAMERA_GONE, "unplugged");
   ASSERT_TRUE(run(track_camera).ok());
   EXPECT_EQ(summary_.unreadable.at(Reason::CAMERA_GONE), 1u);
@@ -121,7 +121,7 @@ TEST_F(TrackCameraTest, GoesOnAfterItsFaults) {
   EXPECT_THAT(said_, HasSubstr("CAMERA_GONE: unplugged\n"));
 }
 
-TEST_F(TrackCameraTest, EyesThatAreWrongAreToldAndItGoesOn) {
+TEST_F(TrackCameraTest, ReportsAFaultyRigAndContinues) {
   for (auto& pair : script_.pairs) pair->right = vision::Image(pair->right.width(), pair->right.height());
   ASSERT_TRUE(run(track_camera).ok());
   EXPECT_THAT(said_, HasSubstr("the eyes are not as the calibration says: EYE_DEAD: "));
@@ -129,7 +129,7 @@ TEST_F(TrackCameraTest, EyesThatAreWrongAreToldAndItGoesOn) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
-TEST_F(TrackCameraTest, WhatTheDaemonRefusesEndsIt) {
+TEST_F(TrackCameraTest, EndsWhenAKeyframeIsRefused) {
   daemon_.takes = 0;
   daemon_.refuses_to_push = {Reason::SESSION_DELETED, "by its operator"};
   EXPECT_EQ(run(track_camera).reason(), Reason::SESSION_DELETED);

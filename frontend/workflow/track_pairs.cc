@@ -44,7 +44,7 @@ Status track_pairs(Run& run, const PairsToTrack& pairs) {
   if (!opened.ok()) return opened.status();
   Delivery& delivery = **opened;
   const auto& last = delivery.last_keyframe();
-  // Only a spool knows whether a run goes on.
+  // Whether the run continues another is known only from the spool.
   auto outputs = PairOutputs::open(options, last.has_value());
   if (!outputs.ok()) return outputs.status();
 

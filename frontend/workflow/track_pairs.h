@@ -1,5 +1,5 @@
-// Stereo pairs, wherever they come from, through the tracking pipeline into a session: what recordings and cameras have
-// in common.
+// Tracks stereo pairs and delivers their keyframes as a session: the common part of the workflows for recordings and
+// cameras.
 #pragma once
 
 #include <functional>
@@ -11,20 +11,20 @@
 
 namespace relmap::workflow {
 
-// Says what the source is. NOT_STEREO: it has one eye.
+// Prints the source's description, unless options.quiet. NOT_STEREO if it has one eye.
 Status introduce_stereo(const Run& run, const capture::StereoSource& source);
 
 struct PairsToTrack {
   capture::StereoSource& source;
-  std::string name;  // of the session, unless the options give one
-  // Keyframes of a new session wait until two pairs hang together (HeldBack). What cannot be read again is sent as it
-  // comes.
+  std::string name;  // the session's, unless the options give one
+  // Keyframes of a new session wait until a pair was tracked from another (HeldBack). Not for a live camera, whose
+  // keyframes are sent as they come.
   bool hold_back = false;
-  std::function<void(const capture::StereoFrame&)> read = {};  // each pair, as it came
-  std::function<void()> ended = {};                            // the last one is tracked and counted
+  std::function<void(const capture::StereoFrame&)> read = {};  // called with each pair as it was read
+  std::function<void()> ended = {};                            // called after the last pair was tracked and counted
 };
-// Reasons: ImuFeed::open()'s, Delivery's, PairOutputs', Pipeline::run()'s; untracked()'s: nothing could be tracked, and
-// what was held back is not sent.
+// The reasons of ImuFeed::open(), Delivery, PairOutputs and Pipeline::run(). untracked()'s reasons if no pair could be
+// tracked from another; keyframes that were held back are then not sent.
 Status track_pairs(Run& run, const PairsToTrack& pairs);
 
 }  // namespace relmap::workflow

@@ -11,7 +11,7 @@ namespace relmap::workflow {
 
 namespace {
 
-// Before anything is begun, by a reader of its own.
+// Opens the recording a second time, so that tracking still begins at its first pair.
 Status check_eyes(Run& run) {
   auto opened = run.outside.open_pairs(run.options);
   if (!opened.ok()) return opened.status();

@@ -1,4 +1,4 @@
-// The workflow of a recording of stereo pairs: checked, tracked, and sent or written.
+// The workflow for a recording of stereo pairs: checks it, tracks it, and delivers its keyframes.
 #pragma once
 
 #include "frontend/workflow/run.h"
@@ -6,8 +6,9 @@
 
 namespace relmap::workflow {
 
-// Reasons: open_source()'s; NOT_STEREO: one eye; NOT_STEREO, ROWS_APART, EYE_DEAD: what the first pairs show is wrong,
-// and nothing was begun; those of track_pairs(), which sends nothing of a recording that cannot be tracked.
+// The reasons of open_source() and track_pairs(). NOT_STEREO if the source has one eye. NOT_STEREO, ROWS_APART or
+// EYE_DEAD if the first pairs show that the stereo camera is faulty; nothing is sent then. Neither is anything sent of
+// a recording that cannot be tracked.
 Status track_recording(Run& run);
 
 }  // namespace relmap::workflow

@@ -22,7 +22,7 @@ using ::testing::StartsWith;
 
 class TrackRecordingTest : public WorkflowTest {
  protected:
-  // Pictures without any texture, no two alike.
+  // A pair of pictures without texture. No two pairs are alike.
   static capture::StereoFrame blank(std::size_t i) {
     capture::StereoFrame pair = testing_pairs::street()[i];
     for (vision::Image* eye : {&pair.left, &pair.right})
@@ -53,7 +53,7 @@ TEST_F(TrackRecordingTest, EveryPairIsTrackedAndItsKeyframesAreSent) {
   EXPECT_THAT(frontend::summary_json(summary_), HasSubstr("\"error\":null"));
 }
 
-TEST_F(TrackRecordingTest, ItsReportHasALineAPair) {
+TEST_F(TrackRecordingTest, WritesALineForEachPairToTheReport) {
   options_.report = file("pairs.tsv");
   options_.show = file("tracks");
   ASSERT_TRUE(run(track_recording).ok());
@@ -65,14 +65,14 @@ TEST_F(TrackRecordingTest, ItsReportHasALineAPair) {
   EXPECT_TRUE(std::filesystem::exists(file("tracks/000011.png")));
 }
 
-TEST_F(TrackRecordingTest, AReportThatCannotBeWrittenIsTheEnd) {
+TEST_F(TrackRecordingTest, FailsIfTheReportCannotBeWritten) {
   options_.report = file("no such folder") + "/pairs.tsv";
   EXPECT_EQ(run(track_recording).reason(), Reason::IO_ERROR);
   EXPECT_EQ(summary_.pairs, 0u);
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TrackRecordingTest, ARecordingThatCannotBeOpenedIsTheEnd) {
+TEST_F(TrackRecordingTest, FailsIfTheRecordingCannotBeOpened) {
   no_recording_ = {Reason::NO_CALIBRATION, "there is none"};
   EXPECT_EQ(run(track_recording).to_string(), "NO_CALIBRATION: there is none");
   EXPECT_EQ(daemon_.opened.size(), 0u);
@@ -81,7 +81,7 @@ TEST_F(TrackRecordingTest, ARecordingThatCannotBeOpenedIsTheEnd) {
               HasSubstr("\"error\":{\"reason\":\"NO_CALIBRATION\",\"message\":\"there is none\"}"));
 }
 
-TEST_F(TrackRecordingTest, PairsThatCannotBeReadAreLeftOutByName) {
+TEST_F(TrackRecordingTest, NamesPairsThatCannotBeRead) {
   script_.pairs[3] = Status(Reason::PICTURE_DAMAGED, "3.png is cut off");
   script_.pairs[7]->right = vision::Image();
   script_.pairs[7]->eye_missing = {Reason::NO_SUCH_FILE, "7.png of the right eye"};
@@ -107,7 +107,7 @@ TEST_F(TrackRecordingTest, ASourceThatFailsForGoodIsNotTrusted) {
   EXPECT_THAT(frontend::summary_text(summary_), StartsWith("NOT TO BE TRUSTED\n"));
 }
 
-TEST_F(TrackRecordingTest, AStopEndsItInOrder) {
+TEST_F(TrackRecordingTest, EndsInOrderWhenStopped) {
   script_.before = [&](std::size_t i) {
     if (i == 6) stop_ = true;
   };
@@ -130,7 +130,7 @@ TEST_F(TrackRecordingTest, AStopBeforeItsFirstPairSendsNothing) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
-TEST_F(TrackRecordingTest, WhatTheDaemonRefusesEndsIt) {
+TEST_F(TrackRecordingTest, EndsWhenAKeyframeIsRefused) {
   daemon_.takes = 1;
   daemon_.refuses_to_push = {Reason::SEQUENCE_CONFLICT, "other keyframes under that uuid"};
   options_.all_keyframes = true;
@@ -140,7 +140,7 @@ TEST_F(TrackRecordingTest, WhatTheDaemonRefusesEndsIt) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TrackRecordingTest, EyesThatArePlainlyWrongAreRefusedBeforeAnythingIsBegun) {
+TEST_F(TrackRecordingTest, RefusesAFaultyRigBeforeAnythingIsSent) {
   for (auto& pair : script_.pairs) std::swap(pair->left, pair->right);
   const Status status = run(track_recording);
   EXPECT_EQ(status.reason(), Reason::NOT_STEREO);
@@ -150,7 +150,7 @@ TEST_F(TrackRecordingTest, EyesThatArePlainlyWrongAreRefusedBeforeAnythingIsBegu
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TrackRecordingTest, OneEyeIsNoStereo) {
+TEST_F(TrackRecordingTest, RefusesASourceWithOneEye) {
   script_.one_eye = true;
   const Status status = run(track_recording);
   EXPECT_EQ(status.reason(), Reason::NOT_STEREO);
@@ -158,7 +158,7 @@ TEST_F(TrackRecordingTest, OneEyeIsNoStereo) {
   EXPECT_EQ(daemon_.opened.size(), 0u);
 }
 
-TEST_F(TrackRecordingTest, OfARecordingThatShowsNothingNoKeyframeIsSent) {
+TEST_F(TrackRecordingTest, SendsNothingOfARecordingThatCannotBeTracked) {
   for (std::size_t i = 0; i < script_.pairs.size(); ++i) script_.pairs[i] = blank(i);
   const Status status = run(track_recording);
   EXPECT_FALSE(status.ok());
@@ -168,13 +168,13 @@ TEST_F(TrackRecordingTest, OfARecordingThatShowsNothingNoKeyframeIsSent) {
   EXPECT_EQ(exit_code(), kFailed);
 }
 
-TEST_F(TrackRecordingTest, ASinglePairIsSentAllTheSame) {
+TEST_F(TrackRecordingTest, SendsASinglePair) {
   script_.pairs.resize(1, script_.pairs[0]);
   ASSERT_TRUE(run(track_recording).ok());
   EXPECT_EQ(daemon_.pushed.size(), 1u);
 }
 
-TEST_F(TrackRecordingTest, GoesOnAfterTheLastKeyframeOfAnInterruptedRun) {
+TEST_F(TrackRecordingTest, ContinuesAfterTheLastKeyframeOfAnInterruptedRun) {
   options_.all_keyframes = true;
   ASSERT_TRUE(run(track_recording).ok());
   const auto whole = daemon_.pushed;

@@ -20,7 +20,7 @@ PoseNews resume() {
   return news;
 }
 
-TEST(WantedPace, IsToldOnceHoweverOftenItIsSaid) {
+TEST(WantedPace, IsReportedOnceHoweverOftenItIsRepeated) {
   const WantedPace::Time now{};
   WantedPace pace(seconds(15));
   EXPECT_EQ(pace.hz(), 0);
@@ -34,7 +34,7 @@ TEST(WantedPace, IsToldOnceHoweverOftenItIsSaid) {
   EXPECT_EQ(pace.slow_downs(), 2u);
 }
 
-TEST(WantedPace, LastsNoLongerThanItIsSaid) {
+TEST(WantedPace, ExpiresIfItIsNotRepeated) {
   const WantedPace::Time begin{};
   WantedPace pace(seconds(15));
   pace.hear(slow_down(2), begin);

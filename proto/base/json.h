@@ -1,4 +1,4 @@
-// Text of a JSON object, written member by member.
+// Writes a JSON object member by member.
 #pragma once
 
 #include <concepts>
@@ -10,9 +10,9 @@
 
 namespace relmap {
 
-// Members stand in the order in which they are added. Texts are UTF-8; what is not is replaced by U+FFFD. Numbers that
-// are whole are written as such, others with the fewest digits that tell them from all others; what is no number (NaN,
-// infinity) is null.
+// Members keep the order in which they are added. Invalid UTF-8 in texts is replaced by U+FFFD. Whole numbers are
+// written without a decimal point, others with as few digits as identify the value. NaN and infinity are written as
+// null.
 class Json {
  public:
   Json& add(std::string_view key, std::string_view text);
@@ -23,20 +23,20 @@ class Json {
     return put(key, std::to_string(value));
   }
   Json& add(std::string_view key, double value);
-  // Rounded to so many digits behind the point; null where there is no value.
+  // Rounds the value to `digits` decimal places. Adds null for nullopt.
   Json& add(std::string_view key, std::optional<double> value, int digits);
   Json& add(std::string_view key, const Json& object) { return put(key, object.text()); }
   Json& add(std::string_view key, const std::vector<Json>& objects);
   Json& add(std::string_view key, const std::vector<std::string>& texts);
   Json& add(std::string_view key, const std::vector<double>& numbers);
   Json& add_null(std::string_view key) { return put(key, "null"); }
-  // All members of the other, behind those that are there.
+  // Appends all members of `other`.
   Json& merge(const Json& other);
 
   std::string text() const;        // on one line
-  std::string text_lines() const;  // for people to read: each member on a line of its own, with a newline at the end
+  std::string text_lines() const;  // for people to read: one line a member, with a newline at the end
 
-  // A text with its quotes.
+  // Returns `text` as a JSON string, quoted and escaped.
   static std::string quoted(std::string_view text);
 
  private:

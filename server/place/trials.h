@@ -1,4 +1,4 @@
-// Tries geometry on one candidate of appearance after another, for one picture.
+// Verifies the place candidates of one picture by geometry, one after another.
 #pragma once
 
 #include <cstddef>
@@ -23,30 +23,31 @@ using Proceed = std::function<Status()>;
 // Which candidates a run tries.
 struct TrialLimits {
   std::size_t max_trials = std::numeric_limits<std::size_t>::max();
-  double min_probability = 0;                                              // the first candidate below it ends the run
-  std::uint32_t sure_inliers = std::numeric_limits<std::uint32_t>::max();  // a place confirmed with so many ends it
-  bool skip_mono = false;     // candidates of mono sessions, which are places without metres, are passed over
-  bool needs_metres = false;  // a place that is confirmed without metres is refused: NOT_STEREO
+  double min_probability = 0;  // the first candidate below this ends the run
+  std::uint32_t sure_inliers = std::numeric_limits<std::uint32_t>::max();  // a place with so many or more ends the run
+  bool skip_mono = false;     // pass over candidates of mono sessions, which have no metric scale
+  bool needs_metres = false;  // refuse a confirmed place without metric scale (NOT_STEREO)
 };
 
+// Not thread-safe.
 class Trials {
  public:
-  // `graph`, `proceed` and what `query` refers to must outlive this. `seed` fixes RANSAC.
+  // `graph`, `proceed` and what `query` refers to must outlive this. `seed` is that of RANSAC.
   Trials(const storage::Graph& graph, const QueryPicture& query, std::uint64_t seed, const Proceed& proceed);
 
-  // Tries the candidates in their order. What `proceed` says.
+  // Tries the candidates in their order. Returns the status of `proceed` if it is not ok.
   Status run(std::span<const PlaceCandidate> candidates, const TrialLimits& limits);
 
   // Drops the trials that geometry does not confirm.
   void keep_confirmed();
 
   const std::vector<PlaceTrial>& all() const { return trials_; }
-  // Of which candidate a trial is. (Its own frame is the one where most fits.)
+  // The candidate of a trial. (The trial's own frame is the one in which most of the picture fits.)
   const PlaceCandidate& candidate(std::size_t trial) const { return candidates_[trial]; }
   std::size_t size() const { return trials_.size(); }
-  std::size_t tried() const { return tried_; }  // those dropped included
+  std::size_t tried() const { return tried_; }  // including trials dropped since
 
-  // Of the functions of these names in uniqueness.h and verify.h.
+  // The functions of these names in uniqueness.h, for the trials.
   std::optional<std::size_t> best() const { return best_of(trials_); }
   std::optional<Standing> weigh(std::size_t answers, const ComparePlace& compare = {}) const {
     return place::weigh(graph_, query_, trials_, answers, seed_, compare);
@@ -58,7 +59,7 @@ class Trials {
   const std::uint64_t seed_;
   const Proceed& proceed_;
   std::vector<PlaceTrial> trials_;
-  std::vector<PlaceCandidate> candidates_;  // of trials_, one each
+  std::vector<PlaceCandidate> candidates_;  // one for each of trials_
   std::size_t tried_ = 0;
 };
 

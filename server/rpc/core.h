@@ -1,4 +1,4 @@
-// What the RPC services share, and how a handler gets the parts of it that it uses.
+// What the RPC services share, and how each handler is given the parts that it uses.
 #pragma once
 
 #include <atomic>
@@ -25,25 +25,25 @@
 
 namespace relmap::rpc {
 
-// What does not change while the daemon runs.
+// Facts that do not change while the daemon runs.
 struct DaemonFacts {
   std::string version;
   std::string boot_id;
   std::string data_folder;
-  std::string lcm_url;  // empty: off
+  std::string lcm_url;  // empty if LCM is off
   bool deterministic = false;
   std::uint64_t pid = 0;
   std::int64_t started_us = 0;  // UTC
 };
 
-// What the way in counts, since the daemon started.
+// Counts of the intake since the daemon started.
 struct IngestFacts {
-  Status lcm;  // not ok: LCM ingest does not run, and why
+  Status lcm;  // why LCM ingest does not run; ok if it does
   std::uint64_t parts = 0, parts_corrupt = 0;
   std::uint64_t keyframes = 0, repeats = 0;
   std::uint64_t acknowledgements = 0;
-  std::uint64_t robots = 0;      // sessions heard of in the last minute
-  std::uint64_t incomplete = 0;  // now
+  std::uint64_t robots = 0;      // sessions heard from in the last minute
+  std::uint64_t incomplete = 0;  // keyframes received and not settled, now
   std::map<Reason, std::uint64_t> not_taken;
 };
 
@@ -52,22 +52,22 @@ struct ProcessFacts {
 };
 using ProcessProbe = std::function<ProcessFacts()>;
 
-// The way in for keyframes.
+// The intake of keyframes.
 struct Intake {
-  intake::IngestServer* server = nullptr;  // null: this daemon takes no keyframes in
-  std::function<IngestFacts()> facts;      // empty: nothing is counted
+  intake::IngestServer* server = nullptr;  // null if this daemon takes in no keyframes
+  std::function<IngestFacts()> facts;      // empty if nothing is counted
 };
 
-// Where FindRoute searches, and what it has found.
+// The index that FindRoute searches, and the routes that it found.
 struct Routes {
   explicit Routes(std::string_view boot_id) : found(boot_id, "route", 64) {}
 
-  std::unique_ptr<route::RouteIndex> index;  // null: routes are searched frame by frame
-  TokenKeeper<FoundRoute> found;             // those whose streams may be resumed
+  std::unique_ptr<route::RouteIndex> index;  // null if routes are searched frame by frame
+  TokenKeeper<FoundRoute> found;             // routes whose streams may be resumed
   std::atomic<std::uint64_t> searched = 0;
 };
 
-// Held while a piece of a graph is imported, which is judged by what the map holds.
+// Locked during an import. A piece of a graph is checked against what the map holds, so imports take turns.
 struct ImportTurn {
   std::mutex mutex;
 };
@@ -86,7 +86,7 @@ struct Core {
   DaemonFacts facts;
   RpcLimits limits;
   Intake intake;
-  ProcessProbe process;  // empty: not known
+  ProcessProbe process;  // empty if not known
   Routes routes;
   Metrics metrics;
   ViewKeeper views;

@@ -1,4 +1,4 @@
-// A drive of relmap-sim as a camera of its size shows it.
+// Shows a drive of relmap-sim through a simulated camera of the same picture size.
 #pragma once
 
 #include <cstddef>
@@ -12,19 +12,20 @@
 
 namespace relmap::testing {
 
-// Outlives the cameras that it is shown by.
+// Must outlive the cameras that show it.
 class ShownDrive {
  public:
-  // The pictures in image_0 and image_1 of `folder`, all in memory. Throws.
+  // Reads all pictures in image_0 and image_1 of `folder` into memory. Throws.
   explicit ShownDrive(const std::string& folder);
   ShownDrive(const ShownDrive&) = delete;
   ShownDrive& operator=(const ShownDrive&) = delete;
 
   std::size_t pairs() const { return left_.size(); }
 
-  // A pair a frame, and the last one from then on.
+  // Each frame shows the next pair; after the end, the last pair.
   SimulatedCameraOptions camera(double rate) const;
-  // The same, forth and back for ever: a program that comes late on a busy machine sees the eyes move, too.
+  // The same, but shows the drive back and forth for ever, so that a program that starts late on a busy machine sees
+  // motion, too.
   SimulatedCameraOptions shuttling_camera(double rate) const;
 
  private:

@@ -1,6 +1,6 @@
-// relmap-simulated-camera runs a program with a simulated camera, and reports what the camera sent and what the program
-// cost. It is a program of its own, since umockdev's library must be loaded before any other and does not work together
-// with jemalloc.
+// relmap-simulated-camera runs a program with a simulated camera, and reports what the camera sent and how much
+// processor time the program took. It is a program of its own, since umockdev's library must be loaded before any other
+// and does not work together with jemalloc.
 #include <signal.h>
 #include <sys/resource.h>
 
@@ -72,13 +72,14 @@ int run(const Options& options) {
 }  // namespace relmap::testing
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs a program at a simulated IIDC stereo camera.", "relmap-simulated-camera");
+  CLI::App app("Runs a program with a simulated IIDC stereo camera.", "relmap-simulated-camera");
   relmap::testing::Options options;
-  app.add_option("--drive", options.drive, "What it shows, forth and back: pictures of relmap-sim (a moving texture)");
+  app.add_option("--drive", options.drive,
+                 "Folder of relmap-sim whose pictures are shown, back and forth (default: a moving texture)");
   app.add_option("--rate", options.rate, "Frames a second")->check(CLI::Range(0.1, 48.0))->capture_default_str();
-  app.add_option("--pairs", options.pairs, "The program is interrupted once so many were sent (0: it ends by itself)");
+  app.add_option("--pairs", options.pairs, "Interrupt the program once this many were sent (0: it ends by itself)");
   app.add_option("--output", options.output, "File for the program's standard output");
-  app.add_option("--errors", options.errors, "File for its standard error");
+  app.add_option("--errors", options.errors, "File for the program's standard error");
   app.add_option("--report", options.report, "File for a JSON object: exit_code, frames, lost, cpu_s")->required();
   app.add_option("command", options.command, "The program and its arguments, behind --")->required();
   relmap::terminal::add_version(app);

@@ -1,4 +1,4 @@
-// The figures that the documents state, for tests that hold the code to them, and the documents to the code.
+// Reads the figures that the documents state, for tests that compare them with the code.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +12,9 @@
 
 namespace relmap::testing {
 
-// Those that stand in `document` (docs/rba.md) where `pattern` matches: a number for each of its groups. Its blanks
-// stand for line breaks, too; separators of thousands are left out. Throws where nothing matches: then the sentence was
-// changed, and so is its test to be.
+// Returns the figures in `document` (docs/rba.md) where `pattern` first matches, one for each of its groups. A blank in
+// the pattern matches a line break, too. Thousands separators are removed. Throws if nothing matches: the sentence was
+// changed, and its test must be changed, too.
 inline std::vector<double> published(const std::string& document, const std::string& pattern) {
   std::string text = content_of(document);
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -30,7 +30,7 @@ inline std::vector<double> published(const std::string& document, const std::str
   return figures;
 }
 
-// Of one group.
+// The same for a pattern with one group.
 inline double published_figure(const std::string& document, const std::string& pattern) {
   return published(document, pattern).at(0);
 }

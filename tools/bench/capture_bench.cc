@@ -1,5 +1,5 @@
-// relmap-bench capture: what a live stereo camera costs, on the way from the bus to a recording and to tracked pairs,
-// and what gets lost. The camera is simulated by a process of its own, which does not count.
+// relmap-bench capture: the processor time that a live stereo camera takes, from the bus to a recording and to tracked
+// pairs, and the number of pairs lost. The camera is simulated by a separate process, which is not counted.
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -22,9 +22,9 @@ struct Options {
 };
 
 struct Cost {
-  double pairs = 0;        // that the program had
-  double cpu_s = 0;        // of the program
-  double lost = 0;         // on the bus
+  double pairs = 0;        // that the program recorded or tracked
+  double cpu_s = 0;        // processor time of the program
+  double lost = 0;         // pairs lost on the bus or dropped by the program
   nlohmann::json summary;  // what the program printed
 };
 
@@ -36,7 +36,7 @@ class CaptureBench {
     std::filesystem::copy_file(folder_ / "drive/calib.txt", folder_ / "cameras/12345678/calib.txt");
   }
 
-  // 640 x 480 x 2: received, stamped, checksummed and written to a file.
+  // Pairs of 640 x 480 x 2 are received, stamped, checksummed and written to a file.
   Cost record(std::uint64_t pairs) {
     Cost cost = at_camera({}, {testing::built_program("relmap-camera"), "--cameras", folder_ / "cameras", "--json",
                                "--quiet", "record", file("raw"), "--frames", std::to_string(pairs)});
@@ -45,7 +45,7 @@ class CaptureBench {
     return cost;
   }
 
-  // 512 x 384 x 2, a street: received, taken apart, tracked, keyframes described.
+  // Pairs of a street, 512 x 384 x 2, are received, separated and tracked, and keyframes are described.
   Cost track(std::uint64_t pairs) {
     Cost cost = at_camera({"--drive", folder_ / "drive", "--pairs", std::to_string(pairs)},
                           {testing::built_program("relmap-frontend"), "--source", "iidc", "--cameras",
@@ -86,7 +86,7 @@ class CaptureBench {
   int runs_ = 0;
 };
 
-// What starting costs is left out: it is that of a short run.
+// The cost of a short run is subtracted, so that starting the program does not count.
 double ms_per_pair(const Cost& all, const Cost& start) {
   return 1e3 * (all.cpu_s - start.cpu_s) / (all.pairs - start.pairs);
 }
@@ -115,7 +115,7 @@ void run(const Options& options, Report& report) {
 
 Run declare_capture(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  app.add_option("--pairs", options->pairs, "by each way, but for those of the start")
+  app.add_option("--pairs", options->pairs, "number of pairs for each program, not counting 20 for its start")
       ->check(CLI::Range(20, 1000000))
       ->capture_default_str();
   app.add_option("--rate", options->rate, "pairs a second")->check(CLI::Range(1.0, 48.0))->capture_default_str();

@@ -45,7 +45,8 @@ void add_freeze(CLI::App& app, Action& action, const char* name, const char* des
       if (!number.ok()) return number.status();
       const Status done = client.freeze_session(*number, frozen);
       if (done.ok() && !console.json)
-        console.out() << "session " << *number << (frozen ? " is frozen\n" : " is what it was before it was frozen\n");
+        console.out() << "session " << *number
+                      << (frozen ? " is frozen\n" : " is thawed, in the state that it had before the freeze\n");
       return done;
     };
   });

@@ -1,4 +1,4 @@
-// A daemon's end, for tests of workflows: takes keyframes, refuses them and tells of them as the test says.
+// A fake daemon for tests of workflows: takes keyframes, refuses them and sends news of them as the test says.
 #pragma once
 
 #include <cstddef>
@@ -16,30 +16,30 @@
 
 namespace relmap::workflow::testing_daemon {
 
-// Must outlive the sinks that it opens. What the test sets is set before the run; what it finds is read after it.
+// Must outlive the sinks that it opens. The test sets the first fields before the run and reads the others after it.
 class FakeDaemon {
  public:
-  // What the test sets.
-  Status refuses_to_open, refuses_to_push;                      // not ok: the answer
-  std::size_t takes = std::numeric_limits<std::size_t>::max();  // keyframes, before it refuses one
-  std::vector<Status> maps;  // what await_map() answers, one after another, before it is content
+  // Set by the test.
+  Status refuses_to_open, refuses_to_push;                      // if not ok, what open and push answer
+  std::size_t takes = std::numeric_limits<std::size_t>::max();  // number of keyframes before it refuses one
+  std::vector<Status> maps;  // what await_map() answers, one after another, before ok
   bool answers = true, settles = true;
-  bool takes_after_interrupt = false;  // as a file does
+  bool takes_after_interrupt = false;  // as a file sink does
   Status trouble;
-  Status session;                                                    // of the summary at the end
-  publishing::PublishSummary at_end;                                 // what the summary has beside the counts
-  std::optional<Keyframe> last;                                      // in its spool
-  std::function<void(std::size_t)> pushed_one = [](std::size_t) {};  // so many keyframes have come
+  Status session;                                                    // PublishSummary::session
+  publishing::PublishSummary at_end;                                 // the other fields of the summary
+  std::optional<Keyframe> last;                                      // the last keyframe in its spool
+  std::function<void(std::size_t)> pushed_one = [](std::size_t) {};  // called with the number of keyframes so far
 
-  // What it finds.
+  // Found by the test.
   std::vector<publishing::PublisherOptions> opened;
   std::vector<Keyframe> pushed;
-  std::optional<bool> complete;  // of finish()
+  std::optional<bool> complete;  // argument of finish()
   std::optional<double> patience;
-  int ends = 0;  // of the session
+  int ends = 0;  // calls of end_session()
   bool interrupted = false;
 
-  // News for who listens.
+  // Sends news to the listener, if there is one.
   void tell(const PoseNews& news) {
     const std::lock_guard lock(mutex_);
     if (listener_) listener_(news);

@@ -1,4 +1,4 @@
-// A short drive down a rendered street as a source of stereo pairs, with what the test makes of it.
+// A source of stereo pairs, a short drive along a rendered street, which the test can alter.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ inline const StereoCamera kDriveCamera{
 // Rendered once.
 inline const std::vector<capture::StereoFrame>& street() {
   static const std::vector<capture::StereoFrame> pairs = [] {
-    cv::setNumThreads(1);  // ThreadSanitizer does not see how OpenCV's own threads keep out of each other's way
+    cv::setNumThreads(1);  // ThreadSanitizer does not know how OpenCV's threads synchronise
     sim::PictureWorldOptions options;
     options.seed = 12;
     options.step = 0.4;
@@ -51,14 +51,14 @@ inline const std::vector<capture::StereoFrame>& street() {
   return pairs;
 }
 
-// What a source gives, and when.
+// What a source returns.
 struct Script {
   Script() {
     for (const capture::StereoFrame& pair : street()) pairs.emplace_back(pair);
   }
-  std::vector<Result<capture::StereoFrame>> pairs;  // an error is one pair that cannot be had
+  std::vector<Result<capture::StereoFrame>> pairs;  // an error is a pair that cannot be read
   bool one_eye = false, stamps_rise = true;
-  std::function<void(std::size_t)> before = [](std::size_t) {};  // the pair of that number is read; that of the end too
+  std::function<void(std::size_t)> before = [](std::size_t) {};  // called before each next(), with its number
 };
 
 template <typename Source = capture::StereoSource>

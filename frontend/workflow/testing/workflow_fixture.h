@@ -1,4 +1,4 @@
-// A run and the world round it, for tests of workflows.
+// A run with a fake outside, for tests of workflows.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -34,7 +34,7 @@ class WorkflowTest : public ::testing::Test {
     outside_.open_daemon_sink = daemon_.opener();
     outside_.open_pairs = [this](const RunOptions&) -> Result<std::unique_ptr<capture::StereoSource>> {
       if (!no_recording_.ok()) return no_recording_;
-      // The eyes are checked by a reader of its own, which the test's script is not for.
+      // Every second source is for the check of the stereo camera, to which `before` does not apply.
       testing_pairs::Script script = script_;
       if (++readers_ % 2 == 0) script.before = [](std::size_t) {};
       return std::unique_ptr<capture::StereoSource>(std::make_unique<testing_pairs::FakePairs<>>(script));
@@ -44,7 +44,7 @@ class WorkflowTest : public ::testing::Test {
     waits_.news_silence = std::chrono::milliseconds(1);
   }
 
-  // Runs it to its end, as run_frontend() does; said_ is what it wrote on standard error.
+  // Runs a workflow as run_frontend() does. Afterwards said_ is what it wrote on standard error.
   template <typename Workflow>
   Status run(const Workflow& workflow) {
     ::testing::internal::CaptureStderr();
@@ -65,7 +65,7 @@ class WorkflowTest : public ::testing::Test {
     return header;
   }
 
-  // Files of the test's own.
+  // The path of a file in the test's temporary folder.
   std::string file(const std::string& name) const { return (folder_.path() / name).string(); }
   static std::vector<std::string> lines_of(const std::string& path) {
     std::vector<std::string> lines;
@@ -77,8 +77,8 @@ class WorkflowTest : public ::testing::Test {
   capture::testing_files::TemporaryFolder folder_;
   testing_daemon::FakeDaemon daemon_;
   testing_pairs::Script script_;
-  Status no_recording_;  // not ok: why there is none
-  int readers_ = 0;      // of the recording, so far
+  Status no_recording_;  // if not ok, why the recording cannot be opened
+  int readers_ = 0;      // times that the recording was opened
   RunOptions options_;
   Outside outside_;
   Waits waits_;

@@ -1,4 +1,4 @@
-// What relmap-frontend reaches: daemons over LCM and gRPC, and logs of LCM messages, beside what needs neither.
+// The Outside of relmap-frontend: daemons over LCM and gRPC, logs of LCM messages, and the defaults for the rest.
 #pragma once
 
 #include "frontend/workflow/outside.h"
