@@ -172,7 +172,7 @@ TEST_F(PictureQuestions, ALabelGoesToAFrameThatRoutesLeadTo) {
   const Finished alone = relmap({"label", asked, "fountain"});
   EXPECT_EQ(alone.exit_code, 0) << alone.standard_error;
   EXPECT_THAT(alone.standard_output, StartsWith("1:"));
-  EXPECT_THAT(alone.standard_error, HasSubstr("no route leads to session 1"));
+  EXPECT_THAT(alone.standard_error, HasSubstr("no route leads to them: session 1"));
 
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   const Finished both = relmap({"label", asked, "gate"});
