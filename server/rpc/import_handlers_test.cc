@@ -257,7 +257,7 @@ TEST_F(ImportGraph, AnInvalidPieceIsRefusedByNameAndNothingIsWritten) {
   EXPECT_EQ(refused(request).reason(), Reason::BAD_DURATION);
   request = piece(0, 10);
   add_loop(request, 7, 7, SE3());
-  EXPECT_EQ(refused(request).to_string(), "INVALID_ARGUMENT: the loop 7 - 7: from a frame to itself");
+  EXPECT_EQ(refused(request).to_string(), "INVALID_ARGUMENT: the loop 7 - 7: it leads from a frame to itself");
   request = piece(0, 10);
   add_loop(request, 10, 2, SE3());
   EXPECT_EQ(refused(request).reason(), Reason::NO_SUCH_FRAME);
