@@ -7,13 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <limits>
 #include <optional>
-#include <random>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -228,24 +226,6 @@ double wait_until_applied(client::Client& client) {
   }
 }
 
-// Processor time of sorting a million numbers, the least of three: the unit in which what the daemon needs for a
-// keyframe can be compared between machines.
-double sorting_cpu_ms() {
-  double best = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < 3; ++round) {
-    std::mt19937 random(1);
-    std::vector<std::uint32_t> numbers(1'000'000);
-    for (std::uint32_t& number : numbers) number = static_cast<std::uint32_t>(random());
-    timespec before{}, after{};
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &before);
-    std::sort(numbers.begin(), numbers.end());
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &after);
-    best = std::min(best, 1e3 * static_cast<double>(after.tv_sec - before.tv_sec) +
-                              1e-6 * static_cast<double>(after.tv_nsec - before.tv_nsec));
-  }
-  return best;
-}
-
 // One run, from the start of the daemon to the check of the map.
 class FleetRun {
  public:
@@ -304,7 +284,6 @@ class FleetRun {
     report.add("cpu_percent", cpu_percent_, "of the daemon; 100: one core");
     const double cpu_ms = 1e3 * daemon_cpu_s_ / static_cast<double>(pushed_since(robots, begin_ns_));
     report.add("cpu_ms_per_keyframe", cpu_ms, "of the daemon, until all that was pushed is relaxed and looked up");
-    report.add("cpu_over_sorting", cpu_ms / sorting_cpu_ms(), "that over what sorting a million numbers takes here");
     report.add("daemon_resident_mb", daemon_.peak_resident_mb(), "at most");
     report.add("memory_budget_mb", static_cast<double>(options_.memory_budget_mb), "");
     report.add("applied_s", applied_s_, "from the last acknowledgement until the map showed all of it");
