@@ -124,7 +124,7 @@ TEST(RouteIndex, IsRightWhileTheMapChanges) {
   for (std::thread& asker : askers) asker.join();
 }
 
-TEST(RouteIndex, ObeysItsShareOfMemory) {
+TEST(RouteIndexMemory, ObeysItsShare) {
   // Most cells are on disk then.
   LiveTown town(std::size_t{1} << 20);
   town.drive(3000);
