@@ -1,7 +1,6 @@
 # relmap_library(NAME [FOLDERS ...] LINK ... PRIVATE_LINK ... SOURCES extra... TEST_LINK ... [TEST_FULL_TIMEOUT s])
 #   A static library of all *.cc in the current folder, or in those of its subfolders that FOLDERS names, but *_test.cc,
-#   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, each gtest suite a ctest entry of its own with label
-#   `ci`: to start a program a thousand times takes longer than most of its cases.
+#   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, with label `ci`.
 # relmap_program(NAME SOURCE LINK ...)  one program, into bin/.
 # relmap_fuzzer(NAME SOURCE LINK ...)   with RELMAP_FUZZ a libFuzzer binary; otherwise a test that replays
 #                                       tests/corpus/NAME through it.
@@ -36,7 +35,6 @@ if(RELMAP_FUZZ)
 endif()
 
 find_package(GTest REQUIRED)
-include(GoogleTest)
 
 # The files of a target are compiled eight at a time (CMAKE_UNITY_BUILD), which halves the time once more. A file with a
 # name in its anonymous namespace that another file of its target has too is compiled apart: relmap_apart(FILE...).
@@ -74,64 +72,41 @@ function(relmap_precompiled_headers name)
   target_precompile_headers(${name} REUSE_FROM relmap_precompiled)
 endfunction()
 
-# A program of gtest cases.
-function(relmap_test_program name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+# relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s] [ALONE])
+#   Each gtest suite is a ctest entry: to start a program, and to make what the cases of a suite share, takes longer than
+#   most cases. The timeout is for what hangs; no test may depend on it. Suites named Long* get FULL_TIMEOUT and label
+#   `full`. ALONE: nothing else runs beside them.
+function(relmap_test name)
+  cmake_parse_arguments(arg "ALONE" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
+  if(NOT arg_ALONE)
+    set(arg_ALONE OFF)
+  endif()
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 600)
+  endif()
+  if(NOT arg_FULL_TIMEOUT)
+    set(arg_FULL_TIMEOUT 600)
+  endif()
+  if(RELMAP_SANITIZE)  # several times slower
+    math(EXPR arg_TIMEOUT "4 * ${arg_TIMEOUT}")
+  endif()
+  if(NOT arg_LABELS)
+    set(arg_LABELS ci)
+  endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINK} relmap_flags GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${RELMAP_TEST_OPTIONS})
   target_precompile_headers(${name} REUSE_FROM relmap_precompiled_test)
   target_include_directories(${name} PRIVATE ${CMAKE_BINARY_DIR}/generated)  # tests/paths.h
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
-endfunction()
-
-# Sanitized programs are several times slower.
-set(RELMAP_PATIENCE 1)
-if(RELMAP_SANITIZE)
-  set(RELMAP_PATIENCE 4)
-endif()
-
-# relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s])
-#   Each gtest case is a ctest entry. With FULL_TIMEOUT its suites named Long* get that time, and label `full` instead.
-function(relmap_test name)
-  cmake_parse_arguments(arg "ALONE" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
-  if(NOT arg_ALONE)  # it measures times: nothing else runs beside it
-    set(arg_ALONE OFF)
-  endif()
-  if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 60)
-  endif()
-  math(EXPR arg_TIMEOUT "${RELMAP_PATIENCE} * ${arg_TIMEOUT}")
-  if(NOT arg_LABELS)
-    set(arg_LABELS ci)
-  endif()
-  relmap_test_program(${name} SOURCES ${arg_SOURCES} LINK ${arg_LINK})
-  set(filter "*")
-  if(arg_FULL_TIMEOUT)
-    set(filter "-Long*")
-    gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "Long*" TEST_LIST ${name}_LONG_TESTS
-                         PROPERTIES TIMEOUT ${arg_FULL_TIMEOUT} LABELS full RUN_SERIAL ${arg_ALONE} DISCOVERY_TIMEOUT 60)
-  endif()
-  gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "${filter}"
-                       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" RUN_SERIAL ${arg_ALONE} DISCOVERY_TIMEOUT 60)
-endfunction()
-
-# relmap_unit_tests(NAME SOURCES ... LINK ... [FULL_TIMEOUT s])  each gtest suite is a ctest entry
-function(relmap_unit_tests name)
-  cmake_parse_arguments(arg "" "FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
-  relmap_test_program(${name} SOURCES ${arg_SOURCES} LINK ${arg_LINK})
-  if(NOT arg_FULL_TIMEOUT)
-    set(arg_FULL_TIMEOUT 600)
-  endif()
-  math(EXPR timeout "${RELMAP_PATIENCE} * 240")
   set(suites ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
   add_custom_command(
     TARGET ${name} POST_BUILD BYPRODUCTS ${suites}
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${name}> -DNAME=${name} -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}
-            -DTIMEOUT=${timeout} -DLONG_TIMEOUT=${arg_FULL_TIMEOUT} -DOUTPUT=${suites}
-            -P ${CMAKE_SOURCE_DIR}/cmake/discover_suites.cmake
+            -DTIMEOUT=${arg_TIMEOUT} -DLONG_TIMEOUT=${arg_FULL_TIMEOUT} -DLABELS=${arg_LABELS} -DALONE=${arg_ALONE}
+            -DOUTPUT=${suites} -P ${CMAKE_SOURCE_DIR}/cmake/discover_suites.cmake
     VERBATIM)
-  # ctest must not pass over what has not been built.
+  # ctest must not pass over a program that has not been built.
   set(included ${CMAKE_CURRENT_BINARY_DIR}/${name}_included.cmake)
   file(WRITE ${included} "if(EXISTS \"${suites}\")\n  include(\"${suites}\")\nelse()\n  add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)\nendif()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${included})
@@ -152,7 +127,7 @@ function(relmap_library name)
   target_link_libraries(${name} PUBLIC relmap_flags ${arg_LINK} PRIVATE ${arg_PRIVATE_LINK})
   relmap_precompiled_headers(${name})
   if(tests)
-    relmap_unit_tests(${name}_test SOURCES ${tests} LINK ${name} ${arg_TEST_LINK} FULL_TIMEOUT ${arg_TEST_FULL_TIMEOUT})
+    relmap_test(${name}_test SOURCES ${tests} LINK ${name} ${arg_TEST_LINK} FULL_TIMEOUT ${arg_TEST_FULL_TIMEOUT})
   endif()
 endfunction()
 
