@@ -8,9 +8,9 @@
 #include "frontend/vision/picture_appearance.h"
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/rectify.h"
-#include "frontend/vision/rig_check.h"
 #include "frontend/vision/stereo_match.h"
 #include "proto/base/number_text.h"
+#include "server/place/stereo_pair.h"
 
 namespace relmap::rpc {
 
@@ -33,25 +33,6 @@ void add_disparities(vision::ImageView left, vision::ImageView right, std::vecto
     if (const auto match = vision::match_stereo(left_pyramid, right_pyramid, feature.u, feature.v, level, options))
       feature.disparity = match->disparity;
   }
-}
-
-// Refuses pictures that cannot be a pair of the camera taken at one time. Only clear cases are refused here; smaller
-// errors are left to the verification of the place.
-Status check_eyes(vision::ImageView left, vision::ImageView right, const StereoCamera& camera) {
-  constexpr double kMaxRowError = 2;  // pixels, in the median
-  constexpr double kExchanged = -3;   // median disparity in pixels, which is never so negative in a pair
-  if (vision::measure_exposure(left).blind()) return {Reason::EYE_DEAD, "the left picture shows nothing"};
-  if (vision::same_picture(left, right)) return {Reason::NOT_STEREO, "both pictures are the same"};
-  vision::RigCheck check(camera);
-  if (!check.add(left, right).ok()) return {};  // too small to tell
-  const vision::RigReport report = check.report();
-  const Status wrong = report.what_is_wrong();
-  const bool told = wrong.reason() == Reason::ROWS_APART   ? report.row_error > kMaxRowError
-                    : wrong.reason() == Reason::NOT_STEREO ? report.disparity < kExchanged
-                                                           : false;
-  if (!told) return {};
-  return {wrong.reason(),
-          "the pictures are not a pair of this camera, or not of one moment: " + vision::with_advice(wrong).message()};
 }
 
 struct CameraOf {
@@ -138,7 +119,7 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   if (!right_grey.empty() && vision::measure_exposure(right_grey).blind())
     right_grey = vision::Image();  // the left picture is used alone
   if (!right_grey.empty())
-    if (Status status = check_eyes(left_grey, right_grey, result.camera); !status.ok()) return status;
+    if (Status status = place::check_stereo_pair(left_grey, right_grey, result.camera); !status.ok()) return status;
   result.features = vision::picture_appearance(left_grey);
   if (!right_grey.empty())
     add_disparities(left_grey, right_grey, result.features);
