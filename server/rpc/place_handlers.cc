@@ -1,6 +1,6 @@
 #include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
-#include "server/place/localise.h"
+#include "server/place/supposed_camera.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/place_messages.h"
@@ -18,12 +18,6 @@ v1::Verification verification_of(const place::VerifiedPlace& place) {
   return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
 }
 
-// Whether this answer shows that a single picture, whose camera was only supposed, is of another camera. A pair or
-// features cannot be asked about without their camera.
-bool is_of_another_camera(const v1::View& view, Reason answer) {
-  return view.supposed() && view.has_left() && !view.has_right() && answer == Reason::WRONG_CALIBRATION;
-}
-
 place::PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> prior) {
   return {seen.features, seen.camera, seen.masked, prior, seen.pair, seen.known, seen.eye_turn};
 }
@@ -34,6 +28,19 @@ v1::View without_camera(v1::View view) {
   view.clear_supposed();
   view.clear_either_eye();
   return view;
+}
+
+// Sees a single picture again with an unknown camera, and replaces `seen` by that. Empty for a pair or features, which
+// cannot be seen without their camera.
+place::DescribeWithoutCamera see_again(const v1::View& asked, const storage::MapView& view,
+                                       std::optional<FrameId> prior, SeenView& seen) {
+  if (!asked.has_left() || asked.has_right()) return {};
+  return [&asked, &view, prior, &seen]() -> Result<place::PlaceQuestion> {
+    auto other = see(without_camera(asked), view);
+    if (!other.ok()) return other.status();
+    seen = std::move(other).value();
+    return question_of(seen, prior);
+  };
 }
 
 // The estimated focal length, in pixels of the given picture; 0 if the camera was known.
@@ -83,12 +90,11 @@ Result<std::optional<FrameId>> frame_if_given(const storage::Graph& graph, bool 
 
 Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& asked,
                                         std::optional<FrameId> prior, const Deadline& deadline) {
-  const auto seen = see(asked, view);
+  auto seen = see(asked, view);
   if (!seen.ok()) return seen.status();
   const place::PlaceKnowledge map{view, mapper.places(), mapper.vocabulary()};
-  const auto found = place::localise_features(map, question_of(*seen, prior), [&] { return deadline.check(); });
-  if (is_of_another_camera(asked, found.reason()))
-    return localise_view(mapper, view, without_camera(asked), prior, deadline);
+  const auto found = place::localise_features(map, question_of(*seen, prior), see_again(asked, view, prior, *seen),
+                                              [&] { return deadline.check(); });
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
   *reply.mutable_frame() = to_wire(found->place.match);
@@ -120,19 +126,16 @@ Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, co
   const auto view = mapper.view();
   const auto near = frame_if_given(*view, request.has_near(), request.near(), "near");
   if (!near.ok()) return near.status();
-  const auto seen = see(request.view(), *view);
+  auto seen = see(request.view(), *view);
   if (!seen.ok()) return seen.status();
   const std::uint32_t most = request.max_places() == 0 ? kDefaultPlaces : request.max_places();
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const place::PlaceKnowledge map{*view, mapper.places(), mapper.vocabulary()};
-  const auto found = place::match_features(map, question_of(*seen, *near), verified, [&] { return deadline.check(); });
+  const auto found =
+      place::match_features(map, question_of(*seen, *near), see_again(request.view(), *view, *near, *seen), verified,
+                            [&] { return deadline.check(); });
   if (!found.ok()) return found.status();
-  if (is_of_another_camera(request.view(), found->nothing_verified.reason())) {
-    v1::MatchImageRequest other = request;
-    *other.mutable_view() = without_camera(request.view());
-    return match_image(other, deadline, mapper);
-  }
   v1::MatchImageReply reply;
   reply.set_new_place(found->new_place);
   reply.set_map_version(view->version());
