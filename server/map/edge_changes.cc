@@ -1,5 +1,6 @@
 #include "server/map/edge_changes.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -48,6 +49,23 @@ std::vector<EdgeChange> EdgeRecorder::changes() const {
   changes.reserve(by_id.size());
   for (auto& [id, change] : by_id) changes.push_back(std::move(change));
   return changes;
+}
+
+std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vector<EdgeChange>& second) {
+  for (const EdgeChange& change : second) {
+    const auto known =
+        std::find_if(first.begin(), first.end(), [&](const EdgeChange& earlier) { return earlier.id == change.id; });
+    if (known == first.end()) {
+      first.push_back(change);
+      continue;
+    }
+    const auto before = known->before;
+    *known = change;
+    known->before = before;
+  }
+  std::erase_if(first, [](const EdgeChange& change) { return change.before == change.after; });
+  std::sort(first.begin(), first.end(), [](const EdgeChange& x, const EdgeChange& y) { return x.id < y.id; });
+  return first;
 }
 
 }  // namespace relmap::map

@@ -36,6 +36,9 @@ struct EdgeChange {
   bool operator==(const EdgeChange&) const = default;
 };
 
+// The combined changes of two successive edits, ascending by id: from before the first to after the second.
+std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vector<EdgeChange>& second);
+
 // Passes every edit on to another graph and records the edges before it.
 class EdgeRecorder final : public storage::ForwardingGraph<storage::EditableGraph> {
  public:

@@ -361,4 +361,8 @@ ClosureChange apply_edge_edit(storage::EditableGraph& map, std::uint64_t sequenc
   return {};
 }
 
+Status overtaken() {
+  return {Reason::WRONG_STATE, "the map has changed meanwhile, and the edit changed nothing: ask again"};
+}
+
 }  // namespace relmap::map

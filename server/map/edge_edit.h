@@ -40,4 +40,7 @@ ClosureChange apply_edge_edit(storage::EditableGraph& map, std::uint64_t sequenc
                               const storage::SetEdgeStateRecord& record,
                               std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
+// The refusal of an edit because the map changed between its check and its turn in the journal. WRONG_STATE.
+Status overtaken();
+
 }  // namespace relmap::map

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "server/map/dry_run.h"
 #include "server/map/testing/two_laps.h"
 #include "server/place/testing/hand_made_graph.h"
-#include "storage/map/draft.h"
 
 namespace relmap::map {
 namespace {
@@ -32,13 +32,12 @@ class EdgeEdit : public TwoLaps {
   // What a dry run tells.
   std::vector<EdgeChange> told_of(const storage::SetEdgeStateRecord& record) {
     const storage::MapHash before = storage::hash_map(drive_.map());
-    const storage::MapState& state = drive_.map().state();
-    storage::Draft draft(drive_.map(), state);
-    EdgeRecorder recorder(draft);
-    apply_edge_edit(recorder, state.applied_sequence + 1, record);
+    DryRun run(drive_.map(), drive_.map().state());
+    const Status made = run.edit(record);
+    EXPECT_TRUE(made.ok()) << made.to_string();
     EXPECT_EQ(storage::hash_map(drive_.map()), before) << "and changes nothing";
-    EXPECT_THAT(derived_differences(draft), IsEmpty());
-    return recorder.changes();
+    EXPECT_THAT(derived_differences(run.outcome()), IsEmpty());
+    return run.changes();
   }
   Status refusal(EdgeId id, EdgeAction action) { return check_edge_edit(drive_.map(), edit_record(id, action)); }
 
@@ -287,19 +286,6 @@ TEST_F(EdgeEdit, ClosuresThatBecomeEdgesInsteadAreAmongTheChanges) {
   const auto goes = [](const EdgeChange& change) { return change.before->in_graph && !change.after->in_graph; };
   EXPECT_EQ(std::count_if(changes.begin(), changes.end(), comes), 1) << "the one that was held joins the laps now";
   EXPECT_EQ(std::count_if(changes.begin(), changes.end(), goes), 1);
-}
-
-TEST_F(EdgeEdit, ADryRunOfAProposalTellsItsChanges) {
-  propose(62);
-  const auto proposal = *true_closure(drive_.map(), world_, 64, kLap);
-  const storage::MapState& state = drive_.map().state();
-  storage::Draft draft(drive_.map(), state);
-  EdgeRecorder recorder(draft);
-  apply_proposal(recorder, state.applied_sequence + 1, proposal);
-  const auto told = recorder.changes();
-  ASSERT_THAT(told, SizeIs(2));
-  EXPECT_FALSE(told[1].before) << "it was not there";
-  EXPECT_EQ(told, drive_.apply(proposal).edges);
 }
 
 TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {

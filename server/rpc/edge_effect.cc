@@ -1,7 +1,5 @@
 #include "server/rpc/edge_effect.h"
 
-#include <algorithm>
-
 #include "proto/wire/convert.h"
 #include "server/rpc/messages.h"
 
@@ -57,23 +55,6 @@ v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes) {
   for (const route::CarriedStretch& stretch : carried.list()) *message.add_carried() = carried_message(stretch);
   for (const route::CarriedStretch& stretch : not_carried.list()) *message.add_not_carried() = carried_message(stretch);
   return message;
-}
-
-std::vector<map::EdgeChange> combined(std::vector<map::EdgeChange> first, const std::vector<map::EdgeChange>& second) {
-  for (const map::EdgeChange& change : second) {
-    const auto known = std::find_if(first.begin(), first.end(),
-                                    [&](const map::EdgeChange& earlier) { return earlier.id == change.id; });
-    if (known == first.end()) {
-      first.push_back(change);
-      continue;
-    }
-    const auto before = known->before;
-    *known = change;
-    known->before = before;
-  }
-  std::erase_if(first, [](const map::EdgeChange& change) { return change.before == change.after; });
-  std::sort(first.begin(), first.end(), [](const map::EdgeChange& x, const map::EdgeChange& y) { return x.id < y.id; });
-  return first;
 }
 
 }  // namespace relmap::rpc

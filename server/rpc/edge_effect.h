@@ -12,7 +12,4 @@ namespace relmap::rpc {
 v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);
 v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 
-// The combined changes of two successive edits.
-std::vector<map::EdgeChange> combined(std::vector<map::EdgeChange> first, const std::vector<map::EdgeChange>& second);
-
 }  // namespace relmap::rpc

@@ -61,15 +61,6 @@ TEST(EditEffect, NamesTheStretchesAlongWhichTheRobotCountsAsCarried) {
   EXPECT_EQ(message.not_carried(0).first().index(), 29u);
 }
 
-TEST(EditEffect, CombinesTwoEditsFromBeforeTheFirstToAfterTheSecond) {
-  const auto both = combined({change(kOther, kDecided, kLone), change(kClosure, std::nullopt, kLone)},
-                             {change(kOther, kLone, kDecided), change(kClosure, kLone, kDecided)});
-  ASSERT_EQ(both.size(), 1u) << "the other is what it was";
-  EXPECT_EQ(both[0].id, kClosure);
-  EXPECT_FALSE(both[0].before);
-  EXPECT_EQ(both[0].after->state, storage::EdgeState::kAccepted);
-}
-
 TEST(EdgeMessage, HoldsUniquenessAndCarryingClosures) {
   storage::Edge edge;
   EXPECT_FALSE(edge_message(edge).has_uniqueness()) << "it is not known";
