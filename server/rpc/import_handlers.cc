@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include "proto/geometry/camera.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
+#include "server/map/graph_piece.h"
 #include "server/rpc/handlers.h"
 
 namespace relmap::rpc {
@@ -18,7 +18,6 @@ namespace {
 constexpr int kMaxPerMessage = 1000;
 constexpr std::chrono::milliseconds kPause{5};
 constexpr std::chrono::milliseconds kPatience{50};
-constexpr double kMaxMetres = 1e7;  // metres
 
 Result<SessionHeader> header_of(const v1::ImportGraphRequest& request) {
   const auto uuid = uuid_from_wire(request.session_uuid());
@@ -37,10 +36,9 @@ Status named(const std::string& what, const Status& status) {
   return {status.reason(), what + ": " + status.message()};
 }
 
-Result<Keyframe> keyframe_of(const v1::ImportedFrame& frame, const SessionHeader& header, std::uint32_t index) {
+// The session and sequence are left to the piece.
+Result<Keyframe> keyframe_of(const v1::ImportedFrame& frame) {
   Keyframe keyframe;
-  keyframe.session = header;
-  keyframe.sequence = index;
   keyframe.time_us = static_cast<std::int64_t>(frame.time_us());
   keyframe.driven_us = static_cast<std::int64_t>(frame.driven_us());
   const auto pose = from_wire(frame.odom_from_frame());
@@ -52,21 +50,18 @@ Result<Keyframe> keyframe_of(const v1::ImportedFrame& frame, const SessionHeader
     keyframe.source = MotionSource::kVision;
     keyframe.step_covariance = *covariance;
   }
-  if (Status good = check_keyframe(keyframe); !good.ok()) return good;
   return keyframe;
 }
 
-Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionNumber session) {
-  if (loop.query() <= loop.match())
-    return {Reason::INVALID_ARGUMENT,
-            loop.query() == loop.match() ? "it leads from a frame to itself" : "query must be the later frame"};
+Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop) {
+  if (Status ends = map::check_loop_ends(loop.query(), loop.match()); !ends.ok()) return ends;
   storage::ClosureProposalRecord proposal;
-  proposal.query = {session, loop.query()};
-  proposal.match = {session, loop.match()};
+  proposal.query.index = loop.query();
+  proposal.match.index = loop.match();
   proposal.verification = storage::Verification::kImported;
   const auto T = from_wire(loop.match_from_query());
   if (!T.ok()) return T.status();
-  if (!(T->t.norm() <= kMaxMetres)) return {Reason::BAD_MOTION, "its ends are more than 10,000 km apart"};
+  if (Status motion = map::check_loop_motion(*T); !motion.ok()) return motion;
   proposal.T_match_query = *T;
   const auto covariance = from_wire(loop.covariance());
   if (!covariance.ok()) return covariance.status();
@@ -74,59 +69,26 @@ Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop,
   return proposal;
 }
 
-// The part of a message that is to be written, after its session has begun.
-struct Piece {
-  SessionNumber session = 0;
-  std::vector<Keyframe> frames;  // those that the map does not hold yet
-  std::vector<storage::ClosureProposalRecord> loops;
-};
-
-Result<Piece> check_piece(map::Mapper& mapper, const v1::ImportGraphRequest& request) {
+Result<map::GraphPiece> piece_of(const v1::ImportGraphRequest& request) {
   if (request.frames_size() > kMaxPerMessage || request.loops_size() > kMaxPerMessage)
     return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxPerMessage) + " frames or loops in a piece"};
-  const auto header = header_of(request);
+  auto header = header_of(request);
   if (!header.ok()) return header.status();
-  if (std::uint64_t{request.first()} + static_cast<std::uint64_t>(request.frames_size()) > 0xfffffffeu)
-    return {Reason::INVALID_ARGUMENT, "frames beyond index 4294967293"};
-
-  std::vector<Keyframe> frames;
-  for (int i = 0; i < request.frames_size(); ++i) {
-    const std::uint32_t index = request.first() + static_cast<std::uint32_t>(i);
-    auto keyframe = keyframe_of(request.frames(i), *header, index);
-    if (!keyframe.ok()) return named("frame " + std::to_string(index), keyframe.status());
-    if (!frames.empty() && keyframe->time_us <= frames.back().time_us)
-      return {Reason::BAD_DURATION, "frame " + std::to_string(index) + " is no later than the one before"};
-    frames.push_back(std::move(keyframe).value());
+  auto piece = map::GraphPiece::make(std::move(header).value(), request.first(),
+                                     static_cast<std::uint32_t>(request.frames_size()));
+  if (!piece.ok()) return piece.status();
+  for (const v1::ImportedFrame& frame : request.frames()) {
+    auto keyframe = keyframe_of(frame);
+    if (!keyframe.ok()) return named("frame " + std::to_string(piece->next_index()), keyframe.status());
+    if (Status added = piece->add_frame(std::move(keyframe).value()); !added.ok()) return added;
   }
-  Piece piece;
   for (const v1::ImportedLoop& loop : request.loops()) {
-    auto proposal = proposal_of(loop, 0);
+    auto proposal = proposal_of(loop);
     if (!proposal.ok())
       return named("the loop " + std::to_string(loop.query()) + " - " + std::to_string(loop.match()),
                    proposal.status());
-    piece.loops.push_back(std::move(proposal).value());
+    piece->add_loop(std::move(proposal).value());
   }
-
-  const auto sessions = mapper.view()->sessions();
-  const auto known = std::find_if(sessions.begin(), sessions.end(),
-                                  [&](const storage::Session& session) { return session.header.uuid == header->uuid; });
-  const std::uint64_t next = known == sessions.end() ? 0 : known->next_sequence;
-  if (request.first() > next) return {Reason::NO_SUCH_FRAME, "frames from " + std::to_string(next) + " on are missing"};
-  for (const storage::ClosureProposalRecord& loop : piece.loops)
-    if (loop.query.index >= std::max<std::uint64_t>(next, request.first() + frames.size()))
-      return {Reason::NO_SUCH_FRAME,
-              "a loop from frame " + std::to_string(loop.query.index) + ", which does not exist"};
-  for (Keyframe& keyframe : frames)
-    if (keyframe.sequence >= next) piece.frames.push_back(std::move(keyframe));
-  if (known != sessions.end() && known->frames > 0 && !piece.frames.empty() &&
-      piece.frames.front().time_us <= known->last_time_us)
-    return {Reason::TIME_BACKWARDS,
-            "frame " + std::to_string(piece.frames.front().sequence) + " is no later than the last one of the map"};
-
-  const auto number = mapper.begin_session(*header);
-  if (!number.ok()) return number.status();
-  piece.session = *number;
-  for (storage::ClosureProposalRecord& loop : piece.loops) loop.query.session = loop.match.session = *number;
   return piece;
 }
 
@@ -176,20 +138,23 @@ Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request,
   // One at a time, since a piece is checked against the map, and pieces must not occupy the threads of all other calls.
   const std::unique_lock held(turn.mutex, std::try_to_lock);
   if (!held.owns_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
-  const auto piece = check_piece(mapper, request);
+  auto piece = piece_of(request);
   if (!piece.ok()) return piece.status();
+  if (Status fits = piece->fit(*mapper.view()); !fits.ok()) return fits;
+  const auto session = piece->begin(mapper);
+  if (!session.ok()) return session.status();
   v1::ImportGraphReply reply;
-  reply.set_session(piece->session);
+  reply.set_session(*session);
   reply.set_frames_known(static_cast<std::uint32_t>(request.frames_size()) -
-                         static_cast<std::uint32_t>(piece->frames.size()));
+                         static_cast<std::uint32_t>(piece->frames().size()));
   Writer writer(mapper, deadline);
-  for (const Keyframe& keyframe : piece->frames) {
+  for (const Keyframe& keyframe : piece->frames()) {
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    if (Status taken = writer.write(storage::KeyframeRecord{piece->session, crc, std::move(payload)}); !taken.ok())
+    if (Status taken = writer.write(storage::KeyframeRecord{*session, crc, std::move(payload)}); !taken.ok())
       return taken;
   }
-  for (const storage::ClosureProposalRecord& loop : piece->loops)
+  for (const storage::ClosureProposalRecord& loop : piece->loops())
     if (Status taken = writer.write(loop); !taken.ok()) return taken;
   // The next piece is checked against the frames of this one, so they must be in the map first.
   const auto written = writer.finish();
