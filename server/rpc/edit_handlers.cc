@@ -2,10 +2,9 @@
 #include <chrono>
 #include <thread>
 
-#include "proto/base/names.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
-#include "server/map/closures.h"
+#include "server/map/label_edit.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/write_and_wait.h"
@@ -14,35 +13,23 @@ namespace relmap::rpc {
 
 namespace {
 
-constexpr std::size_t kMaxLabelsPerFrame = 64;
 constexpr std::chrono::milliseconds kLookEach{100};  // between looks at the progress of a deletion
 
 }  // namespace
 
 Result<v1::SetLabelReply> set_label(const v1::SetLabelRequest& request, const Deadline& deadline, map::Mapper& mapper,
                                     EditLog& edits) {
-  const Status named = check_name("label", request.label());
-  if (!named.ok() && !request.remove()) return named;  // labels that were valid once can still be removed
+  storage::SetLabelRecord record{{}, request.label(), !request.remove()};
+  if (Status valid = map::check_label(record); !valid.ok()) return valid;
   const auto frame = existing_frame(*mapper.view(), request.has_frame(), request.frame(), "frame");
   if (!frame.ok()) return frame.status();
+  record.frame = *frame;
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
       mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,
       [&]() -> Result<storage::JournalRecord> {
-        const auto map = mapper.view();
-        const auto hot = map->hot(*frame);
-        if (!hot) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
-        if (map::is_going(*map, *frame))
-          return {Reason::SESSION_DELETED,
-                  frame->to_string() + " is being deleted with session " + std::to_string(frame->session)};
-        const bool present = std::find(hot->labels.begin(), hot->labels.end(), request.label()) != hot->labels.end();
-        if (request.remove() && !present && !named.ok()) return named;
-        if (request.remove() && !present)
-          return {Reason::NO_SUCH_LABEL, frame->to_string() + " is not labelled '" + request.label() + "'"};
-        if (!request.remove() && !present && hot->labels.size() >= kMaxLabelsPerFrame)
-          return {Reason::BUDGET_EXCEEDED, frame->to_string() + " has " + std::to_string(kMaxLabelsPerFrame) +
-                                               " labels already, as many as a frame may have"};
-        return storage::JournalRecord(storage::SetLabelRecord{*frame, request.label(), !request.remove()});
+        if (Status possible = map::check_label_edit(*mapper.view(), record); !possible.ok()) return possible;
+        return storage::JournalRecord(record);
       },
       sequence);
   if (!status.ok()) return status;
