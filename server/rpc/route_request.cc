@@ -6,6 +6,7 @@
 #include "proto/base/bytes.h"
 #include "proto/base/crc32c.h"
 #include "proto/wire/convert.h"
+#include "server/route/newest_frame.h"
 #include "server/route/refusal.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
@@ -22,20 +23,6 @@ constexpr int kMaxLabels = 100, kMaxSessions = 10'000;
 
 Status too_many(const char* what, std::size_t max_count) {
   return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(max_count) + ' ' + what};
-}
-
-// The newest frame of the robot's sessions. Stereo sessions are preferred, since mono sessions have no edges.
-Result<FrameId> newest_frame(const storage::Graph& map, const std::string& robot) {
-  const auto rank = [](const storage::Session& session) {
-    return std::pair(session.header.camera.is_stereo(), session.last_time_us);
-  };
-  std::optional<storage::Session> newest;
-  for (const storage::Session& session : map.sessions())
-    if (session.header.robot == robot && session.frames > 0 && !storage::is_going(session) &&
-        (!newest || rank(session) >= rank(*newest)))
-      newest = session;
-  if (!newest) return {Reason::NO_SUCH_SESSION, "no robot named '" + robot + "' has sent a frame"};
-  return FrameId{newest->number, newest->last};
 }
 
 Status add_end(map::Mapper& mapper, const storage::MapView& view, const v1::RouteEnd& end, const char* what,
@@ -64,7 +51,7 @@ Status add_end(map::Mapper& mapper, const storage::MapView& view, const v1::Rout
       return {};
     }
     case v1::RouteEnd::kRobot: {
-      const auto frame = newest_frame(view, end.robot());
+      const auto frame = route::newest_frame(view, end.robot());
       if (!frame.ok()) return frame.status();
       ends.frames.push_back(*frame);
       return {};
