@@ -7,7 +7,7 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/trajectory.h"
+#include "server/rpc/trajectory_text.h"
 #include "storage/graph/binding.h"
 
 namespace relmap::rpc {
@@ -76,7 +76,7 @@ class ExportStream {
     header_sent_ = false;
   }
 
-  Result<std::optional<TrajectoryPose>> next_pose() {
+  Result<std::optional<route::TrajectoryPose>> next_pose() {
     if (frames_ % kCheckStride == 0)
       if (Status status = deadline_.check(); !status.ok()) return status;
     auto pose = reader_->next();
@@ -105,14 +105,14 @@ class ExportStream {
   }
 
   // Both return approximately how many bytes they added.
-  std::size_t add_line(const TrajectoryPose& pose, v1::ExportReply& reply) const {
+  std::size_t add_line(const route::TrajectoryPose& pose, v1::ExportReply& reply) const {
     const std::string line = trajectory_line(*contents_.file, pose);
     reply.mutable_data()->append(line);
     if (!pose.doubtful_step) return line.size();
     *reply.add_unmeasured() = edge_message(*pose.doubtful_step);
     return line.size() + reply.unmeasured(reply.unmeasured_size() - 1).ByteSizeLong();
   }
-  std::size_t add_frame(const TrajectoryPose& pose, v1::ExportReply& reply) const {
+  std::size_t add_frame(const route::TrajectoryPose& pose, v1::ExportReply& reply) const {
     v1::ExportedFrame& frame = *reply.add_frames();
     *frame.mutable_id() = relmap::to_wire(pose.frame);
     frame.set_time_us(pose.hot->time_us);
@@ -135,7 +135,7 @@ class ExportStream {
   const std::vector<storage::Session> sessions_;
   const Deadline& deadline_;
   std::size_t current_ = 0;
-  std::optional<TrajectoryReader> reader_;
+  std::optional<route::TrajectoryReader> reader_;
   bool header_sent_ = false;
   std::uint32_t frames_ = 0;  // frames taken from the current session
   std::uint64_t done_ = 0, total_ = 0;

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "proto/wire/convert.h"
-#include "server/rpc/edge_list.h"
+#include "server/route/edge_list.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/label_words.h"
 #include "server/rpc/messages.h"
@@ -55,7 +55,7 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
   const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   const storage::MapView& view = *opened->kept;
-  EdgeFilter filter;
+  route::EdgeFilter filter;
   for (const int state : request.states()) {
     const auto known = from_wire(static_cast<v1::EdgeState>(state));
     if (!known.ok()) return known.status();
@@ -89,7 +89,7 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
   std::size_t bytes = 0;
   bool more = false;
   SearchWork work(mapper.budget(), limits.max_search_frames, deadline);
-  const Status status = for_each_edge(view, filter, after, work.limit(), [&](const storage::Edge& edge) {
+  const Status status = route::for_each_edge(view, filter, after, work.limit(), [&](const storage::Edge& edge) {
     more = static_cast<std::uint32_t>(reply.edges_size()) == most || bytes > kMaxPageBytes;
     if (more) return false;
     *reply.add_edges() = edge_message(edge);

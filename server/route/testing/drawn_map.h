@@ -101,6 +101,7 @@ class DrawnMap final : public storage::PartialGraph {
   char name(FrameId id) const { return names_.at(id); }
   const Vector3& position(char name) const { return positions_.at(name); }
   storage::FrameHot& editable(FrameId id) { return *frames_.at(id); }
+  storage::Session& edit_session(SessionNumber number) { return sessions_.at(number); }
 
   std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
     const auto it = frames_.find(id);

@@ -8,7 +8,7 @@
 #include "server/route/work_limit.h"
 #include "storage/graph/graph.h"
 
-namespace relmap::rpc {
+namespace relmap::route {
 
 struct EdgeFilter {
   std::set<storage::EdgeState> states;   // empty: all
@@ -25,7 +25,7 @@ struct EdgeFilter {
 
 // Calls `visit` with the matching edges behind `after`, ascending by id, until it returns false. `after` is an edge of
 // the map, or invalid to begin with the first. DATA_LOSS, and what work.proceed returns.
-Status for_each_edge(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const route::WorkLimit& work,
+Status for_each_edge(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
                      const std::function<bool(const storage::Edge&)>& visit);
 
-}  // namespace relmap::rpc
+}  // namespace relmap::route

@@ -5,13 +5,10 @@
 
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "storage/graph/graph.h"
 
-namespace relmap::rpc {
-
-enum class TrajectoryFormat : std::uint8_t { kTum, kKitti };
+namespace relmap::route {
 
 struct TrajectoryPose {
   FrameId frame;
@@ -38,10 +35,4 @@ class TrajectoryReader {
   SE3 T_first_previous_;
 };
 
-// TUM: "time tx ty tz qx qy qz qw" after '#' lines that name the session and the frame of the poses; a '#' line before
-// a pose says that its step is doubtful. KITTI has no comments: a line holds the upper three rows of the matrix, row by
-// row, and the header is empty.
-std::string trajectory_header(TrajectoryFormat format, const storage::Session& session);
-std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose);
-
-}  // namespace relmap::rpc
+}  // namespace relmap::route

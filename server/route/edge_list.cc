@@ -1,9 +1,9 @@
-#include "server/rpc/edge_list.h"
+#include "server/route/edge_list.h"
 
 #include <algorithm>
 #include <vector>
 
-namespace relmap::rpc {
+namespace relmap::route {
 
 namespace {
 
@@ -17,7 +17,7 @@ struct Span {
 
 class Walk {
  public:
-  Walk(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const route::WorkLimit& work,
+  Walk(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
        const std::function<bool(const storage::Edge&)>& visit)
       : graph_(graph), filter_(filter), after_(after), work_(work), visit_(visit) {}
 
@@ -99,21 +99,21 @@ class Walk {
     return {};
   }
 
-  Status check() { return frames_++ % route::kWorkStride == 0 && work_.proceed ? work_.proceed(held_) : Status(); }
+  Status check() { return frames_++ % kWorkStride == 0 && work_.proceed ? work_.proceed(held_) : Status(); }
 
   const storage::Graph& graph_;
   const EdgeFilter& filter_;
   const EdgeId after_;
-  const route::WorkLimit& work_;
+  const WorkLimit& work_;
   const std::function<bool(const storage::Edge&)>& visit_;
   std::size_t frames_ = 0, held_ = 0;
 };
 
 }  // namespace
 
-Status for_each_edge(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const route::WorkLimit& work,
+Status for_each_edge(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
                      const std::function<bool(const storage::Edge&)>& visit) {
   return Walk(graph, filter, after, work, visit).run();
 }
 
-}  // namespace relmap::rpc
+}  // namespace relmap::route
