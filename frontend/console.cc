@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "frontend/figures.h"
+#include "proto/base/bar_text.h"
 #include "proto/base/hex.h"
 #include "proto/base/json.h"
 #include "proto/base/mutex.h"
@@ -250,8 +251,7 @@ void ProgressLine::show_text(const RunSummary& so_far, const publishing::Publish
   std::ostringstream line;
   if (terminal_) {
     constexpr std::uint64_t kWidth = 30;
-    const std::uint64_t filled = total_ > 0 ? std::min(kWidth, kWidth * done / total_) : 0;
-    line << '\r' << '[' << std::string(filled, '#') << std::string(kWidth - filled, '.') << "] ";
+    line << '\r' << progress_bar_text(done, total_, kWidth) << ' ';
   }
   line << done;
   if (total_ > 0) line << " of " << total_;

@@ -5,6 +5,8 @@
 #include <ctime>
 #include <ostream>
 
+#include "proto/base/bar_text.h"
+
 namespace relmap::terminal {
 
 namespace {
@@ -85,9 +87,9 @@ std::string vector_text(const Vector3& v) {
 std::string bar_text(std::uint64_t used, std::uint64_t whole) {
   constexpr std::uint64_t kWidth = 20;
   const double part = whole == 0 ? 0 : std::min(1.0, static_cast<double>(used) / static_cast<double>(whole));
-  auto full = static_cast<std::size_t>(part * kWidth + 0.5);
-  if (used > 0 && full == 0) full = 1;
-  return "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
+  auto filled = static_cast<std::uint64_t>(part * kWidth + 0.5);
+  if (used > 0 && filled == 0) filled = 1;
+  return filled_bar_text(filled, kWidth);
 }
 
 std::size_t width_of(const std::string& utf8) {

@@ -7,6 +7,7 @@
 #include <ostream>
 #include <string_view>
 
+#include "proto/base/bar_text.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::terminal {
@@ -45,12 +46,11 @@ void ProgressBar::show(const std::string& step, std::uint64_t done, std::uint64_
 }
 
 void ProgressBar::draw(const std::string& amount, std::uint64_t done, std::uint64_t total) {
-  constexpr std::size_t kWidth = 32;
+  constexpr std::uint64_t kWidth = 32;
   std::string line = step_;
   if (total > 0) {
     const double part = static_cast<double>(std::min(done, total)) / static_cast<double>(total);
-    const auto full = static_cast<std::size_t>(part * kWidth);
-    line += " [" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
+    line += ' ' + progress_bar_text(done, total, kWidth);
     const double seconds = std::chrono::duration<double>(Clock::now() - begun_).count();
     line += "  " + amount;
     if (part > 0.01 && part < 1 && seconds > 2) line += "  " + duration_text(seconds * (1 - part) / part) + " left";
