@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstdio>
-#include <initializer_list>
 #include <iomanip>
 #include <optional>
 #include <sstream>
@@ -32,14 +30,6 @@ Json counts_json(const std::map<Reason, std::uint64_t>& counts) {
 
 Json status_json(const Status& status) {
   return Json().add("reason", reason_name(status.reason())).add("message", status.message());
-}
-
-// Adds null if there is no object.
-Json& add_object(Json& json, const char* key, const std::optional<Json>& object) {
-  return object ? json.add(key, *object) : json.add_null(key);
-}
-Json& add_text(Json& json, const char* key, const std::string& text) {
-  return text.empty() ? json.add_null(key) : json.add(key, text);
 }
 
 std::string text_counts(const std::map<Reason, std::uint64_t>& counts) {
@@ -78,16 +68,11 @@ Json recognition_json(const RunSummary& s) {
   if (!s.place) return json.add_null("place");
   const SE3& T = s.place->T_frame_newest;
   const QuaternionWxyz q = canonical_quaternion(T.R);
-  const auto list = [](std::initializer_list<double> values, double scale) {
-    std::vector<double> rounded;
-    for (const double value : values) rounded.push_back(std::round(value * scale) / scale);
-    return rounded;
-  };
   return json.add("place", Json()
                                .add("frame", s.place->frame.to_string())
                                .add("recognised", s.place->recognised.to_string())
-                               .add("translation", list({T.t.x(), T.t.y(), T.t.z()}, 1e3))
-                               .add("rotation_wxyz", list({q[0], q[1], q[2], q[3]}, 1e6)));
+                               .add("translation", {T.t.x(), T.t.y(), T.t.z()}, 3)
+                               .add("rotation_wxyz", {q[0], q[1], q[2], q[3]}, 6));
 }
 
 std::optional<double> share_of_any(std::uint64_t part, std::uint64_t whole) {
@@ -191,7 +176,7 @@ Json trust_json(const RunSummary& s) {
       .add("measured_share", s.measured_share(), 6)
       .add("missing", Json().add("count", s.missing.count).add("first", s.missing.first))
       .add("findings", findings_json(s.findings()));
-  return add_object(json, "rig", rig_json(s.rig));
+  return json.add("rig", rig_json(s.rig));
 }
 
 }  // namespace
@@ -228,13 +213,12 @@ void ProgressLine::show_json(const RunSummary& so_far, const publishing::Publish
   if (now - shown_ < std::chrono::milliseconds(250)) return;
   shown_ = now;
   Json json;
-  json.add("pairs", so_far.pairs);
-  if (total_ > 0)
-    json.add("of", total_);
-  else
-    json.add_null("of");
-  json.add("keyframes", so_far.keyframes).add("settled", publishing.settled).add("path_m", so_far.path_m, 3);
-  add_text(json, "trouble", trouble.ok() ? "" : trouble.to_string());
+  json.add("pairs", so_far.pairs)
+      .add("of", total_ > 0 ? std::optional(total_) : std::nullopt)
+      .add("keyframes", so_far.keyframes)
+      .add("settled", publishing.settled)
+      .add("path_m", so_far.path_m, 3)
+      .add("trouble", trouble.ok() ? std::nullopt : std::optional(trouble.to_string()));
   std::fputs((json.text() + '\n').c_str(), stdout);
   std::fflush(stdout);
 }
@@ -337,13 +321,12 @@ std::string summary_text(const RunSummary& s) {
 std::string summary_json(const RunSummary& s) {
   const publishing::PublishSummary& p = s.publishing;
   Json json;
-  json.add("robot", s.robot).add("session", s.session).add("uuid", s.uuid);
-  add_text(json, "spool", s.spool);
-  if (s.gone_on)
-    json.add("gone_on_after", *s.gone_on);
-  else
-    json.add_null("gone_on_after");
-  json.add("mono", s.mono)
+  json.add("robot", s.robot)
+      .add("session", s.session)
+      .add("uuid", s.uuid)
+      .add("spool", s.spool.empty() ? std::nullopt : std::optional(s.spool))
+      .add("gone_on_after", s.gone_on)
+      .add("mono", s.mono)
       .add("pairs", s.pairs)
       .add("tracked", s.tracked)
       .add("one_eyed", s.one_eyed)
@@ -371,12 +354,14 @@ std::string summary_json(const RunSummary& s) {
       .add("latency_p50_ms", s.latency_p50_ms, 3)
       .add("latency_p99_ms", s.latency_p99_ms, 3)
       .add("tracked_p50_ms", s.tracked_p50_ms, 3)
-      .add("tracked_p99_ms", s.tracked_p99_ms, 3);
-  add_object(json, "recording", s.recording ? std::optional(identity_json(*s.recording)) : std::nullopt);
-  json.add("left_out", left_out_json(s.left_out));
-  add_object(json, "camera", camera_json(s));
-  json.merge(trust_json(s)).add("wall_s", s.wall_s, 3).add("interrupted", s.interrupted);
-  add_object(json, "error", s.failure.ok() ? std::nullopt : std::optional(status_json(s.failure)));
+      .add("tracked_p99_ms", s.tracked_p99_ms, 3)
+      .add("recording", s.recording ? std::optional(identity_json(*s.recording)) : std::nullopt)
+      .add("left_out", left_out_json(s.left_out))
+      .add("camera", camera_json(s))
+      .merge(trust_json(s))
+      .add("wall_s", s.wall_s, 3)
+      .add("interrupted", s.interrupted)
+      .add("error", s.failure.ok() ? std::nullopt : std::optional(status_json(s.failure)));
   return json.text();
 }
 

@@ -13,6 +13,11 @@ std::string number_of(double value) {
   return nlohmann::json(value).dump();
 }
 
+double rounded(double value, int digits) {
+  const double scale = std::pow(10.0, digits);
+  return std::round(value * scale) / scale;
+}
+
 std::string joined(const std::vector<std::string>& items, const char* separator) {
   std::string text;
   for (const std::string& item : items) {
@@ -46,9 +51,7 @@ Json& Json::add(std::string_view key, std::string_view text) { return put(key, q
 Json& Json::add(std::string_view key, double value) { return put(key, number_of(value)); }
 
 Json& Json::add(std::string_view key, std::optional<double> value, int digits) {
-  if (!value) return add_null(key);
-  const double scale = std::pow(10.0, digits);
-  return add(key, std::round(*value * scale) / scale);
+  return value ? add(key, rounded(*value, digits)) : add_null(key);
 }
 
 Json& Json::merge(const Json& other) {
@@ -66,6 +69,10 @@ Json& Json::add(std::string_view key, const std::vector<std::string>& texts) {
 
 Json& Json::add(std::string_view key, const std::vector<double>& numbers) {
   return put(key, list_of(numbers, number_of));
+}
+
+Json& Json::add(std::string_view key, const std::vector<double>& numbers, int digits) {
+  return put(key, list_of(numbers, [digits](double number) { return number_of(rounded(number, digits)); }));
 }
 
 std::string Json::text() const { return '{' + joined(members_, ",") + '}'; }

@@ -25,11 +25,19 @@ class Json {
   Json& add(std::string_view key, double value);
   // Rounds the value to `digits` decimal places. Adds null for nullopt.
   Json& add(std::string_view key, std::optional<double> value, int digits);
+  // Adds null for nullopt.
+  template <typename Value>
+  Json& add(std::string_view key, const std::optional<Value>& value) {
+    return value ? add(key, *value) : add_null(key);
+  }
   Json& add(std::string_view key, const Json& object) { return put(key, object.text()); }
   Json& add(std::string_view key, const std::vector<Json>& objects);
   Json& add(std::string_view key, const std::vector<std::string>& texts);
   Json& add(std::string_view key, const std::vector<double>& numbers);
+  Json& add(std::string_view key, const std::vector<double>& numbers, int digits);  // rounded to `digits` places
   Json& add_null(std::string_view key) { return put(key, "null"); }
+  // Adds a value that is JSON already.
+  Json& add_json(std::string_view key, std::string_view json) { return put(key, json); }
   // Appends all members of `other`.
   Json& merge(const Json& other);
 

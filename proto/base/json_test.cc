@@ -36,7 +36,20 @@ TEST(Json, NumbersAreReadBackExactly) {
 TEST(Json, RoundsAndMerges) {
   EXPECT_EQ(Json().add("a", 1.23456, 3).add("b", -0.0004, 3).add("c", std::nullopt, 3).text(),
             R"({"a":1.235,"b":0,"c":null})");
+  EXPECT_EQ(Json().add("l", {1.23456, -0.0004, 2}, 3).text(), R"({"l":[1.235,0,2]})");
   EXPECT_EQ(Json().add("a", 1).merge(Json().add("b", 2)).text(), R"({"a":1,"b":2})");
+}
+
+TEST(Json, WhatIsAbsentIsNull) {
+  EXPECT_EQ(Json().add("a", std::optional(Json().add("b", 1))).add("c", std::optional<Json>()).text(),
+            R"({"a":{"b":1},"c":null})");
+  EXPECT_EQ(Json().add("a", std::optional<std::string>("")).add("b", std::optional<std::string>()).text(),
+            R"({"a":"","b":null})");
+  EXPECT_EQ(Json().add("a", std::optional(7U)).add("b", std::optional<std::uint64_t>()).text(), R"({"a":7,"b":null})");
+}
+
+TEST(Json, AValueThatIsJsonAlreadyStaysAsItIs) {
+  EXPECT_EQ(Json().add_json("l", "[[1.50,2.00]]").add("a", 1).text(), R"({"l":[[1.50,2.00]],"a":1})");
 }
 
 TEST(Json, ListsHoldObjectsOrTexts) {
