@@ -72,13 +72,6 @@ Rgb session_colour(SessionNumber session) {
   return kColours[(session - 1) % std::size(kColours)];
 }
 
-template <typename Items, typename Text>
-std::string json_list(const Items& items, const Text& text) {
-  std::string out;
-  for (const auto& item : items) out += (out.empty() ? "" : ",") + text(item);
-  return '[' + out + ']';
-}
-
 // East and north of the root on a plane that touches the Earth there, to degrees.
 class Plane {
  public:
@@ -105,47 +98,56 @@ class Plane {
 // The features of a part, with coordinates if its place is known.
 class Features {
  public:
-  Features(const MapPart& part, const std::optional<Geodetic>& place, std::ostream& out) : part_(part), out_(out) {
+  Features(const MapPart& part, const std::optional<Geodetic>& place) : part_(part) {
     if (place) plane_.emplace(*place);
   }
 
-  void add(const std::vector<FrameId>& frames, const std::string& properties) {
-    out_ << (first_ ? "\n" : ",\n") << R"({"type":"Feature","geometry":)";
-    first_ = false;
-    const auto position = [&](FrameId frame) -> const Vector3& { return part_.find(frame)->t; };
+  void add(const std::vector<FrameId>& frames, Json properties) {
+    Json feature;
+    feature.add("type", "Feature");
     if (plane_) {
-      const auto point = [&](FrameId frame) { return plane_->point(position(frame)); };
-      if (frames.size() == 1)
-        out_ << R"({"type":"Point","coordinates":)" << point(frames[0]) << '}';
-      else
-        out_ << R"({"type":"LineString","coordinates":)" << json_list(frames, point) << '}';
-      out_ << R"(,"properties":{)" << properties << "}}";
+      feature.add("geometry", geometry(frames));
     } else {
-      const auto point = [&](FrameId frame) {
-        const Vector3& p = position(frame);
-        return format("[%.4f,%.4f,%.4f]", p.x(), p.y(), p.z());
-      };
-      out_ << R"(null,"properties":{)" << properties << R"(,"metresInRoot":)" << json_list(frames, point) << "}}";
+      feature.add_null("geometry");
+      properties.add_json("metresInRoot", '[' + points(frames) + ']');
     }
+    text_ += (text_.empty() ? "\n" : ",\n") + feature.add("properties", properties).text();
   }
+  // A JSON list, one line a feature.
+  std::string text() const { return '[' + text_ + "\n]"; }
 
  private:
+  Json geometry(const std::vector<FrameId>& frames) const {
+    if (frames.size() == 1) return Json().add("type", "Point").add_json("coordinates", points(frames));
+    return Json().add("type", "LineString").add_json("coordinates", '[' + points(frames) + ']');
+  }
+  std::string points(const std::vector<FrameId>& frames) const {
+    std::string text;
+    for (const FrameId frame : frames) {
+      const Vector3& p = part_.find(frame)->t;
+      text += text.empty() ? "" : ",";
+      text += plane_ ? plane_->point(p) : format("[%.4f,%.4f,%.4f]", p.x(), p.y(), p.z());
+    }
+    return text;
+  }
+
   const MapPart& part_;
-  std::ostream& out_;
   std::optional<Plane> plane_;
-  bool first_ = true;
+  std::string text_;
 };
 
-std::string tear_json(const Tear& tear) {
-  return Json()
-      .add("edge", tear.edge.to_string())
-      .add("metres", tear.metres, 4)
-      .add("degrees", tear.degrees, 3)
-      .add("sigmas", tear.sigmas, 2)
-      .text();
+std::vector<Json> tears_json(const std::vector<Tear>& tears) {
+  std::vector<Json> list;
+  for (const Tear& tear : tears)
+    list.push_back(Json()
+                       .add("edge", tear.edge.to_string())
+                       .add("metres", tear.metres, 4)
+                       .add("degrees", tear.degrees, 3)
+                       .add("sigmas", tear.sigmas, 2));
+  return list;
 }
 
-std::string step_json(const DoubtfulStep& step) {
+Json step_json(const DoubtfulStep& step) {
   Json json;
   json.add("edge", step.edge.to_string());
   if (step.carried_by.empty()) {
@@ -155,7 +157,19 @@ std::string step_json(const DoubtfulStep& step) {
     for (const EdgeId id : step.carried_by) carried_by.push_back(id.to_string());
     json.add("carriedBy", carried_by);
   }
-  return json.add("beside", name_of(step.beside)).text();
+  return json.add("beside", name_of(step.beside));
+}
+
+std::vector<Json> steps_json(const std::vector<DoubtfulStep>& steps) {
+  std::vector<Json> list;
+  for (const DoubtfulStep& step : steps) list.push_back(step_json(step));
+  return list;
+}
+
+std::vector<std::string> roots_of(const RelaxedMap& map) {
+  std::vector<std::string> roots;
+  for (const MapPart& part : map.parts) roots.push_back(part.root.to_string());
+  return roots;
 }
 
 }  // namespace
@@ -294,17 +308,7 @@ void write_ply_tail(const RelaxedMap& map, std::size_t number, std::ostream& out
 
 void write_geojson(const RelaxedMap& map, std::size_t number, const std::optional<Geodetic>& place, std::ostream& out) {
   const MapPart& part = map.parts.at(number);
-  out << R"({"type":"FeatureCollection","root":)" << Json::quoted(part.root.to_string()) << R"(,"roots":)"
-      << json_list(map.parts, [](const MapPart& other) { return Json::quoted(other.root.to_string()); })
-      << R"(,"part":)" << number + 1 << R"(,"parts":)" << map.parts.size() << R"(,"frames":)" << part.frames.size()
-      << R"(,"located":)" << (place ? "true" : "false") << R"(,"tears":)" << json_list(part.tears, tear_json)
-      << R"(,"doubtful":)" << json_list(part.doubtful, step_json) << R"(,"note":)"
-      << Json::quoted(place
-                          ? "the root was put where the caller said; its y axis is taken for plumb"
-                          : "where the map lies on the Earth is not known: features have no geometry; metresInRoot has "
-                            "their positions in the frame of the root (x right, y down, z forward)")
-      << R"(,"features":[)";
-  Features features(part, place, out);
+  Features features(part, place);
 
   // Runs of frames that measured motion joins.
   std::set<std::pair<FrameId, FrameId>> joined;
@@ -317,10 +321,11 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
   std::vector<FrameId> run;
   const auto end_run = [&] {
     if (!run.empty())
-      features.add(run, "\"session\":" + std::to_string(run[0].session) +
-                            ",\"name\":" + Json::quoted(map.name(run[0].session)) +
-                            ",\"first\":" + Json::quoted(run.front().to_string()) +
-                            ",\"last\":" + Json::quoted(run.back().to_string()));
+      features.add(run, Json()
+                            .add("session", run[0].session)
+                            .add("name", map.name(run[0].session))
+                            .add("first", run.front().to_string())
+                            .add("last", run.back().to_string()));
     run.clear();
   };
   for (const PlacedFrame& placed : part.frames) {
@@ -331,15 +336,33 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
   for (const std::size_t index : part.edges) {
     const RelaxedMap::Spring& spring = map.springs[index];
     if (spring.kind == client::EdgeKind::kOdometry && !spring.doubtful) continue;
-    features.add({spring.relaxed.a, spring.relaxed.b},
-                 "\"edge\":" + Json::quoted(spring.edge.to_string()) + ",\"kind\":\"" + kind_of(spring.kind) +
-                     "\",\"tear\":" + (torn.contains(spring.edge) ? "true" : "false") +
-                     ",\"doubtful\":" + (spring.doubtful ? "true" : "false"));
+    features.add({spring.relaxed.a, spring.relaxed.b}, Json()
+                                                           .add("edge", spring.edge.to_string())
+                                                           .add("kind", kind_of(spring.kind))
+                                                           .add("tear", torn.contains(spring.edge))
+                                                           .add("doubtful", spring.doubtful));
   }
   for (const MapPart::Label& label : part.labels)
-    features.add({label.frame},
-                 "\"label\":" + Json::quoted(label.text) + ",\"frame\":" + Json::quoted(label.frame.to_string()));
-  out << "\n]}\n";
+    features.add({label.frame}, Json().add("label", label.text).add("frame", label.frame.to_string()));
+
+  const char* note = place
+                         ? "the root was put where the caller said; its y axis is taken for plumb"
+                         : "where the map lies on the Earth is not known: features have no geometry; metresInRoot has "
+                           "their positions in the frame of the root (x right, y down, z forward)";
+  out << Json()
+             .add("type", "FeatureCollection")
+             .add("root", part.root.to_string())
+             .add("roots", roots_of(map))
+             .add("part", number + 1)
+             .add("parts", map.parts.size())
+             .add("frames", part.frames.size())
+             .add("located", place.has_value())
+             .add("tears", tears_json(part.tears))
+             .add("doubtful", steps_json(part.doubtful))
+             .add("note", note)
+             .add_json("features", features.text())
+             .text()
+      << '\n';
 }
 
 }  // namespace relmap::cli
