@@ -8,7 +8,6 @@
 #include "proto/base/number_text.h"
 #include "server/place/likeliest.h"
 #include "server/place/metric_places.h"
-#include "server/place/mirrored.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
@@ -90,10 +89,7 @@ Status contradiction_of(std::span<const PlaceTrial> trials) {
 class Search {
  public:
   Search(const PlaceKnowledge& map, const PlaceQuestion& question, const Proceed& proceed)
-      : map_(map),
-        query_(question.picture()),
-        seed_(seed_of(question.features)),
-        trials_(map.graph, query_, seed_, proceed) {}
+      : map_(map), trials_(map.graph, question.picture(), seed_of(question.features), proceed) {}
 
   // Tries candidates until one has kSure inliers. If `proceed` refuses to go on, its status is returned unless a
   // candidate has been confirmed.
@@ -121,15 +117,13 @@ class Search {
     return first;
   }
 
-  Status check_not_mirrored(const Localisation& found) const {
-    return place::check_not_mirrored(map_.graph, query_, found.place, seed_);
-  }
+  Status check_not_mirrored(const Localisation& found) const { return trials_.check_not_mirrored(found.place); }
 
   // AMBIGUOUS_PLACE if a look-alike of the place explains the picture about as well; or what `proceed` returns.
   Status check_unique(const Localisation& found) {
     trials_.keep_confirmed();
     const std::size_t answers = trials_.size();
-    const auto alike = look_alikes(map_.graph, map_.places, found.place.match, query_.masked);
+    const auto alike = look_alikes(map_.graph, map_.places, found.place.match, trials_.query().masked);
     if (Status status = trials_.run(alike, {.max_trials = kVerified, .skip_mono = true}); !status.ok()) return status;
     if (Status status = contradiction(); !status.ok()) return status;
     const auto standing = trials_.weigh(answers);
@@ -139,8 +133,6 @@ class Search {
 
  private:
   const PlaceKnowledge& map_;
-  const QueryPicture query_;
-  const std::uint64_t seed_;
   Trials trials_;
 };
 
@@ -165,9 +157,7 @@ Status check_named(const PlaceQuestion& question) {
 // the place.
 Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
                            std::span<const PlaceCandidate> candidates, const Proceed& proceed) {
-  const QueryPicture query = question.picture();
-  const std::uint64_t seed = seed_of(question.features);
-  Trials trials(map.graph, query, seed, proceed);
+  Trials trials(map.graph, question.picture(), seed_of(question.features), proceed);
   if (Status status = trials.run(candidates, {}); !status.ok()) return status;
   const std::size_t asked = trials.size();
   PlaceMatches matches;
@@ -181,9 +171,8 @@ Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& quest
   const auto standing = trials.weigh(trials.size());
   if (standing) {
     const VerifiedPlace& best = *trials.all()[standing->best].verified;
-    matches.nothing_verified = is_ambiguous(standing->uniqueness, best.inliers)
-                                   ? ambiguous(trials.all(), *standing)
-                                   : check_not_mirrored(map.graph, query, best, seed);
+    matches.nothing_verified = is_ambiguous(standing->uniqueness, best.inliers) ? ambiguous(trials.all(), *standing)
+                                                                                : trials.check_not_mirrored(best);
   }
   if (Status status = contradiction_of(trials.all()); !status.ok()) matches.nothing_verified = std::move(status);
   for (std::size_t i = 0; i < trials.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "server/place/mirrored.h"
 #include "server/place/place_index.h"
 #include "server/place/uniqueness.h"
 #include "server/place/verify.h"
@@ -41,6 +42,7 @@ class Trials {
   // Drops the trials that geometry does not confirm.
   void keep_confirmed();
 
+  const QueryPicture& query() const { return query_; }
   const std::vector<PlaceTrial>& all() const { return trials_; }
   // The candidate of a trial. (The trial's own frame is the one in which most of the picture fits.)
   const PlaceCandidate& candidate(std::size_t trial) const { return candidates_[trial]; }
@@ -51,6 +53,10 @@ class Trials {
   std::optional<std::size_t> best() const { return best_of(trials_); }
   std::optional<Standing> weigh(std::size_t answers, const ComparePlace& compare = {}) const {
     return place::weigh(graph_, query_, trials_, answers, seed_, compare);
+  }
+  // The function of this name in mirrored.h, for the picture.
+  Status check_not_mirrored(const VerifiedPlace& found) const {
+    return place::check_not_mirrored(graph_, query_, found, seed_);
   }
 
  private:
