@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontend/tracking/disparity_range.h"
 #include "frontend/vision/stereo_match.h"
 
 namespace relmap::tracking {
 
 namespace {
 
-constexpr double kMinDepth = 0.4;      // metres
 constexpr float kMinDisparity = 1.0F;  // pixels; below that the depth is too uncertain
 constexpr float kApart = 0.012F;       // distance between landmarks, as a share of the picture's width
 constexpr float kBerth = 0.03F;        // distance from points to avoid, as a share of the picture's width
@@ -26,10 +26,7 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
                                     int level, double sigma, double offset) {
   const auto x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
   const float u = vision::from_level(x, level), v = vision::from_level(y, level);
-  vision::StereoMatchOptions options;
-  options.min_disparity = kMinDisparity;
-  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kMinDepth, 0.2 * camera.width));
-  const auto match = vision::match_stereo(pair.left, pair.right, u, v, level, options);
+  const auto match = vision::match_stereo(pair.left, pair.right, u, v, level, disparity_range(camera, kMinDisparity));
   if (!match) return std::nullopt;
   NewLandmark made;
   const double disparity = match->disparity - offset;
