@@ -18,6 +18,7 @@
 #include "frontend/vision/appearance.h"
 #include "frontend/vision/corners.h"
 #include "frontend/vision/stereo_match.h"
+#include "proto/base/quantile.h"
 #include "tests/support/data_test.h"
 
 namespace relmap::frontend {
@@ -138,9 +139,7 @@ std::vector<double> row_differences(const capture::StereoFrame& frame) {
 
 double median_size(std::vector<double> values) {
   for (double& value : values) value = std::abs(value);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return upper_median(std::move(values));
 }
 
 class RealEuroc : public RealData {

@@ -6,11 +6,13 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "frontend/capture/capture_time.h"
 #include "frontend/capture/picture_file.h"
 #include "frontend/capture/text_file.h"
 #include "proto/base/number_text.h"
+#include "proto/base/quantile.h"
 
 namespace relmap::capture {
 
@@ -52,8 +54,7 @@ bool is_even_over_gaps(const std::vector<std::size_t>& numbers, const std::vecto
     (passed > 1 ? gaps : steps).push_back(step);
   }
   if (steps.empty()) return false;
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  const double usual = steps[steps.size() / 2];
+  const double usual = upper_median(std::move(steps));
   return std::all_of(gaps.begin(), gaps.end(), [&](double gap) { return std::abs(gap - usual) <= kEven * usual; });
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "frontend/tracking/new_landmarks.h"
+#include "proto/base/quantile.h"
 
 namespace relmap::tracking {
 
@@ -22,9 +23,7 @@ double LocalLandmarks::median_depth() const {
   std::vector<double> depths;
   depths.reserve(landmarks_.size());
   for (const Landmark& landmark : landmarks_) depths.push_back(landmark.point.z());
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return upper_median(std::move(depths));
 }
 
 void LocalLandmarks::note(std::vector<Sighting>& sightings) {

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
+
+#include "proto/base/quantile.h"
 
 namespace relmap::vision {
 
@@ -84,9 +87,8 @@ std::optional<double> edge_width(ImageView picture) {
   for (int x = 0; x < picture.width; x += 2)
     collect({picture.data + x, picture.stride, picture.height}, strong, widths);
   if (widths.size() < kMinEdges) return std::nullopt;
-  const auto fifth = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 5);
-  std::nth_element(widths.begin(), fifth, widths.end());
-  return *fifth;
+  const std::size_t fifth = widths.size() / 5;
+  return ranked(std::move(widths), fifth);
 }
 
 }  // namespace relmap::vision

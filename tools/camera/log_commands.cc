@@ -11,6 +11,7 @@
 #include "frontend/capture/raw_log_writer.h"
 #include "proto/base/clock.h"
 #include "proto/base/json.h"
+#include "proto/base/quantile.h"
 #include "tools/camera/commands.h"
 #include "tools/terminal/progress_bar.h"
 
@@ -122,9 +123,8 @@ double recorded_rate(const capture::RawLogReader& log) {
   std::vector<std::int64_t> intervals;
   for (std::size_t i = 1; i < log.frames(); ++i) intervals.push_back(log.time_us(i) - log.time_us(i - 1));
   if (intervals.empty()) return log.header().rate_hz;
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle > 0 ? 1e6 / static_cast<double>(*middle) : log.header().rate_hz;
+  const std::int64_t interval = upper_median(std::move(intervals));
+  return interval > 0 ? 1e6 / static_cast<double>(interval) : log.header().rate_hz;
 }
 
 Result<ExitCode> replay(const GlobalOptions& options, terminal::Console& console, const ReplayOptions& wish) {
