@@ -123,8 +123,9 @@ void split_and_smooth(const StereoLayout& layout, const std::uint8_t* raw, visio
 
 Status check(const StereoLayout& layout, std::size_t bytes) {
   const std::string size = std::to_string(layout.width) + " x " + std::to_string(layout.height);
-  const int least = layout.filter == ColourFilter::kNone ? 1 : 2;
-  if (layout.width < least || layout.height < least) return {Reason::BAD_SIZE, "a stereo frame of " + size + " pixels"};
+  const int min_side = layout.filter == ColourFilter::kNone ? 1 : 2;
+  if (layout.width < min_side || layout.height < min_side)
+    return {Reason::BAD_SIZE, "a stereo frame of " + size + " pixels"};
   if (bytes < layout.bytes())
     return {Reason::BAD_SIZE, "a frame of " + std::to_string(bytes) + " bytes; two eyes of " + size + " have " +
                                   std::to_string(layout.bytes())};

@@ -1,6 +1,5 @@
 #include "frontend/tracking/local_landmarks.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "frontend/tracking/new_landmarks.h"

@@ -49,7 +49,7 @@ class MonoKeyframes : public testing::Test {
     };
     stages.refused = [&](const Status& status) { ++refused_[status.reason()]; };
     stages.publish = [&](MonoPicture& picture) {
-      most_in_work_ = std::max(most_in_work_, next - keyframes_.size());
+      max_in_work_ = std::max(max_in_work_, next - keyframes_.size());
       keyframes_.push_back(picture.keyframe);
       return published_;
     };
@@ -68,7 +68,7 @@ class MonoKeyframes : public testing::Test {
   SessionHeader session_;
   std::vector<Keyframe> keyframes_;
   std::map<Reason, int> refused_;
-  std::size_t most_in_work_ = 0;
+  std::size_t max_in_work_ = 0;
   Status published_, ended_;
 };
 
@@ -111,7 +111,7 @@ TEST_F(MonoKeyframes, TheNumberDescribedAtOnceIsBoundedOnAnyMachine) {
   options.threads = 64;
   feed(std::move(pictures), options);
   EXPECT_EQ(keyframes_.size(), 3 * kMaxDescribedAtOnce);
-  EXPECT_EQ(most_in_work_, kMaxDescribedAtOnce);
+  EXPECT_EQ(max_in_work_, kMaxDescribedAtOnce);
 }
 
 TEST_F(MonoKeyframes, UnusablePicturesAreLeftOutByName) {

@@ -567,8 +567,8 @@ void StereoTracker::feed(std::span<const ImuSample> samples) {
   if (impl_->gyro) impl_->gyro->add(samples);
 }
 
-void StereoTracker::at_most(double keyframes_hz) {
-  impl_->min_apart_us = keyframes_hz > 0 ? std::llround(1e6 / std::max(keyframes_hz, 1e-3)) : 0;
+void StereoTracker::limit_keyframe_rate(double max_hz) {
+  impl_->min_apart_us = max_hz > 0 ? std::llround(1e6 / std::max(max_hz, 1e-3)) : 0;
 }
 
 Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> pair, std::int64_t time_us,

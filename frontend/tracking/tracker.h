@@ -90,7 +90,7 @@ class StereoTracker {
 
   // Limits the rate of keyframes from the next pair on. A keyframe still comes earlier if too few landmarks of the last
   // one are in sight. 0 removes the limit.
-  void at_most(double keyframes_hz);
+  void limit_keyframe_rate(double max_hz);
 
   // Tracks a pair, which must be later than the one before. `expected`, if the robot knows it, is T_previous_this
   // between the two pairs. If this pair becomes a keyframe, returns it without appearance and picture

@@ -347,7 +347,7 @@ TEST(StereoTracker, EveryPairBecomesAKeyframeIfAsked) {
 
 TEST(StereoTracker, LimitsTheRateOfKeyframesIfAsked) {
   StereoTracker often(header()), rare(header());
-  rare.at_most(0.5);
+  rare.limit_keyframe_rate(0.5);
   const std::size_t many = feed(often, 0, 30).keyframes.size();
   const Fed fed = feed(rare, 0, 30);
   EXPECT_EQ(fed.tracked, 30);
@@ -360,7 +360,7 @@ TEST(StereoTracker, LimitsTheRateOfKeyframesIfAsked) {
     EXPECT_EQ(keyframe.source, MotionSource::kVision);
     EXPECT_LT(nees(fed.keyframes[i - 1], keyframe), kChi2);
   }
-  rare.at_most(0);
+  rare.limit_keyframe_rate(0);
   EXPECT_GE(feed(rare, 30, Street::kPairs).keyframes.size(), 2u);
 }
 

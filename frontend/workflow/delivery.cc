@@ -162,7 +162,7 @@ Result<publishing::PublishSummary> Delivery::settle(bool complete) {
 // The daemon looks keyframes up after they are settled, so news of them comes later. Waits until there has been none
 // for a while.
 void Delivery::await_news() const {
-  const auto deadline = Clock::now() + run_.waits.news_most;
+  const auto deadline = Clock::now() + run_.waits.max_news_wait;
   auto heard = localisation_.counts().heard;
   for (auto last = Clock::now(); !run_.stop && Clock::now() < std::min(deadline, last + run_.waits.news_silence);) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

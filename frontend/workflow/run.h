@@ -14,14 +14,14 @@ namespace relmap::workflow {
 
 // Intervals and time limits of a run. Tests use shorter ones.
 struct Waits {
-  std::chrono::milliseconds look{50};           // interval of polling
-  std::chrono::milliseconds camera{1000};       // interval of attempts to open a camera
-  std::chrono::milliseconds silence{5000};      // a daemon silent for so long is reported
-  std::chrono::milliseconds slowed{15'000};     // a daemon's limit on the rate expires if not repeated
-  std::chrono::milliseconds news_silence{500};  // after such a silence no more news is expected
-  std::chrono::milliseconds news_most{10'000};  // maximum wait for news at the end
-  double map_s = 5;                             // seconds for a daemon to say which map it serves
-  double end_s = 2;                             // seconds for a daemon to confirm the end of a session
+  std::chrono::milliseconds look{50};               // interval of polling
+  std::chrono::milliseconds camera{1000};           // interval of attempts to open a camera
+  std::chrono::milliseconds silence{5000};          // a daemon silent for so long is reported
+  std::chrono::milliseconds slowed{15'000};         // a daemon's limit on the rate expires if not repeated
+  std::chrono::milliseconds news_silence{500};      // after such a silence no more news is expected
+  std::chrono::milliseconds max_news_wait{10'000};  // maximum wait for news at the end
+  double map_s = 5;                                 // seconds for a daemon to say which map it serves
+  double end_s = 2;                                 // seconds for a daemon to confirm the end of a session
 };
 
 inline constexpr std::size_t kMaxNamedLeftOut = 100'000;  // pictures and pairs of a recording that the summary names

@@ -70,7 +70,7 @@ Status track_pairs(Run& run, const PairsToTrack& pairs) {
   tracking::PipelineStages stages;
   stages.before_tracking = [&](tracking::StereoTracker& t, std::int64_t time_us) {
     if (*imu) t.feed((*imu)->until(time_us));
-    if (options.live) t.at_most(delivery.wanted_hz());
+    if (options.live) t.limit_keyframe_rate(delivery.wanted_hz());
   };
   stages.capture = [&] { return reader.next(); };
   stages.refused = [&](const Status& status) { run.refusals.say(status); };

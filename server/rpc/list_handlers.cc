@@ -18,8 +18,8 @@ constexpr std::uint32_t kEdgesPerPage = 1000, kMaxEdgesPerPage = 5000;
 constexpr std::uint32_t kLabelsPerPage = 1000, kMaxLabelsPerPage = 5000;
 constexpr std::size_t kMaxPageBytes = 2u << 20;  // a page ends early beyond it
 
-std::uint32_t page_size(std::uint32_t asked, std::uint32_t usual, std::uint32_t most) {
-  return asked == 0 ? usual : std::min(asked, most);
+std::uint32_t page_size(std::uint32_t asked, std::uint32_t usual, std::uint32_t max) {
+  return asked == 0 ? usual : std::min(asked, max);
 }
 
 const Status kForeignToken(Reason::INVALID_ARGUMENT, "the page token is not one of this list");
@@ -35,12 +35,12 @@ Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& reque
   if (!position.empty() && std::from_chars(position.data(), position.data() + position.size(), after).ec != std::errc{})
     return kForeignToken;
 
-  const std::uint32_t most = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
+  const std::uint32_t max_sessions = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
   v1::ListSessionsReply reply;
   reply.set_map_version(opened->kept->version());
   for (const storage::Session& session : opened->kept->sessions()) {
     if (session.number <= after || storage::is_deleted(session)) continue;
-    if (static_cast<std::uint32_t>(reply.sessions_size()) == most) {
+    if (static_cast<std::uint32_t>(reply.sessions_size()) == max_sessions) {
       reply.set_next_page_token(
           views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
       break;
@@ -83,14 +83,14 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
     after = *id;
   }
 
-  const std::uint32_t most = page_size(request.page_size(), kEdgesPerPage, kMaxEdgesPerPage);
+  const std::uint32_t max_edges = page_size(request.page_size(), kEdgesPerPage, kMaxEdgesPerPage);
   v1::ListEdgesReply reply;
   reply.set_map_version(view.version());
   std::size_t bytes = 0;
   bool more = false;
   SearchWork work(mapper.budget(), limits.max_search_frames, deadline);
   const Status status = route::for_each_edge(view, filter, after, work.limit(), [&](const storage::Edge& edge) {
-    more = static_cast<std::uint32_t>(reply.edges_size()) == most || bytes > kMaxPageBytes;
+    more = static_cast<std::uint32_t>(reply.edges_size()) == max_edges || bytes > kMaxPageBytes;
     if (more) return false;
     *reply.add_edges() = edge_message(edge);
     bytes += reply.edges(reply.edges_size() - 1).ByteSizeLong();
@@ -107,7 +107,7 @@ Result<v1::FindLabelsReply> find_labels(const v1::FindLabelsRequest& request, co
   const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   const std::string& after = opened->position;
-  const std::uint32_t most = page_size(request.page_size(), kLabelsPerPage, kMaxLabelsPerPage);
+  const std::uint32_t max_labels = page_size(request.page_size(), kLabelsPerPage, kMaxLabelsPerPage);
   v1::FindLabelsReply reply;
   reply.set_map_version(opened->kept->version());
   std::size_t bytes = 0;
@@ -116,7 +116,7 @@ Result<v1::FindLabelsReply> find_labels(const v1::FindLabelsRequest& request, co
     if ((!after.empty() && label <= after) || !begins_with(label, request.prefix()) ||
         !has_words(label, request.words()))
       continue;
-    if (static_cast<std::uint32_t>(reply.labels_size()) == most || bytes > kMaxPageBytes) {
+    if (static_cast<std::uint32_t>(reply.labels_size()) == max_labels || bytes > kMaxPageBytes) {
       reply.set_next_page_token(views.token(opened->kept, reply.labels(reply.labels_size() - 1).label()));
       break;
     }

@@ -128,7 +128,7 @@ Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, co
   if (!near.ok()) return near.status();
   auto seen = see(request.view(), *view);
   if (!seen.ok()) return seen.status();
-  const std::uint32_t most = request.max_places() == 0 ? kDefaultPlaces : request.max_places();
+  const std::uint32_t max_places = request.max_places() == 0 ? kDefaultPlaces : request.max_places();
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const place::PlaceKnowledge map{*view, mapper.places(), mapper.vocabulary()};
@@ -142,7 +142,7 @@ Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, co
   reply.set_reason(to_wire(found->nothing_verified.reason()));
   reply.set_message(found->nothing_verified.message());
   for (const place::PlaceMatch& match : found->places) {
-    if (static_cast<std::uint32_t>(reply.places_size()) == most) break;
+    if (static_cast<std::uint32_t>(reply.places_size()) == max_places) break;
     *reply.add_places() = match_message(*view, *seen, match, request.thumbnails());
   }
   return reply;

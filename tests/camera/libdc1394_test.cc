@@ -142,10 +142,10 @@ TEST_F(Libdc1394Test, ReadsWhatPointGreyAdds) {
   ASSERT_EQ(DC1394_SUCCESS, dc1394_get_control_register(opened.get(), 0x1f20, &quadlet));
   EXPECT_EQ(camera->options().serial, quadlet);
   EXPECT_NE(DC1394_SUCCESS, dc1394_get_control_register(opened.get(), 0x1ffc, &quadlet));
-  float rate = 0, most = 0;
+  float min_rate = 0, max_rate = 0;
   ASSERT_EQ(DC1394_SUCCESS,
-            dc1394_feature_get_absolute_boundaries(opened.get(), DC1394_FEATURE_FRAME_RATE, &rate, &most));
-  EXPECT_EQ(48, most);
+            dc1394_feature_get_absolute_boundaries(opened.get(), DC1394_FEATURE_FRAME_RATE, &min_rate, &max_rate));
+  EXPECT_EQ(48, max_rate);
 }
 
 }  // namespace

@@ -21,14 +21,14 @@ constexpr std::uint32_t kAbsolute = kBase + 0x3000, kAbsoluteSize = 0x10;
 constexpr std::uint32_t kStrobe = kBase + 0x4000;
 constexpr std::uint32_t kAll = 0xffff'ffff;
 constexpr std::uint32_t kVideoModeError = 0x628;
-constexpr std::uint32_t kPacketUnit = 8, kPacketMost = 4096;  // bytes, at 400 Mbit/s
+constexpr std::uint32_t kPacketUnit = 8, kMaxPacket = 4096;  // bytes, at 400 Mbit/s
 constexpr std::chrono::nanoseconds kCycle{125'000};
 
 struct Feature {
   std::uint32_t number;  // of its registers
-  std::uint32_t least, most, value;
+  std::uint32_t min, max, value;
   std::uint32_t abilities;
-  float absolute_least, absolute_most;
+  float absolute_min, absolute_max;
 };
 
 // The frame rate's absolute value ends at the camera's rate.
@@ -145,7 +145,7 @@ void SimulatedCamera::add_features() {
     const std::uint32_t number = feature.number;
     at(kBase + reg::kFeatureHiInq) |= bit(static_cast<int>(number));
     at(kBase + reg::kElementInq + 4 * number) =
-        inquiry::kPresent | feature.abilities | feature.least << inquiry::kMinShift | feature.most;
+        inquiry::kPresent | feature.abilities | feature.min << inquiry::kMinShift | feature.max;
     std::uint32_t writable = control::kValue;
     if (feature.abilities & inquiry::kAbsolute) writable |= control::kAbsolute;
     if (feature.abilities & inquiry::kOnOff) writable |= control::kOn;
@@ -156,9 +156,9 @@ void SimulatedCamera::add_features() {
     if (!(feature.abilities & inquiry::kAbsolute)) continue;
     const std::uint32_t csr = kAbsolute + kAbsoluteSize * number;
     at(kBase + reg::kAbsoluteCsrInq + 4 * number) = offset_quadlets(csr);
-    const float most = number == kFrameRate ? static_cast<float>(options_.rate) : feature.absolute_most;
-    registers_[csr + iidc::absolute::kMin] = {std::bit_cast<std::uint32_t>(feature.absolute_least), 0};
-    registers_[csr + iidc::absolute::kMax] = {std::bit_cast<std::uint32_t>(most), 0};
+    const float max = number == kFrameRate ? static_cast<float>(options_.rate) : feature.absolute_max;
+    registers_[csr + iidc::absolute::kMin] = {std::bit_cast<std::uint32_t>(feature.absolute_min), 0};
+    registers_[csr + iidc::absolute::kMax] = {std::bit_cast<std::uint32_t>(max), 0};
     registers_[csr + iidc::absolute::kValue] = {0, kAll};
     written_feature(kBase + reg::kFeature + 4 * number, at(kBase + reg::kFeature + 4 * number));
   }
@@ -198,10 +198,10 @@ void SimulatedCamera::apply_format7(std::uint32_t csr) {
   const auto packets = static_cast<std::uint32_t>(8000 / options_.rate);
   const std::uint32_t wanted = (bytes + packets - 1) / packets;
   const std::uint32_t recommended =
-      std::clamp((wanted + kPacketUnit - 1) / kPacketUnit * kPacketUnit, kPacketUnit, kPacketMost);
+      std::clamp((wanted + kPacketUnit - 1) / kPacketUnit * kPacketUnit, kPacketUnit, kMaxPacket);
   at(csr + format7::kPixelNumber) = pixels;
   at(csr + format7::kTotalBytesLo) = bytes;
-  at(csr + format7::kPacketPara) = kPacketUnit << 16 | kPacketMost;
+  at(csr + format7::kPacketPara) = kPacketUnit << 16 | kMaxPacket;
   at(csr + format7::kBytesPerPacket) = recommended << 16 | recommended;
   at(csr + format7::kPacketsPerFrame) = (bytes + recommended - 1) / recommended;
   at(csr + format7::kFrameInterval) =
@@ -247,14 +247,14 @@ void SimulatedCamera::written_feature(std::uint32_t offset, std::uint32_t before
   std::uint32_t& value = at(offset);
   const bool kept = value & (control::kAuto | control::kAbsolute);  // it is set by the camera, or by its absolute value
   const std::uint32_t asked = kept ? before & control::kValue : value & control::kValue;
-  const std::uint32_t set = std::clamp(asked, feature->least, feature->most);
+  const std::uint32_t set = std::clamp(asked, feature->min, feature->max);
   value = (value & ~control::kValue) | set;
   if (!(feature->abilities & inquiry::kAbsolute)) return;
   const std::uint32_t csr = kAbsolute + kAbsoluteSize * number;
-  const auto least = std::bit_cast<float>(at(csr + iidc::absolute::kMin));
-  const auto most = std::bit_cast<float>(at(csr + iidc::absolute::kMax));
-  const float part = static_cast<float>(set - feature->least) / static_cast<float>(feature->most - feature->least);
-  at(csr + iidc::absolute::kValue) = std::bit_cast<std::uint32_t>(least + part * (most - least));
+  const auto min = std::bit_cast<float>(at(csr + iidc::absolute::kMin));
+  const auto max = std::bit_cast<float>(at(csr + iidc::absolute::kMax));
+  const float part = static_cast<float>(set - feature->min) / static_cast<float>(feature->max - feature->min);
+  at(csr + iidc::absolute::kValue) = std::bit_cast<std::uint32_t>(min + part * (max - min));
 }
 
 // Takes effect where the feature is told to go by it, in the steps of its plain value.
@@ -269,11 +269,11 @@ void SimulatedCamera::written_absolute(std::uint32_t offset, std::uint32_t befor
     at(offset) = before;
     return;
   }
-  const auto least = std::bit_cast<float>(at(csr + iidc::absolute::kMin));
-  const auto most = std::bit_cast<float>(at(csr + iidc::absolute::kMax));
-  const float part = (std::clamp(asked, least, most) - least) / (most - least);
-  const auto steps = std::lround(part * static_cast<float>(feature.most - feature.least));
-  state = (state & ~control::kValue) | (feature.least + static_cast<std::uint32_t>(steps));
+  const auto min = std::bit_cast<float>(at(csr + iidc::absolute::kMin));
+  const auto max = std::bit_cast<float>(at(csr + iidc::absolute::kMax));
+  const float part = (std::clamp(asked, min, max) - min) / (max - min);
+  const auto steps = std::lround(part * static_cast<float>(feature.max - feature.min));
+  state = (state & ~control::kValue) | (feature.min + static_cast<std::uint32_t>(steps));
   written_feature(kBase + reg::kFeature + 4 * number, state);
 }
 
@@ -289,11 +289,11 @@ void SimulatedCamera::written_format7(std::uint32_t csr, std::uint32_t field, st
   using namespace format7;
   std::uint32_t& setting = at(csr + kValueSetting);
   const auto fits = [&] {
-    const std::uint32_t size = at(csr + kSize), most = at(csr + kMaxImageSize), unit = at(csr + kUnitSize);
+    const std::uint32_t size = at(csr + kSize), max = at(csr + kMaxImageSize), unit = at(csr + kUnitSize);
     const std::uint32_t place = at(csr + kPosition), step = at(csr + kUnitPosition);
     const auto along = [&](int shift) {
       const auto of = [&](std::uint32_t quadlet) { return quadlet >> shift & 0xffff; };
-      return of(size) != 0 && of(size) % of(unit) == 0 && of(place) % of(step) == 0 && of(place) + of(size) <= of(most);
+      return of(size) != 0 && of(size) % of(unit) == 0 && of(place) % of(step) == 0 && of(place) + of(size) <= of(max);
     };
     const std::uint32_t coding = at(csr + kColorCoding) >> 24;
     return along(16) && along(0) && coding < 32 && (at(csr + kColorCodingInq) & bit(static_cast<int>(coding)));
@@ -305,7 +305,7 @@ void SimulatedCamera::written_format7(std::uint32_t csr, std::uint32_t field, st
     std::uint32_t& packet = at(csr + kBytesPerPacket);
     const std::uint32_t asked = packet >> 16;
     setting &= ~setting::kError2;
-    if (asked == 0 || asked % kPacketUnit != 0 || asked > kPacketMost) {
+    if (asked == 0 || asked % kPacketUnit != 0 || asked > kMaxPacket) {
       setting |= setting::kError2;
       packet = before;
     } else {
@@ -331,7 +331,7 @@ std::optional<SimulatedCamera::Picture> SimulatedCamera::picture() const {
   const auto rate = static_cast<int>(at(kBase + reg::kCurrentRate) >> 29);
   for (const FixedMode& fixed : kFixedModes)
     if (fixed.format == format && fixed.mode == mode && rate >= kFirstRate && rate <= kLastRate)
-      return Picture{fixed.width, fixed.height, fixed.bytes_per_pixel, kPacketMost};
+      return Picture{fixed.width, fixed.height, fixed.bytes_per_pixel, kMaxPacket};
   return std::nullopt;
 }
 

@@ -113,8 +113,8 @@ TEST_F(SimulatedCameraTest, AnAbsoluteValueIsClippedAndTakenInSteps) {
   const auto set = std::bit_cast<float>(write(place + iidc::absolute::kValue, std::bit_cast<std::uint32_t>(0.01f)));
   EXPECT_NE(0.01f, set);
   EXPECT_NEAR(0.01f, set, 4e-5f);
-  const auto most = std::bit_cast<float>(write(place + iidc::absolute::kValue, std::bit_cast<std::uint32_t>(99.f)));
-  EXPECT_EQ(std::bit_cast<float>(read(place + iidc::absolute::kMax)), most);
+  const auto max = std::bit_cast<float>(write(place + iidc::absolute::kValue, std::bit_cast<std::uint32_t>(99.f)));
+  EXPECT_EQ(std::bit_cast<float>(read(place + iidc::absolute::kMax)), max);
   EXPECT_EQ(1000u, read(reg::kFeature + kShutter) & control::kValue);
 }
 

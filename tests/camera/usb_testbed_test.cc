@@ -348,15 +348,15 @@ TEST_F(UsbTestbedTest, PendingTransfersEndWhenTheCameraIsUnpluggedInMidFrame) {
   hand.join();
   EXPECT_EQ(LIBUSB_TRANSFER_NO_DEVICE, stream.came.back().status);
   int gone = 0;
-  std::size_t most = 0;
+  std::size_t max_size = 0;
   for (const Stream::Came& frame : stream.came)
     if (frame.status == LIBUSB_TRANSFER_NO_DEVICE) {
       ++gone;
-      most = std::max(most, frame.size);
+      max_size = std::max(max_size, frame.size);
     }
   EXPECT_EQ(4, gone);
-  EXPECT_GE(2 * most, frame_bytes);
-  EXPECT_LT(most, frame_bytes);
+  EXPECT_GE(2 * max_size, frame_bytes);
+  EXPECT_LT(max_size, frame_bytes);
   EXPECT_EQ(1u, testbed.counters(camera).cut);
   std::uint32_t quadlet = 0;
   EXPECT_EQ(LIBUSB_ERROR_NO_DEVICE, usb.read(iidc::kConfigRom, quadlet));

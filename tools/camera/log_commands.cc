@@ -1,7 +1,6 @@
 // record and replay: write raw frames to a log, and give a log to the front-end.
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstring>

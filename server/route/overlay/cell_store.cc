@@ -316,8 +316,8 @@ std::shared_ptr<const StoredCell> CellStore::write(const CellFacts& facts, const
   bool same = known && known->facts_ == facts && known->nodes_ == stored->nodes_ && known->links_ == stored->links_;
   ByteWriter w;
   std::uint64_t written = 0;
-  const auto flush = [&](std::size_t at_least) {
-    if (w.size() < at_least) return;
+  const auto flush = [&](std::size_t min_bytes) {
+    if (w.size() < min_bytes) return;
     if (same) {
       Bytes before(w.size());
       impl_->read(known->offset_ + written, before);
