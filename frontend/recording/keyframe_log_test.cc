@@ -350,7 +350,7 @@ class CountedBytes : public std::stringbuf {
   }
 };
 
-// Each of 20,000 events claims 300 kB: what is read stays in proportion to the log.
+// Each of 20,000 events announces 300 kB: what is read stays in proportion to the log.
 TEST(EventLogTest, FalseLengthsReadNoMoreThanTheLog) {
   std::string event("\xed\xa1\xda\x01", 4);
   event += std::string(19, '\0') + '\x01' + std::string("\x00\x04\x93\xe0", 4) + 'x';
@@ -362,7 +362,7 @@ TEST(EventLogTest, FalseLengthsReadNoMoreThanTheLog) {
   std::size_t events = 0;
   auto next = log.next();
   for (; next.ok() && next->has_value(); next = log.next()) ++events;
-  EXPECT_GT(events, 9000u);  // all but the last ones, which claim more than there is
+  EXPECT_GT(events, 9000u);  // all but the last ones, which announce more than there is
   EXPECT_LT(counted.read, 3 * bytes.size());
 }
 

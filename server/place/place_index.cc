@@ -101,13 +101,13 @@ std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, 
   seeds.resize(kept);
 
   std::vector<Group> groups;
-  std::unordered_set<std::uint32_t> claimed;
+  std::unordered_set<std::uint32_t> grouped;
   for (const Seed& seed : seeds) {
     if (groups.size() == kMaxSeeds) break;
-    if (claimed.contains(seed.place)) continue;
+    if (grouped.contains(seed.place)) continue;
     Group group{seed.place, {}};
     for (const std::uint32_t place : places_around(scores, graph, scores.frame(seed.place), kPlaceRadius))
-      if (claimed.insert(place).second) group.members.push_back(place);
+      if (grouped.insert(place).second) group.members.push_back(place);
     groups.push_back(std::move(group));
   }
   return groups;

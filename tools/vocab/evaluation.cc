@@ -116,9 +116,9 @@ void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& a
   for (const place::PlaceCandidate& candidate : answer.candidates) {
     const bool right = map.shows(candidate.frame, asked);
     if (right) truth += candidate.probability;
-    result.claims.push_back({candidate.probability, right});
+    result.predictions.push_back({candidate.probability, right});
   }
-  result.claims.push_back({answer.new_place, is_new});
+  result.predictions.push_back({answer.new_place, is_new});
   result.log_probability += std::log(std::max(truth, kMinProbability));
   if (!answer.candidates.empty() && answer.candidates.front().probability > kConfident) {
     ++result.answered;

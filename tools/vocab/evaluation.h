@@ -30,7 +30,7 @@ struct Candidates {
 };
 
 // A probability that was given to a statement, and whether the statement was true.
-struct Claim {
+struct Prediction {
   double probability = 0;
   bool right = false;
 };
@@ -45,7 +45,7 @@ struct Evaluation {
   Candidates ours, tfidf;
   std::size_t new_places_right = 0;  // of new_places: p(new) > 0.5
   double log_probability = 0;        // mean log probability of the truth (the place, or "new"); at least log 1e-4 each
-  std::vector<Claim> claims;         // of every query: one for each candidate, and one for "new"
+  std::vector<Prediction> predictions;  // of every query: one for each candidate, and one for "new"
 };
 
 // Evaluates the vocabulary on the set. `verify`: also with geometry, which takes most of the time. NO_SUCH_FILE, and

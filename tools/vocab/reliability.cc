@@ -8,7 +8,7 @@ namespace relmap::vocab {
 namespace {
 
 constexpr double kSide = 420, kLeft = 60, kTop = 24, kRight = 330, kBelow = 50;  // pixels
-constexpr std::size_t kMinClaims = 5;                                            // claims that make a dot
+constexpr std::size_t kMinPredictions = 5;                                       // predictions that make a dot
 constexpr const char* kColours[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#17becf"};
 
 double x_of(double p) { return kLeft + p * kSide; }
@@ -42,22 +42,23 @@ std::string axes() {
 
 }  // namespace
 
-Reliability reliability(std::span<const Claim> claims, double min_probability) {
+Reliability reliability(std::span<const Prediction> predictions, double min_probability) {
   Reliability result;
-  for (const Claim& claim : claims) {
-    if (claim.probability < min_probability) continue;
+  for (const Prediction& prediction : predictions) {
+    if (prediction.probability < min_probability) continue;
     const auto count = static_cast<double>(result.bins.size());
-    auto& bin = result.bins[static_cast<std::size_t>(std::clamp(claim.probability * count, 0.0, count - 1))];
-    ++bin.claims;
-    ++result.claims;
-    bin.said += claim.probability;
-    bin.came_true += claim.right;
+    auto& bin = result.bins[static_cast<std::size_t>(std::clamp(prediction.probability * count, 0.0, count - 1))];
+    ++bin.predictions;
+    ++result.predictions;
+    bin.said += prediction.probability;
+    bin.came_true += prediction.right;
   }
   for (auto& bin : result.bins) {
-    result.error += std::abs(bin.said - bin.came_true) / static_cast<double>(std::max<std::size_t>(1, result.claims));
-    if (bin.claims == 0) continue;
-    bin.said /= static_cast<double>(bin.claims);
-    bin.came_true /= static_cast<double>(bin.claims);
+    result.error +=
+        std::abs(bin.said - bin.came_true) / static_cast<double>(std::max<std::size_t>(1, result.predictions));
+    if (bin.predictions == 0) continue;
+    bin.said /= static_cast<double>(bin.predictions);
+    bin.came_true /= static_cast<double>(bin.predictions);
   }
   return result;
 }
@@ -73,16 +74,17 @@ std::string draw(const std::vector<ReliabilityCurve>& curves) {
     const char* stroke = kColours[colour % std::size(kColours)];
     std::string line;
     for (const auto& bin : reliability.bins) {
-      if (bin.claims < kMinClaims) continue;
+      if (bin.predictions < kMinPredictions) continue;
       line += print("%.1f,%.1f ", x_of(bin.said), y_of(bin.came_true));
-      svg += print("<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='0.7'/>\n", x_of(bin.said),
-                   y_of(bin.came_true), std::min(12.0, 2 + std::sqrt(static_cast<double>(bin.claims)) / 3), stroke);
+      svg +=
+          print("<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='0.7'/>\n", x_of(bin.said),
+                y_of(bin.came_true), std::min(12.0, 2 + std::sqrt(static_cast<double>(bin.predictions)) / 3), stroke);
     }
     svg += "<polyline points='" + line + print("' fill='none' stroke='%s' stroke-width='1.5'/>\n", stroke);
     const double y = kTop + 16 + 22 * static_cast<double>(colour++);
     svg += print("<circle cx='%g' cy='%g' r='5' fill='%s'/>\n", kLeft + kSide + 20, y - 4, stroke);
     svg += text_at(kLeft + kSide + 32, y, "start",
-                   name + print(": %zu claims, off by %.3f", reliability.claims, reliability.error));
+                   name + print(": %zu predictions, off by %.3f", reliability.predictions, reliability.error));
   }
   return svg + "</svg>\n";
 }

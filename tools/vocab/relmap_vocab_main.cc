@@ -139,7 +139,7 @@ void print_evaluation(const Evaluation& e, bool verified, bool json) {
   figures.print_share("tfidf_recall_at_full_precision", e.tfidf.before.at_full_precision, e.seen_before);
   figures.print_share("new_place_right_share", e.new_places_right, e.new_places);
   figures.print("log_probability", e.log_probability);
-  figures.print("calibration_error", reliability(e.claims).error);
+  figures.print("calibration_error", reliability(e.predictions).error);
   figures.print("queries", e.queries);
   figures.print("seen_before", e.seen_before);
   figures.print("new_places", e.new_places);
@@ -173,7 +173,7 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
   if (!vocabulary.ok()) return fail(vocabulary.status());
   Percentage progress;
   std::vector<ReliabilityCurve> curves;
-  std::map<std::string, std::vector<Claim>> claims;
+  std::map<std::string, std::vector<Prediction>> predictions;
   for (const std::string& text : sets) {
     const std::string name = text.substr(0, text.find('='));
     std::vector<std::string> folders;
@@ -183,12 +183,12 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
     if (!set.ok()) return fail(set.status());
     const auto result = evaluate(*vocabulary, *set, false, progress.of("pictures"));
     if (!result.ok()) return fail(result.status());
-    auto& of_name = claims[name];
-    of_name.insert(of_name.end(), result->claims.begin(), result->claims.end());
+    auto& of_name = predictions[name];
+    of_name.insert(of_name.end(), result->predictions.begin(), result->predictions.end());
   }
-  for (const auto& [name, of_name] : claims) {
+  for (const auto& [name, of_name] : predictions) {
     curves.push_back({name, reliability(of_name)});
-    std::printf("%-12s %5zu claims, off by %.4f\n", name.c_str(), curves.back().reliability.claims,
+    std::printf("%-12s %5zu predictions, off by %.4f\n", name.c_str(), curves.back().reliability.predictions,
                 curves.back().reliability.error);
   }
   const std::string svg = draw(curves);
