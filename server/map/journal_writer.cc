@@ -67,7 +67,7 @@ void JournalWriter::run() {
       lock.lock();
       if (wake_.wait_for(mutex_, kAskAgain, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; })) return;
       lock.unlock();
-      const Status now = engine_->append(epoch_, {}).status();
+      const Status now = append({}).status();
       lock.lock();
       set_health(now);
       continue;

@@ -16,6 +16,7 @@
 #include "storage/testing/fault_engine.h"
 #include "storage/testing/faulty_files.h"
 #include "storage/testing/forgetful_files.h"
+#include "storage/testing/forwarding_engine.h"
 #include "tests/paths.h"
 
 namespace relmap::map {
@@ -250,40 +251,24 @@ TEST(Mapper, AfterStopNothingIsTaken) {
 }
 
 // Hands out a journal in which one record is damaged, or ends in an exception as it is applied.
-class DamagedJournal final : public storage::Engine {
+class DamagedJournal final : public storage::ForwardingEngine {
  public:
   DamagedJournal(std::shared_ptr<storage::Engine> engine, std::uint64_t damaged, bool throws = false)
-      : engine_(std::move(engine)), damaged_(damaged), throws_(throws) {}
+      : ForwardingEngine(std::move(engine)), damaged_(damaged), throws_(throws) {}
 
-  Result<std::uint64_t> acquire() override { return engine_->acquire(); }
-  Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
-    return engine_->append(epoch, records);
-  }
   Status read_journal(std::uint64_t from, const std::function<bool(std::uint64_t, ByteSpan)>& visit) const override {
-    return engine_->read_journal(from, [&](std::uint64_t sequence, ByteSpan record) {
+    return engine().read_journal(from, [&](std::uint64_t sequence, ByteSpan record) {
       if (throws_ && sequence == damaged_) throw std::runtime_error("as told");
       return visit(sequence, sequence == damaged_ ? record.first(record.size() / 2) : record);
     });
   }
-  std::uint64_t first_journal_sequence() const override { return engine_->first_journal_sequence(); }
-  std::uint64_t last_journal_sequence() const override { return engine_->last_journal_sequence(); }
   Status trim(std::uint64_t) override { return {}; }
   // Nothing is ever committed, so that all is replayed.
   Status commit(std::uint64_t, std::uint64_t, std::span<const storage::Put>, std::span<const std::string>) override {
     return {Reason::IO_ERROR, "as told"};
   }
-  std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
-  std::shared_ptr<const storage::EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
-  Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
-  Status checkpoint(const std::string& directory, const storage::EngineProgress& progress) override {
-    return engine_->checkpoint(directory, progress);
-  }
-  Status compact(const storage::EngineProgress& progress) override { return engine_->compact(progress); }
-  Result<storage::EngineStats> stats() const override { return engine_->stats(); }
-  std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
 
  private:
-  const std::shared_ptr<storage::Engine> engine_;
   const std::uint64_t damaged_;
   const bool throws_;
 };

@@ -14,6 +14,7 @@
 #include "server/place/testing/random_vocabulary.h"
 #include "storage/engine/memory_engine.h"
 #include "storage/maintenance/verify.h"
+#include "storage/testing/forwarding_engine.h"
 #include "tools/sim/points_world.h"
 
 namespace relmap::testing {
@@ -65,48 +66,31 @@ class Journal {
 };
 
 // Passes everything on, and keeps every record that became durable.
-class KeptJournal final : public storage::Engine {
+class KeptJournal final : public storage::ForwardingEngine {
  public:
-  KeptJournal(std::shared_ptr<storage::Engine> engine, Journal& kept, std::uint64_t& commits)
-      : engine_(std::move(engine)), kept_(kept), commits_(commits) {
+  KeptJournal(std::shared_ptr<storage::Engine> to, Journal& kept, std::uint64_t& commits)
+      : ForwardingEngine(std::move(to)), kept_(kept), commits_(commits) {
     // An append that failed may have become durable all the same.
-    (void)engine_->read_journal(engine_->first_journal_sequence(), [&](std::uint64_t sequence, ByteSpan record) {
+    (void)engine().read_journal(engine().first_journal_sequence(), [&](std::uint64_t sequence, ByteSpan record) {
       kept_.keep(sequence, record);
       return true;
     });
   }
 
-  Result<std::uint64_t> acquire() override { return engine_->acquire(); }
   Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
-    const auto appended = engine_->append(epoch, records);
+    const auto appended = engine().append(epoch, records);
     for (std::size_t i = 0; appended.ok() && i < records.size(); ++i)
       kept_.keep(*appended - records.size() + 1 + i, records[i]);
     return appended;
   }
-  Status read_journal(std::uint64_t from, const std::function<bool(std::uint64_t, ByteSpan)>& visit) const override {
-    return engine_->read_journal(from, visit);
-  }
-  std::uint64_t first_journal_sequence() const override { return engine_->first_journal_sequence(); }
-  std::uint64_t last_journal_sequence() const override { return engine_->last_journal_sequence(); }
-  Status trim(std::uint64_t through) override { return engine_->trim(through); }
   Status commit(std::uint64_t epoch, std::uint64_t applied, std::span<const storage::Put> puts,
                 std::span<const std::string> deletes) override {
-    const Status status = engine_->commit(epoch, applied, puts, deletes);
+    const Status status = engine().commit(epoch, applied, puts, deletes);
     commits_ += status.ok();
     return status;
   }
-  std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
-  std::shared_ptr<const storage::EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
-  Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
-  Status checkpoint(const std::string& directory, const storage::EngineProgress& progress) override {
-    return engine_->checkpoint(directory, progress);
-  }
-  Status compact(const storage::EngineProgress& progress) override { return engine_->compact(progress); }
-  Result<storage::EngineStats> stats() const override { return engine_->stats(); }
-  std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
 
  private:
-  const std::shared_ptr<storage::Engine> engine_;
   Journal& kept_;
   std::uint64_t& commits_;
 };
