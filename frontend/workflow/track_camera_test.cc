@@ -77,6 +77,19 @@ TEST_F(TrackCameraTest, TracksUntilTheRunIsStopped) {
   EXPECT_EQ(exit_code(), kInterrupted);
 }
 
+// The thread that checks the eyes reads the camera's pictures, so it ends first.
+TEST_F(TrackCameraTest, TheEyesAndTheCameraAreReportedBeforeKeyframesAreWaitedFor) {
+  bool finishing = false;
+  daemon_.at_call = [&](const std::string& call) {
+    if (call != "finish") return;
+    finishing = true;
+    EXPECT_TRUE(summary_.rig.has_value());
+    EXPECT_TRUE(summary_.camera.has_value());
+  };
+  ASSERT_TRUE(run(track_camera).ok());
+  EXPECT_TRUE(finishing);
+}
+
 TEST_F(TrackCameraTest, WaitsForTheCameraIfAsked) {
   options_.wait = true;
   absent_ = {{Reason::NO_CAMERA, "none"}, {Reason::NO_CAMERA, "none"}, {Reason::CAMERA_BUSY, "another program has it"}};
