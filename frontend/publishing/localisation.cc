@@ -10,6 +10,7 @@ namespace {
 
 // The daemon's lookups may be some thousand keyframes behind; older ones are not worth the memory.
 constexpr std::size_t kMaxPoses = 4096;
+constexpr std::size_t kMaxClosures = 4096;
 
 }  // namespace
 
@@ -61,14 +62,20 @@ std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
     counts_.recovered_steps -= bridge(ends, false);
     return std::nullopt;
   }
+  // A closure that is older than all that are kept would be forgotten at once, and be new when it is told again.
+  if (closures_.size() >= kMaxClosures && ends < closures_.begin()->first) return std::nullopt;
   const auto [closure, is_new] = closures_.try_emplace(ends);
   if (!is_new) return std::nullopt;
   if (const auto T_odom_keyframe = odometry(news.keyframe.index))
     closure->second = news.T_frame_keyframe * T_odom_keyframe->inverse();
-  if (closures_.size() > kMaxPoses) closures_.erase(closures_.begin());
   ++counts_.closures;
   const std::uint64_t steps = bridge(ends, true);
   counts_.recovered_steps += steps;
+  if (closures_.size() > kMaxClosures) {  // a forgotten closure could not be taken out, so it no longer bridges a step
+    const Ends oldest = closures_.begin()->first;
+    closures_.erase(closures_.begin());
+    counts_.recovered_steps -= bridge(oldest, false);
+  }
   if (steps == 0) return std::nullopt;
   return Recovery{news.keyframe, news.frame, news.T_frame_keyframe.t.norm(), steps};
 }

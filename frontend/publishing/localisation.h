@@ -41,7 +41,7 @@ class Localisation {
     std::uint64_t closures = 0;   // closures that came into force
     std::uint64_t withdrawn = 0;  // closures that were taken out again
     std::uint64_t unmeasured_steps = 0;
-    std::uint64_t recovered_steps = 0;  // unmeasured steps that a closure in force bridges
+    std::uint64_t recovered_steps = 0;  // unmeasured steps that one of the newest 4,096 closures in force bridges
     std::uint64_t heard = 0;            // news of any kind
   };
   Counts counts() const;

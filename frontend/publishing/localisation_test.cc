@@ -141,6 +141,29 @@ TEST_F(LocalisationTest, ManyLateNewsOfOldKeyframesLeaveTheNewest) {
   EXPECT_EQ(localisation_.place()->recognised, (FrameId{kMine, 3999}));
 }
 
+TEST_F(LocalisationTest, AClosureThatIsForgottenBridgesNoStep) {
+  drive(10);
+  drive(1, MotionSource::kConstantVelocity);  // 10
+  drive(5000);
+  ASSERT_TRUE(hear(15, {kMine, 3}));
+  for (std::uint32_t i = 100; i < 100 + 4095; ++i) hear(i, {kMine, 50});
+  EXPECT_EQ(localisation_.counts().recovered_steps, 1u) << "4,096 closures are kept";
+  hear(100 + 4095, {kMine, 50});
+  EXPECT_EQ(localisation_.counts().recovered_steps, 0u);
+  hear(15, {kMine, 3}, PoseNews::Kind::kClosureOut);
+  EXPECT_EQ(localisation_.counts().withdrawn, 0u);
+
+  // It is older than all that are kept, so it is not taken in again.
+  EXPECT_FALSE(hear(15, {kMine, 3}));
+  EXPECT_EQ(localisation_.counts().closures, 4097u);
+  EXPECT_EQ(localisation_.counts().recovered_steps, 0u);
+
+  ASSERT_TRUE(hear(4500, {kMine, 4}));
+  EXPECT_EQ(localisation_.counts().recovered_steps, 1u);
+  hear(4500, {kMine, 4}, PoseNews::Kind::kClosureOut);
+  EXPECT_EQ(localisation_.counts().recovered_steps, 0u);
+}
+
 TEST_F(LocalisationTest, NewsOfAnUnknownKeyframeGiveNoPlace) {
   hear(5, {kOther, 5});
   EXPECT_FALSE(localisation_.place());
