@@ -28,12 +28,14 @@ std::size_t queue_bytes(const storage::JournalRecord& record) {
 }  // namespace
 
 JournalWriter::JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch,
-                             std::shared_ptr<storage::Budget> budget, bool one_at_a_time, OnDurable on_durable)
+                             std::shared_ptr<storage::Budget> budget, bool one_at_a_time, OnDurable on_durable,
+                             OnIdle on_idle)
     : engine_(std::move(engine)),
       epoch_(epoch),
       budget_(std::move(budget)),
       one_at_a_time_(one_at_a_time),
       on_durable_(std::move(on_durable)),
+      on_idle_(std::move(on_idle)),
       durable_(engine_->last_journal_sequence()),
       finished_(durable_),
       thread_([this] { run(); }) {}
@@ -64,6 +66,7 @@ void JournalWriter::run() {
       const Status why = health_;
       lock.unlock();
       refuse(std::move(refused), why);
+      on_idle_();
       lock.lock();
       if (wake_.wait_for(mutex_, kAskAgain, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; })) return;
       lock.unlock();
@@ -91,7 +94,9 @@ void JournalWriter::run() {
     write(std::move(group));
     lock.lock();
     writing_ = false;
-    wake_.notify_all();
+    lock.unlock();
+    on_idle_();
+    lock.lock();
   }
 }
 

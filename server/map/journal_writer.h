@@ -29,10 +29,12 @@ class JournalWriter {
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   // Called from the writer's thread with each durable group, in order, before their `done`.
   using OnDurable = std::function<void(std::vector<DurableRecord>)>;
+  // Called from the writer's thread, without a lock held, when idle() may have become true.
+  using OnIdle = std::function<void()>;
 
   // `one_at_a_time` (deterministic mode): writes groups of one record, each only after finished() of the one before.
   JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch, std::shared_ptr<storage::Budget> budget,
-                bool one_at_a_time, OnDurable on_durable);
+                bool one_at_a_time, OnDurable on_durable, OnIdle on_idle);
   ~JournalWriter();
 
   // Queues a record. BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN, or health(); otherwise `done` is called once,
@@ -68,6 +70,7 @@ class JournalWriter {
   const std::shared_ptr<storage::Budget> budget_;
   const bool one_at_a_time_;
   const OnDurable on_durable_;
+  const OnIdle on_idle_;
 
   mutable Mutex mutex_;
   ConditionVariable wake_;

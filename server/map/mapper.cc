@@ -305,12 +305,14 @@ void Mapper::Impl::add_place(FrameId frame, std::span<const std::uint32_t> words
 }
 
 void Mapper::Impl::start() {
-  writer = std::make_unique<JournalWriter>(engine, epoch, budget, options.deterministic,
-                                           [this](std::vector<DurableRecord> group) {
-                                             const MutexLock lock(mutex);
-                                             for (DurableRecord& record : group) durable.push_back(std::move(record));
-                                             changed.notify_all();
-                                           });
+  writer = std::make_unique<JournalWriter>(
+      engine, epoch, budget, options.deterministic,
+      [this](std::vector<DurableRecord> group) {
+        const MutexLock lock(mutex);
+        for (DurableRecord& record : group) durable.push_back(std::move(record));
+        changed.notify_all();
+      },
+      [this] { tell_waiting(); });
   if (options.deterministic) catch_up();
   patient = true;
   worker = std::thread([this] { work(); });
@@ -593,12 +595,10 @@ std::optional<std::vector<EdgeChange>> Mapper::edge_changes(std::uint64_t sequen
 
 Status Mapper::wait_idle(Clock::time_point deadline) const {
   MutexLock lock(impl_->mutex);
-  while (!impl_->all_done()) {
-    if (impl_->failed) return impl_->storage;
-    if (Clock::now() >= deadline) return {Reason::DEADLINE, "the map is still being worked on"};
-    impl_->changed.wait_for(impl_->mutex, std::chrono::milliseconds(20));
-  }
-  return {};
+  const auto ended = [this]() RELMAP_REQUIRES(impl_->mutex) { return impl_->all_done() || impl_->failed; };
+  if (!impl_->changed.wait_until(impl_->mutex, deadline, ended))
+    return {Reason::DEADLINE, "the map is still being worked on"};
+  return impl_->failed && !impl_->all_done() ? impl_->storage : Status();
 }
 
 Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
@@ -617,8 +617,7 @@ void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
   const std::uint64_t told = impl_->edits.watch(std::move(watcher));
   // The edits that the first watcher was told of may not be published yet; the worker publishes them right after.
   MutexLock lock(impl_->mutex);
-  while (view()->version() < told && !impl_->failed)
-    impl_->changed.wait_for(impl_->mutex, std::chrono::milliseconds(1));
+  impl_->changed.wait(impl_->mutex, [&] { return view()->version() >= told || impl_->failed; });
 }
 
 std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
