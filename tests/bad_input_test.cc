@@ -249,11 +249,15 @@ TEST_F(BadInput, MissingSequencesAndPartsAreAskedForAndWaitedFor) {
                                    ack.held == std::vector<SequenceRange>{{2, 2}} && ack.next_sequence == 1;
                           }));
   expect_frames(1);
+  const auto counts = [&] { return MapStub(daemon_->address()).status().or_throw().ingest(); };
+  EXPECT_EQ(counts().robots(), 1u);
+  EXPECT_EQ(counts().incomplete(), 0u) << "sequence 2 is whole";
   EXPECT_TRUE(robot.until([&] { robot.say_payload(1, payload(1), 2); },
                           [](const Acknowledgement& ack) {
                             return ack.incomplete.size() == 1 && ack.incomplete[0].sequence == 1 &&
                                    ack.incomplete[0].parts == std::vector<std::uint32_t>{2};
                           }));
+  EXPECT_EQ(counts().incomplete(), 1u);
   EXPECT_TRUE(robot.until([&] { robot.say(robot.part(1, payload(1), 2)); },
                           [](const Acknowledgement& ack) { return ack.next_sequence == 3; }));
   expect_counted(Reason::SEQUENCE_TOO_FAR, [&] { robot.say(robot.part(5000, payload(3), 0)); });

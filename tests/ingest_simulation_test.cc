@@ -78,7 +78,7 @@ class World {
 
   publishing::PublisherCore& core() { return core_; }
   intake::FakeSink& sink() { return sink_; }
-  const intake::Intake& intake() const { return *intake_; }
+  intake::IngestStats stats() const { return intake_->stats(now_); }
 
   // Of the parts that were sent, those that had been sent before.
   double resent_share() const {
@@ -184,7 +184,7 @@ TEST(IngestSimulation, PerfectChannelSettlesEverythingAtTheFirstSending) {
   EXPECT_EQ(world.core().counts().resent, 0u);
   EXPECT_EQ(world.core().counts().parts_resent, 0u);
   EXPECT_EQ(world.core().counts().settled, 200u);
-  EXPECT_EQ(world.intake().stats().keyframes_durable, 200u);
+  EXPECT_EQ(world.stats().keyframes_durable, 200u);
   EXPECT_TRUE(world.sink().faults.empty());
 }
 
@@ -196,7 +196,7 @@ TEST(IngestSimulation, LossDoublingReorderingAndDamageLoseAndDoubleNothing) {
     const auto outcomes = world.outcomes();
     EXPECT_EQ(outcomes.size(), 200u);
     for (const auto& [sequence, reason] : outcomes) EXPECT_EQ(reason, Reason::OK) << sequence;
-    EXPECT_GT(world.intake().stats().parts_refused[intake::index_of(Reason::CORRUPT)], 0u);
+    EXPECT_GT(world.stats().parts_refused[intake::index_of(Reason::CORRUPT)], 0u);
     EXPECT_TRUE(world.core().counts().refused.empty());
     EXPECT_EQ(world.sink().faults, std::vector<std::string>{});
   }

@@ -224,7 +224,7 @@ IngestStats IngestServer::stats() const {
   IngestStats stats;
   {
     const MutexLock lock(impl_->mutex);
-    stats = impl_->intake.stats();
+    stats = impl_->intake.stats(now());
   }
   const MutexLock lock(impl_->queue_mutex);
   for (std::size_t i = 0; i < impl_->unsound.size(); ++i) {

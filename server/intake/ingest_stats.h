@@ -29,7 +29,8 @@ struct IngestStats {
   std::uint64_t evicted = 0;             // keyframes dropped for want of memory
   std::uint64_t acknowledgements = 0;    // sent
   std::uint64_t sessions = 0;            // being taken in now
-  std::uint64_t pending = 0;             // keyframes received and not settled
+  std::uint64_t heard = 0;               // sessions heard from in the last minute
+  std::uint64_t incomplete = 0;          // keyframes of which parts are missing now
   Status blocked;                        // why the sink journals nothing now
 };
 

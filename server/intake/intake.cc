@@ -22,6 +22,7 @@ constexpr double kNearLimit = 0.2;                   // seconds' worth of keyfra
 constexpr std::chrono::milliseconds kStranger{500};  // a session that has not begun is answered so long after a message
 constexpr double kSlowest = 0.1;                     // keyframes per second: the lowest rate that a robot is told
 constexpr std::chrono::seconds kLive{5};             // a robot heard within this time is present
+constexpr std::chrono::minutes kLately{1};           // stats() counts the sessions that were heard within this time
 constexpr std::chrono::seconds kLookForNames{1};     // interval of looking for robots of the same name
 constexpr std::int64_t kNoLag = 86'400'000'000;      // us: so old a time stamp is a recording's and tells no lag
 }  // namespace
@@ -430,14 +431,16 @@ Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try 
   return error.status();
 }
 
-IngestStats Intake::stats() const {
+IngestStats Intake::stats(SteadyTime now) const {
   IngestStats stats = stats_;
   stats.evicted = reassembly_.evicted();
   stats.sessions = sessions_.size();
   for (const auto& [session, entry] : sessions_) {
-    stats.pending += entry.intake.pending();
+    stats.heard += entry.schedule.last_heard() + kLately > now;
+    stats.incomplete += reassembly_.incomplete(session).size();
     if (stats.blocked.ok()) stats.blocked = entry.intake.blocked();
   }
+  for (const auto& [session, silent] : silent_) stats.heard += silent.heard + kLately > now;
   return stats;
 }
 

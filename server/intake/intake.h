@@ -59,7 +59,7 @@ class Intake {
 
   // The session's present acknowledgement. NO_SUCH_SESSION if neither the intake nor the map knows it.
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
-  IngestStats stats() const;
+  IngestStats stats(SteadyTime now) const;
   // All sessions that are being taken in, and robots that fell silent without an end, in no particular order.
   std::vector<RobotStats> robots(SteadyTime now);
   // Sessions that have begun. Only these have memory and queues of their own.

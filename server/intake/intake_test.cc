@@ -51,8 +51,8 @@ class IntakeTest : public testing::Test {
     (void)intake_->poll(now_);
     return *intake_->acknowledgement(uuid_);
   }
-  std::uint64_t refused(Reason reason) const { return intake_->stats().keyframes_refused[index_of(reason)]; }
-  std::uint64_t part_refused(Reason reason) const { return intake_->stats().parts_refused[index_of(reason)]; }
+  std::uint64_t refused(Reason reason) const { return intake_->stats(now_).keyframes_refused[index_of(reason)]; }
+  std::uint64_t part_refused(Reason reason) const { return intake_->stats(now_).parts_refused[index_of(reason)]; }
   template <typename Record>
   std::vector<Record> journalled() const {
     std::vector<Record> all;
@@ -212,7 +212,7 @@ TEST_F(IntakeTest, DamagedPartsAreCountedAndChangeNothing) {
   intake_->take_part(part, now_);
   EXPECT_EQ(part_refused(Reason::CORRUPT), 1u);
   EXPECT_EQ(part_refused(Reason::BAD_SIZE), 1u);
-  EXPECT_EQ(intake_->stats().sessions, 0u);
+  EXPECT_EQ(intake_->stats(now_).sessions, 0u);
   send(0);
   EXPECT_EQ(settle().next_sequence, 1u);
 }
@@ -226,7 +226,7 @@ TEST_F(IntakeTest, RepeatsChangeNothingAndAreAcknowledgedAtOnce) {
   ASSERT_EQ(acks.size(), 1u);
   EXPECT_EQ(acks[0].next_sequence, 1u);
   EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 1u);
-  EXPECT_GT(intake_->stats().repeated_parts, 0u);
+  EXPECT_GT(intake_->stats(now_).repeated_parts, 0u);
 }
 
 TEST_F(IntakeTest, ConflictsAreRefusedAndSettleNothing) {
@@ -268,14 +268,14 @@ TEST_F(IntakeTest, GapsAreJournalledExceptForSequencesThatCame) {
   EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 3u);
   send(2);
   EXPECT_GT(part_refused(Reason::SEQUENCE_SETTLED), 0u);
-  EXPECT_EQ(intake_->stats().sequences_given_up, 5u);
+  EXPECT_EQ(intake_->stats(now_).sequences_given_up, 5u);
 }
 
 TEST_F(IntakeTest, InvalidGapsAreRefused) {
   intake_->take_gap({uuid_, 3, 1, Reason::DROPPED_BY_ROBOT}, now_);
   intake_->take_gap({uuid_, 0, 1, Reason::NOT_FINITE}, now_);
   intake_->take_gap({uuid_, 0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
-  const IngestStats stats = intake_->stats();
+  const IngestStats stats = intake_->stats(now_);
   EXPECT_EQ(stats.messages_refused[index_of(Reason::INVALID_ARGUMENT)], 2u);
   EXPECT_EQ(stats.messages_refused[index_of(Reason::BAD_SIZE)], 1u);
 }
@@ -289,7 +289,9 @@ TEST_F(IntakeTest, SequencesBeyondTheWindowWait) {
 }
 
 TEST_F(IntakeTest, RefusalsBeforeASessionBeginsAreCountedSeparately) {
-  const auto waiting = [&] { return intake_->stats().refused_before_begin[index_of(Reason::IMPLAUSIBLE_CALIBRATION)]; };
+  const auto waiting = [&] {
+    return intake_->stats(now_).refused_before_begin[index_of(Reason::IMPLAUSIBLE_CALIBRATION)];
+  };
   for (std::uint32_t s = 0; s < 2; ++s) {
     Keyframe k = keyframe(s);
     k.session.camera.cx = -1e6;
@@ -361,7 +363,7 @@ TEST_F(IntakeTest, KnowsRepeatsThatTheMapDoesNotShowYet) {
 TEST_F(IntakeTest, FullQueueIsTriedAgain) {
   sink_.capacity = 1;
   for (std::uint32_t s = 0; s < 3; ++s) send(s);
-  EXPECT_EQ(intake_->stats().blocked.reason(), Reason::BUDGET_EXCEEDED);
+  EXPECT_EQ(intake_->stats(now_).blocked.reason(), Reason::BUDGET_EXCEEDED);
   EXPECT_LE(intake_->next_due(now_), now_ + milliseconds(20));
   for (int i = 0; i < 3; ++i) settle();
   EXPECT_EQ(settle().next_sequence, 3u);
@@ -407,7 +409,7 @@ TEST_F(IntakeTest, WithAFullDiskKeyframesWaitAndNothingIsSettled) {
   EXPECT_EQ(ack.next_sequence, 1u);
   EXPECT_EQ(ack.held, (std::vector<SequenceRange>{{1, 3}})) << "the robot need not send them again";
   EXPECT_TRUE(ack.refused.empty());
-  EXPECT_EQ(intake_->stats().blocked.reason(), Reason::DISK_FULL);
+  EXPECT_EQ(intake_->stats(now_).blocked.reason(), Reason::DISK_FULL);
   EXPECT_GT(intake_->next_due(now_), now_ + milliseconds(20)) << "a disk is not asked fifty times a second";
   sink_.refuse_submit = {};
   acknowledge();
@@ -434,7 +436,7 @@ TEST_F(IntakeTest, ReadOnlySinkGivesNoCreditsAndSaysWhy) {
   sink_.refuse_submit = {Reason::READ_ONLY, "the journal is damaged"};
   send(0);
   EXPECT_EQ(settle().credits, 0u);
-  EXPECT_EQ(intake_->stats().blocked.reason(), Reason::READ_ONLY);
+  EXPECT_EQ(intake_->stats(now_).blocked.reason(), Reason::READ_ONLY);
   sink_.refuse_submit = {};
   acknowledge();
   EXPECT_EQ(settle().next_sequence, 1u);
@@ -460,7 +462,7 @@ TEST_F(IntakeTest, SilentSessionsMakeRoomForOthers) {
     if (n <= 2) settle();
   }
   // 1 and 2 were settled and went; 3 and 4 are under way and stay.
-  EXPECT_EQ(intake_->stats().sessions, 2u);
+  EXPECT_EQ(intake_->stats(now_).sessions, 2u);
   uuid_.bytes.fill(5);
   send(0);
   EXPECT_GT(part_refused(Reason::BUDGET_EXCEEDED), 0u);
@@ -492,7 +494,7 @@ TEST_F(IntakeTest, ASilentRobotHoldsNoMemory) {
   now_ += std::chrono::seconds(1);
   (void)intake_->poll(now_);
   EXPECT_EQ(budget_.used(storage::Share::kReassembly), 0u);
-  EXPECT_EQ(intake_->stats().sessions, 0u);
+  EXPECT_EQ(intake_->stats(now_).sessions, 0u);
 
   for (std::uint32_t s = 1; s < 6; ++s) send(s);  // it was only asleep
   EXPECT_EQ(settle().next_sequence, 6u);
@@ -506,14 +508,14 @@ TEST_F(IntakeTest, SessionsThatNeverBeginLockNobodyOut) {
     intake_->take_gap({stranger, 0, 5, Reason::DROPPED_BY_ROBOT}, now_);
     now_ += milliseconds(1);
   }
-  EXPECT_LE(intake_->stats().sessions, 1024u);
+  EXPECT_LE(intake_->stats(now_).sessions, 1024u);
   send(0);
   EXPECT_EQ(settle().next_sequence, 1u);
 }
 
 TEST_F(IntakeTest, TheLastPossibleSequenceHasASuccessor) {
   intake_->take_gap({uuid_, 0xfffffff0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
-  EXPECT_EQ(intake_->stats().messages_refused[index_of(Reason::INVALID_ARGUMENT)], 1u);
+  EXPECT_EQ(intake_->stats(now_).messages_refused[index_of(Reason::INVALID_ARGUMENT)], 1u);
 }
 
 TEST_F(IntakeTest, OnlyRobotsOnTheListAreTaken) {
@@ -690,6 +692,63 @@ TEST_F(IntakeTest, ReportsTheStateOfEachRobot) {
   EXPECT_EQ(intake_->begun(), std::set<SessionUuid>{uuid_});
 }
 
+TEST_F(IntakeTest, CountsKeyframesOfWhichPartsAreMissingNow) {
+  for (const std::uint32_t s : {0, 1, 5}) send(s);  // 5 is whole, and waits for 2 to 4
+  settle();
+  EXPECT_EQ(intake_->robots(now_).at(0).pending, 1u);
+  EXPECT_EQ(intake_->stats(now_).incomplete, 0u);
+  const auto send_some = [&](std::uint32_t sequence, std::uint32_t first_part, bool all) {
+    const Bytes payload = encode_keyframe(keyframe(sequence));
+    const std::uint32_t end = all ? count_parts(payload.size(), 600) : first_part + 1;
+    for (std::uint32_t i = first_part; i < end; ++i)
+      intake_->take_part(cut_part(uuid_, sequence, payload, crc32c(payload), 600, i), now_);
+  };
+  send_some(2, 0, false);
+  send_some(3, 0, false);
+  const SessionUuid first = uuid_;
+  uuid_.bytes[0] ^= 1;
+  send_some(0, 0, false);
+  EXPECT_EQ(intake_->stats(now_).incomplete, 3u);
+  uuid_ = first;
+  send_some(2, 1, true);
+  EXPECT_EQ(intake_->stats(now_).incomplete, 2u);
+}
+
+TEST_F(IntakeTest, CountsSessionsThatWereHeardInTheLastMinute) {
+  send(0);
+  settle();
+  const SessionUuid first = uuid_;
+  const SteadyTime heard = now_ - milliseconds(300);
+  EXPECT_EQ(intake_->stats(now_).heard, 1u);
+  (void)intake_->poll(heard + std::chrono::seconds(30));
+  now_ = heard + std::chrono::seconds(30);
+  uuid_.bytes[0] ^= 1;
+  send(0);
+  EXPECT_EQ(intake_->stats(now_).heard, 2u);
+  now_ = heard + std::chrono::seconds(61);
+  EXPECT_EQ(intake_->stats(now_).sessions, 2u) << "the first is forgotten at the next poll()";
+  EXPECT_EQ(intake_->stats(now_).heard, 1u);
+
+  // A session that is asked about was not heard from.
+  settle();
+  ASSERT_EQ(intake_->stats(now_).sessions, 1u);
+  ASSERT_TRUE(intake_->acknowledgement(first).ok());
+  EXPECT_EQ(intake_->stats(now_).sessions, 2u);
+  EXPECT_EQ(intake_->stats(now_).heard, 1u);
+}
+
+TEST_F(IntakeTest, CountsASessionThatMadeRoomForAnotherAsHeard) {
+  IntakeOptions options;
+  options.max_sessions = 1;
+  restart(options);
+  send(0);
+  settle();
+  uuid_.bytes[0] ^= 1;
+  send(0);
+  EXPECT_EQ(intake_->stats(now_).sessions, 1u);
+  EXPECT_EQ(intake_->stats(now_).heard, 2u);
+}
+
 // A robot that was killed stays in the list for a while, where an operator may look for it; one that ended does not.
 TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   const auto listed = [&] {
@@ -724,7 +783,7 @@ TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   EXPECT_EQ(robots[0].next_sequence, 3u);
   EXPECT_EQ(robots[0].silent_us, 70'000'000);
   EXPECT_EQ(robots[0].keyframes_per_s, 0);
-  EXPECT_EQ(intake_->stats().sessions, 0u) << "it holds nothing";
+  EXPECT_EQ(intake_->stats(now_).sessions, 0u) << "it holds nothing";
   now_ = heard + std::chrono::seconds(599);
   EXPECT_EQ(listed().size(), 1u);
   now_ = heard + std::chrono::seconds(600);
@@ -857,7 +916,7 @@ TEST_F(IntakeTest, TheSessionWithMostWaitingKeyframesGivesWay) {
     uuid_.bytes.fill(n);
     for (std::uint32_t s = 1; s < kIntakeWindow; ++s) send(large(s));
   }
-  EXPECT_GT(intake_->stats().evicted, 0u);
+  EXPECT_GT(intake_->stats(now_).evicted, 0u);
   EXPECT_LE(budget_.used(storage::Share::kReassembly), budget_.allowance(storage::Share::kReassembly));
   uuid_ = robot;
   for (std::uint32_t s = 0; s < 10; ++s) send(large(s));

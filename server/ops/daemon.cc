@@ -36,8 +36,8 @@ rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
   facts.keyframes = stats.keyframes_received;
   facts.repeats = stats.repeated_parts;
   facts.acknowledgements = stats.acknowledgements;
-  facts.robots = stats.sessions;
-  facts.incomplete = stats.pending;
+  facts.robots = stats.heard;
+  facts.incomplete = stats.incomplete;
   for (std::size_t number = 0; number < stats.parts_refused.size(); ++number) {
     // Keyframes refused for good are counted by the map once their session has begun; others are asked for again, or
     // were no message.

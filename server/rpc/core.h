@@ -43,7 +43,7 @@ struct IngestFacts {
   std::uint64_t keyframes = 0, repeats = 0;
   std::uint64_t acknowledgements = 0;
   std::uint64_t robots = 0;      // sessions heard from in the last minute
-  std::uint64_t incomplete = 0;  // keyframes received and not settled, now
+  std::uint64_t incomplete = 0;  // keyframes of which parts are missing now
   std::map<Reason, std::uint64_t> not_taken;
 };
 
