@@ -362,8 +362,9 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
   // Before anything is written: the folder may be somebody's pictures.
   if (Status usable = check_folder(directory); !usable.ok()) return usable;
   const auto disk = posix_file_system(options.sync);
+  const auto folders = options.folder_files ? options.folder_files : disk;
   if (!options.read_only)
-    if (Status made = create_folder(directory, *disk); !made.ok()) return made;
+    if (Status made = create_folder(directory, *folders); !made.ok()) return made;
   std::error_code error;
   auto database = std::make_shared<Database>();
   if (options.read_only && !std::filesystem::is_directory(directory, error))
@@ -380,7 +381,7 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
 
   const auto files = options.journal_files ? options.journal_files : disk;
   if (!options.read_only)
-    if (Status made = create_durable_directory(*disk, directory + "/map"); !made.ok()) return made;
+    if (Status made = create_durable_directory(*folders, directory + "/map"); !made.ok()) return made;
   if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);
   database->settings = rocksdb_settings(directory, options);
   rocksdb::Options& settings = database->settings.options;

@@ -37,8 +37,9 @@ struct RocksDbOptions {
   bool sync = true;
   // Direct I/O for reads and compactions, where the file system has it.
   bool direct_io = true;
-  // The file systems under the journal and RocksDB; null: the machine's own. For tests that forget what was not synced.
-  std::shared_ptr<FileSystem> journal_files;
+  // The file systems under the journal and RocksDB, and that in which DIR and DIR/map are created; null: the machine's
+  // own. For tests that forget what was not synced.
+  std::shared_ptr<FileSystem> journal_files, folder_files;
   std::shared_ptr<rocksdb::FileSystem> map_files;
 };
 

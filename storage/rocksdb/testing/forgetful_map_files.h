@@ -1,5 +1,6 @@
 // RocksDB's files on a real disk whose power can fail: then the sectors that were not synced, and what was done to the
-// names of files whose folder was not (made, replaced, removed), are forgotten, each by chance. Only for tests; a
+// names of files whose folder was not (made, replaced, removed), are forgotten, each by chance. A folder that was
+// created here is gone with all that is in it, by chance, until the folder above it is synced. Only for tests; a
 // header, so that no program carries it.
 #pragma once
 
@@ -13,8 +14,11 @@
 #include <mutex>
 #include <optional>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
+
+#include "storage/io/file.h"
 
 namespace relmap::storage {
 
@@ -41,6 +45,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   // Forgets what was not durable, and restores the power. The database must be closed.
   void restart() {
     const std::lock_guard lock(mutex_);
+    forget_folders();
     for (const auto& [path, file] : files_) {
       if (file.name_durable || !chance()) {
         if (std::filesystem::exists(path)) forget(path, file);
@@ -58,6 +63,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
     }
     files_.clear();
     removed_.clear();
+    folders_.clear();
     power_ = true;
     operations_left_.reset();
   }
@@ -75,6 +81,12 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   IOStatus ReuseWritableFile(const std::string&, const std::string&, const rocksdb::FileOptions&,
                              std::unique_ptr<rocksdb::FSWritableFile>*, IODebugContext*) override {
     return IOStatus::NotSupported("reuse of files");
+  }
+  IOStatus CreateDir(const std::string& name, const IOOptions&, IODebugContext*) override {
+    return std::filesystem::exists(name) ? IOStatus::IOError(name + " exists") : create_folder(name);
+  }
+  IOStatus CreateDirIfMissing(const std::string& name, const IOOptions&, IODebugContext*) override {
+    return create_folder(name);
   }
   IOStatus NewDirectory(const std::string& name, const IOOptions& options,
                         std::unique_ptr<rocksdb::FSDirectory>* result, IODebugContext* dbg) override {
@@ -105,6 +117,30 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
     if (!error) removed_.push_back(removed);
     files_.erase(name);
     return target()->DeleteFile(name, options, dbg);
+  }
+
+  // Creates a folder whose name is durable after sync_names() of the folder above. Succeeds if it exists already.
+  IOStatus create_folder(const std::string& name) {
+    const std::lock_guard lock(mutex_);
+    if (!spend()) return no_power();
+    std::error_code error;
+    if (std::filesystem::create_directory(name, error)) folders_.insert(name);
+    return error ? IOStatus::IOError(name + ": " + error.message()) : IOStatus::OK();
+  }
+  IOStatus sync_names(const std::string& directory) {
+    const std::lock_guard lock(mutex_);
+    if (!spend()) return no_power();
+    if (!sync_) return IOStatus::OK();
+    for (auto& [path, file] : files_) {
+      if (folder_of(path) != directory) continue;
+      file.name_durable = true;
+      file.replaced.reset();
+    }
+    std::erase_if(removed_, [&](const Removed& removed) {
+      return folder_of(removed.path) == directory && std::filesystem::remove(removed.kept_as);
+    });
+    std::erase_if(folders_, [&](const std::string& folder) { return folder_of(folder) == directory; });
+    return IOStatus::OK();
   }
 
  private:
@@ -161,6 +197,20 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
     return error ? State{} : State{size, size, true, {}};
   }
 
+  // The outermost folders come first, so what is in a folder that is gone is not asked about.
+  void forget_folders() {
+    for (const std::string& folder : folders_) {
+      if (!std::filesystem::exists(folder) || chance()) continue;
+      std::filesystem::remove_all(folder);
+      const auto is_in_it = [&](const std::string& path) { return path.starts_with(folder + "/"); };
+      std::erase_if(files_, [&](const auto& file) { return is_in_it(file.first); });
+      std::erase_if(removed_, [&](const Removed& removed) {
+        if (is_in_it(removed.path)) std::filesystem::remove(removed.kept_as);
+        return is_in_it(removed.path);
+      });
+    }
+  }
+
   bool chance() { return std::uniform_int_distribution<int>(0, 1)(rng_) == 1; }
   // The length and each sector behind what is durable reach the disk independently of each other.
   void forget(const std::string& path, const State& file) {
@@ -194,29 +244,41 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
     if (sync_) files_[name].durable = files_[name].size;
     return IOStatus::OK();
   }
-  IOStatus sync_names(const std::string& directory) {
-    const std::lock_guard lock(mutex_);
-    if (!spend()) return no_power();
-    for (auto& [path, file] : files_) {
-      if (!sync_ || std::filesystem::path(path).parent_path() != std::filesystem::path(directory)) continue;
-      file.name_durable = true;
-      file.replaced.reset();
-    }
-    std::erase_if(removed_, [&](const Removed& removed) {
-      const bool durable = sync_ && std::filesystem::path(removed.path).parent_path() == directory;
-      return durable && std::filesystem::remove(removed.kept_as);
-    });
-    return IOStatus::OK();
-  }
 
   const bool sync_;
   mutable std::mutex mutex_;
   std::mt19937_64 rng_;
   std::map<std::string, State> files_;  // written since the last restart
   std::vector<Removed> removed_;        // removed names that may come back
+  std::set<std::string> folders_;       // created, and the folder above not synced since
   std::uint64_t removals_ = 0;
   std::optional<std::uint64_t> operations_left_;
   bool power_ = true;
+};
+
+// The folders of a map on that disk, for RocksDbOptions::folder_files. All else is the machine's own file system.
+class ForgetfulFolders : public FileSystem {
+ public:
+  explicit ForgetfulFolders(std::shared_ptr<ForgetfulMapFiles> disk) : disk_(std::move(disk)) {}
+
+  Status create_directory(const std::string& path) override { return converted(disk_->create_folder(path)); }
+  Status sync_directory(const std::string& path) override { return converted(disk_->sync_names(path)); }
+
+  Result<std::vector<std::string>> list(const std::string& directory) const override { return real_->list(directory); }
+  Result<std::unique_ptr<AppendFile>> open_append(const std::string& path) override { return real_->open_append(path); }
+  Result<std::unique_ptr<ReadFile>> open_read(const std::string& path) const override { return real_->open_read(path); }
+  Status truncate(const std::string& path, std::uint64_t size) override { return real_->truncate(path, size); }
+  Status remove(const std::string& path) override { return real_->remove(path); }
+  Result<DiskRoom> room(const std::string& directory) const override { return real_->room(directory); }
+  Status occupy(const std::string& path, std::uint64_t bytes) override { return real_->occupy(path, bytes); }
+
+ private:
+  static Status converted(const rocksdb::IOStatus& status) {
+    return status.ok() ? Status() : Status(Reason::IO_ERROR, status.ToString());
+  }
+
+  const std::shared_ptr<ForgetfulMapFiles> disk_;
+  const std::shared_ptr<FileSystem> real_ = posix_file_system();
 };
 
 }  // namespace relmap::storage
