@@ -384,14 +384,19 @@ TEST_F(IidcUsb, AnEyeThatIsDeadIsMissingFromPairsAndNamed) {
   EXPECT_TRUE((*whole)->eye_missing.ok());
   EXPECT_TRUE((*whole)->arrived);
   camera->fail([](CameraFaults& faults) { faults.dead_eye = capture::FirstByte::kRight; });
-  for (int i = 0; i < 20; ++i) {
+  // Some were on their way; from the first that lacks the eye on, all do. A busy machine may miss some.
+  int without = 0;
+  for (int i = 0; i < 200 && without < 10; ++i) {
     const auto pair = (*source)->next();
-    ASSERT_TRUE(pair.ok() && pair->has_value());
+    if (pair.reason() == Reason::CAPTURE_FAILED) continue;
+    ASSERT_TRUE(pair.ok() && pair->has_value()) << pair.status().to_string();
     EXPECT_FALSE((*pair)->left.empty());
-    if (i < 10) continue;  // some were on their way
+    if (without == 0 && !(*pair)->right.empty()) continue;
+    ++without;
     EXPECT_TRUE((*pair)->right.empty());
     EXPECT_EQ((*pair)->eye_missing.reason(), Reason::EYE_DEAD);
   }
+  EXPECT_EQ(without, 10);
 }
 
 TEST_F(IidcUsb, AClockThatDoesNotAnswerHoldsNoFramesUpForLong) {
