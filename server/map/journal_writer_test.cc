@@ -94,15 +94,22 @@ class JournalWriterTest : public ::testing::Test {
   ~JournalWriterTest() override { engine_->let_go(); }  // so that a failed test ends
 
   void start(bool one_at_a_time = false) {
-    writer_ = std::make_unique<JournalWriter>(engine_, epoch_, budget_, one_at_a_time,
-                                              [this](std::vector<DurableRecord> group) {
-                                                const std::lock_guard lock(mutex_);
-                                                durable_groups_.push_back(group.size());
-                                                for (const DurableRecord& record : group) {
-                                                  durable_.emplace_back(record.sequence, name_of(record.record));
-                                                  budget_->release(storage::Share::kQueues, record.bytes);
-                                                }
-                                              });
+    writer_ = std::make_unique<JournalWriter>(
+        engine_, epoch_, budget_, one_at_a_time,
+        [this](std::vector<DurableRecord> group) {
+          const std::lock_guard lock(mutex_);
+          durable_groups_.push_back(group.size());
+          for (const DurableRecord& record : group) {
+            durable_.emplace_back(record.sequence, name_of(record.record));
+            budget_->release(storage::Share::kQueues, record.bytes);
+          }
+        },
+        [this] {
+          const bool idle = writer_->idle();
+          const std::lock_guard lock(mutex_);
+          told_idle_ = idle;
+          changed_.notify_all();
+        });
   }
   // Submits a record. Every call of its callback is noted in answers_.
   Status submit(const std::string& name) {
@@ -165,6 +172,7 @@ class JournalWriterTest : public ::testing::Test {
   std::vector<std::pair<std::uint64_t, std::string>> durable_;  // as on_durable was told
   Sizes durable_groups_;                                        // as on_durable was told
   int answered_too_early_ = 0;                                  // callbacks before on_durable
+  bool told_idle_ = false;                                      // by the last call of on_idle
   std::unique_ptr<JournalWriter> writer_;
 };
 
@@ -189,6 +197,14 @@ TEST_F(JournalWriterTest, RecordsThatQueueDuringAnAppendGoTogetherIntoTheNext) {
   EXPECT_EQ(writer_->durable_through(), 4u);
   EXPECT_TRUE(writer_->idle());
   EXPECT_EQ(queued_bytes(), 0u);
+}
+
+TEST_F(JournalWriterTest, ItTellsWhenItHasBecomeIdle) {
+  start();
+  ASSERT_TRUE(submit("a").ok());
+  std::unique_lock lock(mutex_);
+  EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [&] { return told_idle_; }));
+  EXPECT_EQ(order_.size(), 1u) << "after the last answer";
 }
 
 TEST_F(JournalWriterTest, EveryRecordOfManyThreadsGetsOneAnswerAndItsOwnPlace) {
