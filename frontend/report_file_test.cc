@@ -107,5 +107,8 @@ TEST(ReportFile, SaysWhereItCannotBeWritten) {
     EXPECT_EQ(ReportFile::open("/nowhere/report.tsv", goes_on).reason(), Reason::IO_ERROR);
 }
 
+// Reading from it gives zeros without end.
+TEST(ReportFile, ADeviceIsWrittenAndNotRead) { EXPECT_TRUE(ReportFile::open("/dev/zero", false).ok()); }
+
 }  // namespace
 }  // namespace relmap::frontend
