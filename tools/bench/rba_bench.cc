@@ -34,7 +34,8 @@ void run(Options options, Report& report) {
   const Figure8Options figure8{options.window, options.seeds, births, options.full, options.picture};
   if (options.scenario == "figure8") return run_figure8(figure8, report);
   if (options.scenario == "regions") return run_regions(figure8, report);
-  if (options.scenario == "edges") return run_edges({options.window, options.seeds, options.picture}, report);
+  if (options.scenario == "edges")
+    return run_edges({options.window, options.seeds, options.full, options.picture}, report);
   const char* recorded = std::getenv("RELMAP_DATA");
   const EuclideanOptions euclidean{options.window, options.seeds, births,
                                    options.data.empty() && recorded ? recorded : options.data, options.picture};
@@ -88,7 +89,7 @@ Run declare_rba(CLI::App& app) {
                  "Observations of a frame, about (figure8, regions, euclidean)")
       ->check(CLI::Range(20U, 500U))
       ->capture_default_str();
-  app.add_flag("!--no-full", options->full, "Do not compute the full solution");
+  app.add_flag("!--no-full", options->full, "Do not compute the full solution (figure8, edges)");
   return [options](Report& report) { run(*options, report); };
 }
 

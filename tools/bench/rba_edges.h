@@ -12,6 +12,7 @@ namespace relmap::bench {
 struct EdgesOptions {
   std::uint32_t window = 8;
   int seeds = 1;
+  bool full = true;     // also compute the full solution
   std::string picture;  // empty: none
 };
 
