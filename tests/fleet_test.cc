@@ -23,7 +23,7 @@ BenchFigures fleet(double seconds, double rate, const std::vector<std::string>& 
   std::vector<std::string> arguments{
       "fleet", "--batch", "0", "--robots", "20", "--seconds", std::to_string(seconds), "--rate", std::to_string(rate)};
   arguments.insert(arguments.end(), more.begin(), more.end());
-  return BenchFigures(arguments, std::chrono::seconds(std::max(200L, std::lround(2 * seconds))));
+  return BenchFigures(arguments, std::chrono::seconds(std::max(500L, std::lround(2 * seconds))));
 }
 
 // The capacity of this machine at the moment relative to two idle cores, of which twenty robots need half: measured by
@@ -31,7 +31,7 @@ BenchFigures fleet(double seconds, double rate, const std::vector<std::string>& 
 double machine_share() {
   constexpr double kOfTwoCores = 900;
   const BenchFigures figures({"fleet", "--robots", "1", "--seconds", "0.2", "--no-closures", "--batch", "1000"},
-                             std::chrono::seconds(200));
+                             std::chrono::seconds(500));
   const double share = std::clamp(figures["batch_full_frames_per_s"] / kOfTwoCores, 0.1, 1.0);
   std::printf("share of the machine: %.2f\n", share);
   return share;
