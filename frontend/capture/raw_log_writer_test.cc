@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,12 +10,14 @@
 #include <csignal>
 #include <thread>
 
+#include "frontend/capture/testing/file_size_limit.h"
 #include "frontend/capture/testing/raw_logs.h"
 
 namespace relmap::capture {
 namespace {
 
 using namespace std::chrono_literals;
+using testing_files::FileSizeLimit;
 using testing_files::raw_bytes;
 using testing_files::raw_frame;
 using testing_files::raw_header;
@@ -131,25 +132,6 @@ TEST(RawLogWriter, NamesAFullDisk) {
   EXPECT_NE(log.status().message().find(path), std::string::npos);
   EXPECT_EQ(RawLogWriter::open((folder.path() / "nowhere/log").string(), raw_header()).reason(), Reason::IO_ERROR);
 }
-
-// No file may grow beyond that meanwhile.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
 
 TEST(RawLogWriter, IsWholeUpToWhereTheDiskFailed) {
   TemporaryFolder folder;

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/capture/testing/file_size_limit.h"
 #include "frontend/tracking/pair.h"
-#include "frontend/workflow/testing/full_disk.h"
 #include "frontend/workflow/testing/workflow_fixture.h"
 
 namespace relmap::workflow {
@@ -140,7 +140,7 @@ TEST_F(PairOutputsTest, APictureThatCannotBeWrittenIsAnErrorAndItsLineIsInTheRep
 
 TEST_F(PairOutputsTest, AReportThatIsNotCompleteIsAnErrorOfClosing) {
   options_.show.clear();
-  const FullDisk full;
+  const capture::testing_files::FileSizeLimit full_disk(64);
   const Status written = write({0});
   EXPECT_EQ(written.to_string(), "IO_ERROR: " + options_.report + " is not complete");
 }

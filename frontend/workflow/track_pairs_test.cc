@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "frontend/workflow/testing/full_disk.h"
+#include "frontend/capture/testing/file_size_limit.h"
 #include "frontend/workflow/testing/workflow_fixture.h"
 
 namespace relmap::workflow {
@@ -221,7 +221,7 @@ TEST_F(TrackPairsTest, KeyframesOfARunThatTracksNothingAreSentOnlyIfNotHeldBack)
 
 TEST_F(TrackPairsTest, AReportThatIsNotCompleteFailsTheRunAfterItsDelivery) {
   options_.report = file("pairs.tsv");
-  const FullDisk full;
+  const capture::testing_files::FileSizeLimit full_disk(64);
   EXPECT_EQ(track().reason(), Reason::IO_ERROR);
   EXPECT_EQ(daemon_.pushed.size(), 12u);
   EXPECT_EQ(daemon_.complete, true);
