@@ -22,14 +22,6 @@ place::PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> pr
   return {seen.features, seen.camera, seen.masked, prior, seen.pair, seen.known, seen.eye_turn};
 }
 
-// The same picture with an unknown camera.
-v1::View without_camera(v1::View view) {
-  view.clear_calibration();
-  view.clear_supposed();
-  view.clear_either_eye();
-  return view;
-}
-
 // Sees a single picture again with an unknown camera, and replaces `seen` by that. Empty for a pair or features, which
 // cannot be seen without their camera.
 place::DescribeWithoutCamera see_again(const v1::View& asked, const storage::MapView& view,

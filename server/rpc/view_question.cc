@@ -118,4 +118,12 @@ Result<SeenView> see(const v1::View& view, const storage::Graph& graph) {
   return {Reason::INVALID_ARGUMENT, "the view holds neither a picture nor features nor a frame"};
 }
 
+v1::View without_camera(v1::View view) {
+  view.clear_calibration();
+  view.clear_supposed();
+  view.clear_either_eye();
+  view.clear_rectified();
+  return view;
+}
+
 }  // namespace relmap::rpc

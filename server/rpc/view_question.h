@@ -29,4 +29,8 @@ struct SeenView {
 // the reasons of describe_picture() and from_wire().
 Result<SeenView> see(const v1::View& view, const storage::Graph& graph);
 
+// The view without its camera, nor what can only be said of pictures of a session's camera: see() takes it for one of
+// an unknown camera.
+v1::View without_camera(v1::View view);
+
 }  // namespace relmap::rpc

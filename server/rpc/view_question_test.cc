@@ -112,5 +112,19 @@ TEST_F(ViewQuestion, RectifiedNeedsTheCameraOfASession) {
   EXPECT_EQ(see(view, graph_).reason(), Reason::INVALID_ARGUMENT);
 }
 
+TEST_F(ViewQuestion, APictureCanBeSeenWithoutTheCameraThatWasSupposed) {
+  v1::View view = question(kRaw);
+  view.set_supposed(true);
+  for (const bool rectified : {false, true}) {
+    view.set_rectified(rectified);
+    view.set_either_eye(!rectified);
+    const auto seen = see(without_camera(view), graph_);
+    ASSERT_TRUE(seen.ok()) << seen.status().to_string();
+    EXPECT_EQ(seen->camera->f, 0);
+    EXPECT_NE(seen->known, place::CameraKnown::kSupposed);
+    EXPECT_TRUE(seen->eye_turn.isZero());
+  }
+}
+
 }  // namespace
 }  // namespace relmap::rpc
