@@ -19,7 +19,7 @@ constexpr double kRightPlaceMetres = 3;     // a place is right if it was seen f
 constexpr double kRightPlaceRadians = 0.8;  // and this way
 constexpr double kRouteTolerance = 0.1;     // of its length, against the way along the circuit
 
-struct Options {
+struct AnswersOptions {
   std::string server, drive;
   int queries = 20;
 };
@@ -40,7 +40,7 @@ std::string picture_path(const std::string& drive, const char* eye, std::size_t 
 // Asks about the drive's pictures, and knows the truth of every frame of its session.
 class Judge {
  public:
-  Judge(const Options& options)
+  Judge(const AnswersOptions& options)
       : options_(options),
         truth_(testing::read_truth(options.drive).or_throw()),
         client_(client::Client::connect(options.server).or_throw()) {
@@ -152,7 +152,7 @@ class Judge {
     return std::min(along(first_lap, goal_picture), along(goal_picture, from));
   }
 
-  const Options options_;
+  const AnswersOptions options_;
   const testing::DriveTruth truth_;
   std::unique_ptr<client::Client> client_;
   client::Session session_;
@@ -161,7 +161,7 @@ class Judge {
 }  // namespace
 
 Run declare_answers(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<AnswersOptions>();
   app.add_option("--server", options->server, "data folder or HOST:PORT of the daemon")->required();
   app.add_option("--drive", options->drive, "folder of the drive: pictures, poses.txt, times.txt")->required();
   app.add_option("--queries", options->queries, "pictures to ask about")->check(CLI::Range(1, 1000));

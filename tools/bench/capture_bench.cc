@@ -16,7 +16,7 @@ namespace relmap::bench {
 
 namespace {
 
-struct Options {
+struct CaptureOptions {
   std::uint64_t pairs = 200;
   double rate = 20;
 };
@@ -30,7 +30,7 @@ struct Cost {
 
 class CaptureBench {
  public:
-  explicit CaptureBench(const Options& options) : options_(options) {
+  explicit CaptureBench(const CaptureOptions& options) : options_(options) {
     testing::record_simulation(folder_ / "drive", {"--seed", "5", "--pairs", "60", "--laps", "0.5", "--step", "0.25"});
     std::filesystem::create_directories(folder_ / "cameras/12345678");
     std::filesystem::copy_file(folder_ / "drive/calib.txt", folder_ / "cameras/12345678/calib.txt");
@@ -81,7 +81,7 @@ class CaptureBench {
     return {0, said.at("cpu_s"), said.at("lost"), nlohmann::json::parse(testing::read_text(output))};
   }
 
-  const Options options_;
+  const CaptureOptions options_;
   const storage::TemporaryFolder folder_;
   int runs_ = 0;
 };
@@ -91,7 +91,7 @@ double ms_per_pair(const Cost& all, const Cost& start) {
   return 1e3 * (all.cpu_s - start.cpu_s) / (all.pairs - start.pairs);
 }
 
-void run(const Options& options, Report& report) {
+void run(const CaptureOptions& options, Report& report) {
   CaptureBench bench(options);
   const std::uint64_t few = 20;
   const Cost recorded_few = bench.record(few), recorded = bench.record(few + options.pairs);
@@ -114,7 +114,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_capture(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CaptureOptions>();
   app.add_option("--pairs", options->pairs, "number of pairs for each program, not counting 20 for its start")
       ->check(CLI::Range(20, 1000000))
       ->capture_default_str();

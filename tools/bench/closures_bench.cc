@@ -21,10 +21,10 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr SessionNumber kSession = 1;
+constexpr SessionNumber kReplayed = 1;
 constexpr double kFalseBeyond = 10, kTrueWithin = 3;  // metres between the ends, by the truth
 
-struct Options {
+struct ClosuresOptions {
   std::string graph, truth;
   std::uint32_t truth_every = 10;
   bool loops_are_true = false;
@@ -39,7 +39,7 @@ g2o::PoseGraph read(const std::string& path) { return g2o::read_pose_graph(path)
 
 class Replay {
  public:
-  Replay(const g2o::PoseGraph& graph, const Options& options, const map::ConsistencyRules& rules)
+  Replay(const g2o::PoseGraph& graph, const ClosuresOptions& options, const map::ConsistencyRules& rules)
       : graph_(graph), options_(options) {
     auto engine = std::shared_ptr<storage::Engine>(storage::make_memory_engine());
     map_ = storage::Map::open(engine, engine->acquire().or_throw(),
@@ -54,7 +54,7 @@ class Replay {
   }
 
   void run() {
-    apply(storage::SessionRecord{kSession, header_.name, header_});
+    apply(storage::SessionRecord{kReplayed, header_.name, header_});
     add_keyframe(0, SE3());
     std::size_t next = 0;
     SE3 T_odom_frame;
@@ -70,10 +70,10 @@ class Replay {
   std::vector<std::optional<storage::Edge>> closures() const {
     std::vector<std::optional<storage::Edge>> found;
     for (const g2o::PoseGraph::Edge& loop : graph_.loops) {
-      const auto hot = map_->hot({kSession, loop.a});
+      const auto hot = map_->hot({kReplayed, loop.a});
       std::optional<storage::Edge> closure;
       for (const storage::Edge& edge : hot ? hot->edges : std::vector<storage::Edge>{})
-        if (edge.kind == storage::EdgeKind::kLoop && edge.a == FrameId{kSession, loop.b}) closure = edge;
+        if (edge.kind == storage::EdgeKind::kLoop && edge.a == FrameId{kReplayed, loop.b}) closure = edge;
       found.push_back(std::move(closure));
     }
     return found;
@@ -99,13 +99,13 @@ class Replay {
     }
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    apply(storage::KeyframeRecord{kSession, crc, std::move(payload)});
+    apply(storage::KeyframeRecord{kReplayed, crc, std::move(payload)});
   }
 
   void propose(const g2o::PoseGraph::Edge& loop) {
     storage::ClosureProposalRecord proposal;
-    proposal.query = {kSession, loop.a};
-    proposal.match = {kSession, loop.b};
+    proposal.query = {kReplayed, loop.a};
+    proposal.match = {kReplayed, loop.b};
     proposal.T_match_query = loop.T_ab.inverse();
     proposal.verification = storage::Verification::kImported;
     proposal.covariance = options_.loop_scale * options_.loop_scale * inverse_covariance(loop.T_ab, loop.covariance);
@@ -115,7 +115,7 @@ class Replay {
   }
 
   const g2o::PoseGraph& graph_;
-  const Options& options_;
+  const ClosuresOptions& options_;
   std::unique_ptr<storage::Map> map_;
   std::unique_ptr<map::MapBuilder> builder_;
   SessionHeader header_;
@@ -127,7 +127,7 @@ class Replay {
 enum class Truth { kTrue, kFalse, kBetween, kUnknown };
 
 // Whether a loop is true: by the true distance of its ends, or by its origin.
-std::vector<Truth> truths(const g2o::PoseGraph& graph, const Options& options) {
+std::vector<Truth> truths(const g2o::PoseGraph& graph, const ClosuresOptions& options) {
   const g2o::PoseGraph truth = options.truth.empty() ? g2o::PoseGraph{} : read(options.truth);
   const auto truth_of = [&](std::uint32_t id) -> std::optional<Vector3> {
     const auto found = std::lower_bound(truth.ids.begin(), truth.ids.end(), id / options.truth_every);
@@ -177,7 +177,7 @@ struct Outcome {
   std::vector<double> proposal_us;
 };
 
-Outcome replay(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+Outcome replay(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const ClosuresOptions& options,
                const map::ConsistencyRules& rules) {
   Replay replay(graph, options, rules);
   replay.run();
@@ -221,7 +221,7 @@ std::vector<Variant> one_by_one() {
   return variants;
 }
 
-void report_rules(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+void report_rules(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const ClosuresOptions& options,
                   Report& report) {
   for (const Variant& variant : one_by_one()) {
     const Outcome outcome = replay(graph, truth, options, variant.rules);
@@ -232,7 +232,7 @@ void report_rules(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, 
 }
 
 // Thresholds chosen on one half of the drive and judged on the other.
-void report_folds(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+void report_folds(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const ClosuresOptions& options,
                   Report& report) {
   std::vector<std::pair<map::ConsistencyRules, Outcome>> tried;
   for (const std::uint32_t reach : {20u, 50u, 100u, 200u})
@@ -262,7 +262,7 @@ void report_folds(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, 
   report.add("folds_false_refused", refused, "likewise");
 }
 
-void run(const Options& options, Report& report) {
+void run(const ClosuresOptions& options, Report& report) {
   g2o::PoseGraph graph = read(options.graph);
   std::vector<Truth> truth = truths(graph, options);
   mix_in(look_alikes(graph, options.look_alikes, options.seed), graph, truth);
@@ -293,7 +293,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_closures(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ClosuresOptions>();
   app.add_option("graph", options->graph, "g2o file of poses in the plane, odometry, and loops to propose")->required();
   app.add_option("--truth", options->truth, "g2o file with the true positions");
   app.add_option("--truth-every", options->truth_every, "frames of the graph between two true positions")

@@ -12,7 +12,7 @@ namespace relmap::bench {
 
 namespace {
 
-struct Options {
+struct DriveOptions {
   std::string data, before, truth;
 };
 
@@ -28,7 +28,7 @@ testing::DriveEvaluation evaluate_folder(const std::string& folder, const testin
   return testing::evaluate_drive(*view, sessions.front().number, truth);
 }
 
-void run(const Options& options, Report& report) {
+void run(const DriveOptions& options, Report& report) {
   const testing::DriveTruth truth = testing::read_truth(options.truth).or_throw();
   const testing::DriveEvaluation after = evaluate_folder(options.data, truth);
   report.add("keyframes", after.keyframes, "keyframes in the map");
@@ -54,7 +54,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_drive(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DriveOptions>();
   app.add_option("--data", options->data, "data folder of a stopped relmapd")->required();
   app.add_option("--before", options->before, "data folder of the same recording mapped without closures");
   app.add_option("--truth", options->truth, "folder with poses.txt and times.txt of the recording")->required();

@@ -26,7 +26,7 @@ constexpr double kSegments[] = {30, 50};  // metres
 constexpr int kFeatures = 120;
 constexpr double kChi2 = 22.46;  // of six degrees of freedom, 0.999
 
-struct Options {
+struct FrontendOptions {
   std::string source = "sim", path, reference, scene = "street", faults = "none", track;
   sim::PictureWorldOptions world;
   double circuit_m = 250;
@@ -101,7 +101,7 @@ struct Totals {
 
 class Drive {
  public:
-  Drive(PictureDrive& pictures, const Options& options, Totals& totals)
+  Drive(PictureDrive& pictures, const FrontendOptions& options, Totals& totals)
       : pictures_(pictures),
         first_(options.first),
         totals_(totals),
@@ -261,7 +261,7 @@ class Drive {
   std::optional<tracking::PosePair> last_;
 };
 
-void add_figures(const Totals& t, const Options& options, Report& report) {
+void add_figures(const Totals& t, const FrontendOptions& options, Report& report) {
   const auto per_pair = [&](double sum) { return sum / std::max(1.0, t.pairs); };
   const auto share = [](double part, double whole) { return part / std::max(1.0, whole); };
   report.add("frames", t.pairs, "stereo pairs");
@@ -320,7 +320,7 @@ void scale(StereoCamera& camera, double by) {
   camera.height = static_cast<int>(camera.height * by);
 }
 
-void run(const Options& options, Report& report) {
+void run(const FrontendOptions& options, Report& report) {
   cv::setNumThreads(1);
   Totals totals;
   if (!options.path.empty()) {
@@ -351,7 +351,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_frontend(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<FrontendOptions>();
   options->world.frames = 5000;
   app.footer(
       "Examples:\n"

@@ -15,7 +15,7 @@ const cv::Size kWindow(21, 21);
 constexpr int kLevels = 3;
 constexpr double kQuality = 0.01, kApart = 10;  // pixels
 constexpr float kMaxRows = 2;                   // pixels between the rows of the two eyes
-constexpr float kMinDisparity = 1;              // pixels
+constexpr float kMinFollowedDisparity = 1;      // pixels
 constexpr double kRefill = 0.75;                // of the features wanted
 constexpr double kReprojection = 1.5;           // pixels
 constexpr int kIterations = 200, kMinInliers = 12;
@@ -57,7 +57,7 @@ struct KltOdometry::Impl {
     std::vector<char> good(features.size(), 0);
     for (std::size_t i = 0; i < features.size(); ++i) {
       const float disparity = features[i].x - there[i].x;
-      good[i] = found[i] && disparity > kMinDisparity && std::abs(features[i].y - there[i].y) < kMaxRows;
+      good[i] = found[i] && disparity > kMinFollowedDisparity && std::abs(features[i].y - there[i].y) < kMaxRows;
       if (!good[i]) continue;
       const Vector3 p = camera.triangulate({features[i].x, features[i].y, there[i].x});
       points.emplace_back(p.x(), p.y(), p.z());

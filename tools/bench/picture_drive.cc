@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::size_t kAhead = 64;  // pairs
 
-class RecordedDrive : public PictureDrive {
+class DriveOfRecording : public PictureDrive {
  public:
-  RecordedDrive(std::unique_ptr<capture::StereoSource> source, testing::DriveTruth truth)
+  DriveOfRecording(std::unique_ptr<capture::StereoSource> source, testing::DriveTruth truth)
       : source_(std::move(source)), truth_(std::move(truth)) {}
   const StereoCamera& camera() const override { return source_->camera(); }
   const vision::Rectifier* rectifier() const override { return &source_->rectifier(); }
@@ -76,8 +76,8 @@ class RenderedDrive : public PictureDrive {
 }  // namespace
 
 std::unique_ptr<PictureDrive> open_recorded_drive(const std::string& kind, const std::string& folder) {
-  return std::make_unique<RecordedDrive>(capture::open_source(kind, folder).or_throw(),
-                                         testing::read_truth(folder).or_throw());
+  return std::make_unique<DriveOfRecording>(capture::open_source(kind, folder).or_throw(),
+                                            testing::read_truth(folder).or_throw());
 }
 
 std::unique_ptr<PictureDrive> open_rendered_drive(const sim::PictureWorldOptions& options) {

@@ -11,6 +11,7 @@
 #include "server/place/testing/random_vocabulary.h"
 #include "storage/testing/endless_drive.h"
 #include "storage/testing/temporary_folder.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -21,16 +22,11 @@ constexpr std::uint32_t kWords = 10000;
 constexpr std::uint32_t kMinWords = 100, kMaxWords = 300;  // words of a place
 constexpr std::uint32_t kFeatures = 300;
 
-struct Options {
+struct PlacesOptions {
   std::uint32_t places = 100000;
   double budget_mb = 0;
   int queries = 200;
 };
-
-using Clock = std::chrono::steady_clock;
-double microseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-}
 
 // 100 to 300 different words, drawn by Zipf's law with exponent 1; always the same for the same number.
 class Pictures {
@@ -148,7 +144,7 @@ double quantise_us() {
   return quantile(times, 0.5);
 }
 
-void run(const Options& options, Report& report) {
+void run(const PlacesOptions& options, Report& report) {
   const Pictures pictures;
   const auto vocabulary = correlated_vocabulary(pictures);
   const DescribedDrive graph(options.places, pictures);
@@ -221,7 +217,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_places(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PlacesOptions>();
   app.add_option("--places", options->places, "Number of places, of 100 to 300 words each")->capture_default_str();
   app.add_option("--budget-mb", options->budget_mb, "Memory budget of the index; 0: unlimited")->capture_default_str();
   app.add_option("--queries", options->queries, "Number of queries, half of them revisits")->capture_default_str();

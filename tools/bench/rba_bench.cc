@@ -14,7 +14,7 @@ namespace relmap::bench {
 
 namespace {
 
-struct Options {
+struct RbaBenchOptions {
   std::string scenario = "figure8";
   std::uint32_t frames = 0;  // 0: the scenario's
   std::uint32_t laps = 1000;
@@ -27,7 +27,7 @@ struct Options {
   std::string picture;
 };
 
-void run(Options options, Report& report) {
+void run(RbaBenchOptions options, Report& report) {
   if (options.seeds == 0) options.seeds = options.scenario == "figure8" ? 20 : 3;
   // The world of 45 observations a frame.
   const double births = Figure8Options().births * options.observations / 45;
@@ -62,7 +62,7 @@ void run(Options options, Report& report) {
 }  // namespace
 
 Run declare_rba(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RbaBenchOptions>();
   app.add_option("--scenario", options->scenario,
                  "figure8, regions, edges, euclidean, loop, laps, exploration, lift or real")
       ->check(

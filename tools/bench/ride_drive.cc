@@ -13,7 +13,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr int kFeatures = 300;  // of a keyframe's appearance set, as relmap-frontend has them
+constexpr int kAppearanceFeatures = 300;  // of a keyframe's appearance set, as relmap-frontend has them
 
 SessionHeader header_of(const sim::PictureWorldOptions& options) {
   SessionHeader header;
@@ -37,7 +37,8 @@ RideDrive drive_ride(const sim::PictureWorldOptions& options) {
     ++drive.pairs;
     drive.lost += !tracker.report().tracked && !tracker.report().repeated;
     if (!keyframe) continue;
-    keyframe->appearance = tracking::appearance_set(*prepared, *keyframe, tracker.report().offset_px, kFeatures);
+    keyframe->appearance =
+        tracking::appearance_set(*prepared, *keyframe, tracker.report().offset_px, kAppearanceFeatures);
     keyframe->picture = tracking::keyframe_picture(prepared->picture, tracking::KeyframePicture::kWhole);
     drive.keyframes.push_back(std::move(*keyframe));
     drive.truth.push_back(pair->truth);

@@ -13,14 +13,14 @@ namespace relmap::bench {
 
 namespace {
 
-struct Options {
+struct RidesOptions {
   std::string ride = "lift-ramp";
   std::uint64_t first_seed = 1;
   int seeds = 1, width = 320;
   bool on_foot = false, list = false;
 };
 
-sim::PictureWorldOptions world_of(const Options& options, std::uint64_t seed) {
+sim::PictureWorldOptions world_of(const RidesOptions& options, std::uint64_t seed) {
   sim::PictureWorldOptions world = sim::ride_options(*sim::ride_of(options.ride), seed, !options.on_foot);
   world.camera = sim::scaled(world.camera, options.width);
   if (const Status status = world.check(); !status.ok()) throw StatusError(status);
@@ -52,7 +52,7 @@ void list_closures(const storage::Graph& graph, const RideDrive& drive, std::uin
   }
 }
 
-void run(const Options& options, Report& report) {
+void run(const RidesOptions& options, Report& report) {
   std::map<std::string, std::vector<double>> series;
   double closed = 0, wrong = 0, wrong_meanwhile = 0, right = 0, of_cabin = 0;
   std::map<Reason, std::uint32_t> right_refused, wrong_refused;
@@ -114,7 +114,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_rides(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RidesOptions>();
   app.add_option("--ride", options->ride, "kind of ride, as in relmap-sim pictures --ride")
       ->check(CLI::IsMember({"lift", "lift-alike", "lift-ramp", "train", "escalator", "alike"}))
       ->capture_default_str();

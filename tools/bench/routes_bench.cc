@@ -24,6 +24,7 @@
 #include "server/rpc/limits.h"
 #include "storage/map/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -32,7 +33,7 @@ namespace {
 
 constexpr std::uint32_t kLandmarks = 12, kObservers = 4;
 
-struct Options {
+struct RoutesOptions {
   std::string world = "fleet";
   std::uint32_t frames = 1'000'000;
   std::uint32_t queries = 1000;
@@ -41,9 +42,6 @@ struct Options {
   std::size_t memory_budget_mb = 512;
   std::string data;
 };
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 storage::FrameHot frame_of_drive(std::uint32_t index) {
   storage::FrameHot hot;
@@ -89,7 +87,7 @@ void drive_on(storage::Map& map, std::uint32_t frames) {
 }
 
 struct StoredMap {
-  explicit StoredMap(const Options& options)
+  explicit StoredMap(const RoutesOptions& options)
       : budget(std::make_shared<storage::Budget>(options.memory_budget_mb << 20)) {
     storage::RocksDbOptions engine_options;
     engine_options.cache_bytes = budget->allowance(storage::Share::kEngine);
@@ -103,7 +101,7 @@ struct StoredMap {
   std::unique_ptr<storage::Map> map;
 };
 
-void run_drive(const Options& options, Report& report) {
+void run_drive(const RoutesOptions& options, Report& report) {
   StoredMap stored(options);
   drive_on(*stored.map, options.frames);
 
@@ -323,7 +321,7 @@ class Traffic {
   std::uint32_t next_ = 0;
 };
 
-void run_fleet(const Options& options, Report& report) {
+void run_fleet(const RoutesOptions& options, Report& report) {
   const route::StreetGrid town(town_of(options.frames));
   const std::vector<route::RouteWeights> metrics(kMetrics.begin(), kMetrics.begin() + options.metrics);
   const StoredMap stored(options);
@@ -563,7 +561,7 @@ void run_fleet(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_routes(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RoutesOptions>();
   app.add_option("--world", options->world, "fleet: many robots in a town; drive: one robot, straight on")
       ->check(CLI::IsMember({"fleet", "drive"}))
       ->capture_default_str();

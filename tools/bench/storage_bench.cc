@@ -21,14 +21,13 @@
 #include "storage/map/part_loader.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/storage_load.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr SessionNumber kSession = 1;
 constexpr std::size_t kGroup = 64;  // keyframes a batch job sends before it waits for the acknowledgement
@@ -38,18 +37,13 @@ constexpr std::uint32_t kWindow = 4'992;  // updates on either side of what they
 constexpr std::size_t kNeighbourhood = 20;
 constexpr std::size_t kPage = 4096;
 
-struct Options {
+struct StorageOptions {
   std::uint32_t frames = 100'000;
   std::uint64_t memory_budget_mb = 256;
   bool light = false;
   std::string data;
   std::uint64_t seed = 1;
 };
-
-double microseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-}
-double seconds_since(Clock::time_point start) { return microseconds_since(start) * 1e-6; }
 
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -187,7 +181,7 @@ struct Store {
   std::uint64_t epoch = 0;
   std::unique_ptr<storage::Map> map;
 
-  static Store open(const Options& options, const std::string& folder) {
+  static Store open(const StorageOptions& options, const std::string& folder) {
     Store store;
     store.budget = std::make_shared<storage::Budget>(options.memory_budget_mb << 20);
     storage::RocksDbOptions how;
@@ -306,7 +300,7 @@ class JournalThreads {
 // Writes a long drive to a map.
 class Feed {
  public:
-  Feed(const Options& options, std::uint32_t frames, std::uint64_t seed, Store& store)
+  Feed(const StorageOptions& options, std::uint32_t frames, std::uint64_t seed, Store& store)
       : store_(store), frames_(frames), number_(store.engine->allocate_session(store.epoch).or_throw()) {
     KeyframeLoad load(options.light ? kLightLoad : LoadSize{}, seed);
     storage::Session session;
@@ -359,7 +353,7 @@ struct Ingest {
   double payload_bytes = 0, zstd_bytes = 0;
 };
 
-Ingest ingest(const Options& options, Store& store, ChunkReader& reader) {
+Ingest ingest(const StorageOptions& options, Store& store, ChunkReader& reader) {
   Ingest result;
   const auto start = Clock::now();
   const double cpu_start = cpu_seconds();
@@ -382,7 +376,7 @@ Ingest ingest(const Options& options, Store& store, ChunkReader& reader) {
 // Updates by a new session of the map and of one of 5,000 to 15,000 keyframes, in turn, so that all else is the same
 // for both: what the threads beside them and the rest of the machine are at changes more between two minutes than
 // either figure. Each has the time of the other's turn to finish its commit.
-void measure_updates(const Options& options, Store& store, const std::string& folder, Report& report) {
+void measure_updates(const StorageOptions& options, Store& store, const std::string& folder, Report& report) {
   Store small_store = Store::open(options, folder);
   Feed before(options, kSmallMap - kWindow, options.seed, small_store);
   while (before.done() < kSmallMap - kWindow) (void)before.step();
@@ -415,7 +409,7 @@ double time_of_drive(const storage::Graph& graph, FrameId first, std::uint32_t f
 }
 
 // Times in turn until one keyframe is durable, and a bare append with fdatasync.
-void measure_acknowledgement(const Options& options, Store& store, const std::string& folder, Report& report) {
+void measure_acknowledgement(const StorageOptions& options, Store& store, const std::string& folder, Report& report) {
   KeyframeLoad load(options.light ? kLightLoad : LoadSize{}, options.seed + 1);
   const std::string path = folder + "/raw-append";
   const int fd = ::open(path.c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0600);
@@ -437,7 +431,7 @@ void measure_acknowledgement(const Options& options, Store& store, const std::st
   report.add("raw_append_p50_us", quantile(raw_us, 0.5), "as many bytes by write and fdatasync, in turn");
 }
 
-void run(const Options& options, Report& report) {
+void run(const StorageOptions& options, Report& report) {
   std::optional<storage::TemporaryFolder> own;
   if (options.data.empty()) own.emplace();
   const std::string base = own ? *own / "" : options.data;
@@ -517,7 +511,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_storage(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StorageOptions>();
   app.add_option("--frames", options->frames, "Keyframes to take in")
       ->check(CLI::Range(20'000U, 100'000'000U))
       ->capture_default_str();

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kBuffers = 8;  // as a camera's driver has: a frame is not in the nearest cache when it is taken
 
-struct Options {
+struct UnpackOptions {
   int width = 640, height = 480, rounds = 2000;
 };
 
@@ -26,7 +26,7 @@ double milliseconds(Work work) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
-void run(const Options& options, Report& report) {
+void run(const UnpackOptions& options, Report& report) {
   capture::StereoLayout grey{options.width, options.height, capture::FirstByte::kRight, capture::ColourFilter::kNone},
       bayer = grey;
   bayer.filter = capture::ColourFilter::kGRBG;
@@ -69,7 +69,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_unpack(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<UnpackOptions>();
   app.add_option("--width", options->width, "width of one eye's picture, pixels")
       ->check(CLI::Range(2, 4096))
       ->capture_default_str();

@@ -11,14 +11,11 @@
 #include "frontend/publishing/publisher.h"
 #include "tests/support/running_daemon.h"
 #include "tools/bench/fleet/keyframes.h"
+#include "tools/bench/stopwatch.h"
 
 namespace relmap::bench {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 std::vector<Keyframe> recording(const FleetLap& lap, const FleetRobot& robot, std::uint32_t size) {
   std::vector<Keyframe> keyframes;

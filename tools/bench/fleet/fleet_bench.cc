@@ -25,6 +25,7 @@
 #include "tools/bench/fleet/evaluation.h"
 #include "tools/bench/fleet/relay.h"
 #include "tools/bench/fleet/trouble.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -33,11 +34,10 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using Clock = std::chrono::steady_clock;
 using testing::Process;
 using testing::RunningDaemon;
 
-struct Options {
+struct FleetOptions {
   std::uint32_t robots = 20;
   double rate = 5, seconds = 300;
   RelayFaults faults{0.05, 0.05, 0.01};
@@ -114,7 +114,7 @@ class FleetDaemon {
 // Robots to be killed are processes of their own; the others share one.
 class FleetProcesses {
  public:
-  FleetProcesses(const Options& options, std::string folder, std::string lcm)
+  FleetProcesses(const FleetOptions& options, std::string folder, std::string lcm)
       : options_(options), folder_(std::move(folder)), lcm_(std::move(lcm)), start_us_(now_us()) {
     for (std::uint32_t k = 0; k < options.kill_robots; ++k) processes_.push_back(start(k, 1));
     if (options.robots > options.kill_robots)
@@ -168,7 +168,7 @@ class FleetProcesses {
         testing::ProcessOptions{.standard_output = "", .standard_error = folder_ + "/robots.log"});
   }
 
-  const Options& options_;
+  const FleetOptions& options_;
   const std::string folder_, lcm_;
   const std::int64_t start_us_;
   std::vector<std::unique_ptr<Process>> processes_;
@@ -180,7 +180,7 @@ struct Kill {
   double at = 0;  // share of the run
   std::optional<std::uint32_t> robot;
 };
-std::vector<Kill> plan_kills(const Options& options) {
+std::vector<Kill> plan_kills(const FleetOptions& options) {
   constexpr double kFirst = 0.1, kLast = 0.9;
   const std::uint32_t of_robots = options.kill_robots * options.kills_each;
   std::vector<Kill> kills;
@@ -202,7 +202,7 @@ std::pair<std::string, std::string> two_groups() {
   }
 }
 
-void wait_until_all_are_heard(const FleetProcesses& processes, const Options& options, const std::string& deeds) {
+void wait_until_all_are_heard(const FleetProcesses& processes, const FleetOptions& options, const std::string& deeds) {
   const auto deadline = Clock::now() + seconds(60);
   for (;; std::this_thread::sleep_for(milliseconds(50))) {
     std::uint32_t heard = 0;
@@ -229,7 +229,7 @@ double wait_until_applied(client::Client& client) {
 // One run, from the start of the daemon to the check of the map.
 class FleetRun {
  public:
-  explicit FleetRun(const Options& options)
+  explicit FleetRun(const FleetOptions& options)
       : options_(options),
         folder_(options.folder.empty() ? temporary_ / "fleet" : options.folder),
         groups_(two_groups()),
@@ -291,7 +291,7 @@ class FleetRun {
   }
 
  private:
-  static FleetLap make_lap(const std::string& folder, const Options& options) {
+  static FleetLap make_lap(const std::string& folder, const FleetOptions& options) {
     std::filesystem::create_directories(folder);
     FleetLap::make(folder + "/lap.bin", options.keyframe_bytes, options.seed);
     return FleetLap(folder + "/lap.bin");
@@ -381,7 +381,7 @@ class FleetRun {
       report.add("settled_after_robot_restart_s", of_robots, "of a robot: until all it had pushed was acknowledged");
   }
 
-  const Options& options_;
+  const FleetOptions& options_;
   const storage::TemporaryFolder temporary_;
   const std::string folder_;
   const std::pair<std::string, std::string> groups_;  // LCM URLs: of the robots, of the daemon
@@ -399,7 +399,7 @@ class FleetRun {
 };
 
 // A tenth as many with all background work of the daemon.
-void report_batch(const Options& options, Report& report) {
+void report_batch(const FleetOptions& options, Report& report) {
   BatchSpeed journal, map, full;
   journal.durable_per_s = map.done_per_s = full.done_per_s = std::numeric_limits<double>::quiet_NaN();
   if (options.batch > 0) {
@@ -419,7 +419,7 @@ void report_batch(const Options& options, Report& report) {
   report.add("batch_full_frames_per_s", full.done_per_s, "until all are relaxed and looked up");
 }
 
-void run(const Options& options, Report& report) {
+void run(const FleetOptions& options, Report& report) {
   if (options.kill_robots > options.robots) throw std::runtime_error("more robots to be killed than there are");
   if (!testing::enter_private_network(testing::Multicast::kOnLoopback))
     std::cerr << "no network namespace may be made here: random multicast groups of this machine instead\n";
@@ -433,7 +433,7 @@ void run(const Options& options, Report& report) {
 }  // namespace
 
 Run declare_fleet(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FleetOptions>();
   const auto share = CLI::Range(0.0, 1.0);
   app.footer(
       "Examples:\n"

@@ -8,15 +8,14 @@
 #include "server/ops/signals.h"
 #include "tools/bench/fleet/keyframes.h"
 #include "tools/bench/fleet/robot_transport.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-struct Options {
+struct RobotsOptions {
   std::string folder, lcm;
   std::uint32_t first = 0, count = 1, robots = 1;
   double rate = 5;
@@ -48,7 +47,7 @@ class Stop {
 
 class DrivingRobot {
  public:
-  DrivingRobot(const Options& options, std::uint32_t number, const FleetLap& lap, std::shared_ptr<SharedLcm> lcm,
+  DrivingRobot(const RobotsOptions& options, std::uint32_t number, const FleetLap& lap, std::shared_ptr<SharedLcm> lcm,
                const DeedLog& log, Stop& stop)
       : options_(options), lap_(lap), log_(log), stop_(stop) {
     robot_ = {number, options.seed, start_of(number, options.robots), options.start_us,
@@ -92,7 +91,7 @@ class DrivingRobot {
     log_.add({kind, robot_.number, number, *sent_bytes_, monotonic_ns()});
   }
 
-  const Options& options_;
+  const RobotsOptions& options_;
   const FleetLap& lap_;
   const DeedLog& log_;
   Stop& stop_;
@@ -102,7 +101,7 @@ class DrivingRobot {
   std::thread thread_;
 };
 
-void run(const Options& options) {
+void run(const RobotsOptions& options) {
   ops::block_stop_signals();
   const FleetLap lap(options.folder + "/lap.bin");
   const DeedLog log(options.folder + "/deeds");
@@ -119,7 +118,7 @@ void run(const Options& options) {
 }  // namespace
 
 Run declare_fleet_robots(CLI::App& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RobotsOptions>();
   app.add_option("--folder", options->folder, "folder of the fleet: lap.bin, deeds, spools")->required();
   app.add_option("--lcm", options->lcm, "LCM URL")->required();
   app.add_option("--first", options->first, "number of the first of these robots");

@@ -7,12 +7,11 @@
 #include "proto/base/crc32c.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
+#include "tools/bench/stopwatch.h"
 
 namespace relmap::bench {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kBreath{2};
 constexpr std::uint32_t kWindow = 64;      // keyframes that the daemon takes ahead of what it has settled
