@@ -48,14 +48,17 @@ function(relmap_apart)
 endfunction()
 
 # Much of the time to compile a file goes into the headers of others, so the commonest are compiled once:
-#   relmap_precompiled       the standard library and Eigen
-#   relmap_precompiled_test  and GoogleTest, for tests; they are compiled with -O1, for what they measure is in the libraries
+#   relmap_precompiled           the standard library and Eigen
+#   relmap_precompiled_terminal  the same for command lines, which are compiled with -O1: what they ask for is done elsewhere,
+#                                and CLI11 takes GCC half as long again with -O3 (GCC obeys the -O of the precompiled headers)
+#   relmap_precompiled_test      and GoogleTest, for tests; they are compiled with -O1, for what they measure is in the
+#                                libraries
 # (CLI11 is better left out: it has objects that each file which sees them must build.) The headers are named, not
 # gathered in a file of our own, so that the compiler cache serves every checkout. CMAKE_DISABLE_PRECOMPILE_HEADERS=ON
 # builds without; tools/fuzz does, and so finds an #include that is missing.
-set(RELMAP_TEST_OPTIONS "")
+set(RELMAP_QUICK_OPTIONS "")
 if(CMAKE_BUILD_TYPE STREQUAL "RelWithDebInfo")
-  set(RELMAP_TEST_OPTIONS -O1)
+  set(RELMAP_QUICK_OPTIONS -O1)
 endif()
 function(relmap_precompile name)
   cmake_parse_arguments(arg "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
@@ -69,10 +72,17 @@ function(relmap_precompile name)
     <unordered_map> <unordered_set> <variant> <vector> <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> ${arg_HEADERS})
 endfunction()
 relmap_precompile(relmap_precompiled)
+relmap_precompile(relmap_precompiled_terminal OPTIONS ${RELMAP_QUICK_OPTIONS})
 relmap_precompile(relmap_precompiled_test LINK GTest::gmock HEADERS <gmock/gmock.h> <gtest/gtest.h>
-                  OPTIONS ${RELMAP_TEST_OPTIONS})
+                  OPTIONS ${RELMAP_QUICK_OPTIONS})
+# In a folder of command lines: set(RELMAP_COMMAND_LINE ON)
 function(relmap_precompiled_headers name)
-  target_precompile_headers(${name} REUSE_FROM relmap_precompiled)
+  if(RELMAP_COMMAND_LINE)
+    target_compile_options(${name} PRIVATE ${RELMAP_QUICK_OPTIONS})
+    target_precompile_headers(${name} REUSE_FROM relmap_precompiled_terminal)
+  else()
+    target_precompile_headers(${name} REUSE_FROM relmap_precompiled)
+  endif()
 endfunction()
 
 # relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s] [ALONE])
@@ -98,7 +108,7 @@ function(relmap_test name)
   endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINK} relmap_flags GTest::gtest GTest::gmock GTest::gtest_main)
-  target_compile_options(${name} PRIVATE ${RELMAP_TEST_OPTIONS})
+  target_compile_options(${name} PRIVATE ${RELMAP_QUICK_OPTIONS})
   target_precompile_headers(${name} REUSE_FROM relmap_precompiled_test)
   target_include_directories(${name} PRIVATE ${CMAKE_BINARY_DIR}/generated)  # tests/paths.h
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
