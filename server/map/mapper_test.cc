@@ -128,7 +128,7 @@ TEST(Mapper, TheFirstWatcherIsToldOfAllEditsSinceTheMapWasOpened) {
   EXPECT_TRUE(told.empty()) << "only the first";
 }
 
-TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
+TEST(DeterministicMapper, GivesTheSameMapFromTheSameInput) {
   sim::PointsWorldOptions world_options = small_world(66);
   world_options.births = 30;
   world_options.appearance = 150;
@@ -403,7 +403,7 @@ TEST(Mapper, WhileCommitsFailIntakeIsLimitedToWhatFitsInMemory) {
   EXPECT_TRUE(mapper->stop().ok());
 }
 
-TEST(Mapper, DeterministicModeGivesTheSameMapDespiteDiskFailures) {
+TEST(DeterministicMapper, GivesTheSameMapDespiteDiskFailures) {
   sim::PointsWorldOptions world_options = small_world(66);
   world_options.births = 30;
   world_options.appearance = 150;
@@ -438,7 +438,7 @@ TEST(Mapper, DeterministicModeGivesTheSameMapDespiteDiskFailures) {
   EXPECT_EQ(maps[0], maps[1]);
 }
 
-TEST(Mapper, DeterministicModeGivesTheSameMapDespiteStopsWithAFullQueue) {
+TEST(DeterministicMapper, GivesTheSameMapDespiteStopsWithAFullQueue) {
   sim::PointsWorldOptions world_options = small_world(66);
   world_options.births = 30;
   world_options.appearance = 150;

@@ -46,7 +46,7 @@ void expect_as_dijkstra(const RouteIndex::Snapshot& map, std::size_t metric, Fra
   }
 }
 
-TEST(RouteIndex, KeepsUpWithTheMap) {
+TEST(RouteIndexUpdates, KeepsUpWithTheMap) {
   LiveTown town;
   town.drive(200);
   const auto index = town.index();
@@ -72,7 +72,7 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
   EXPECT_GT(town.budget().used(storage::Share::kRoutes), 0u);
 }
 
-TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
+TEST(RouteIndexUpdates, KeepsUpWithASessionThatIsDeleted) {
   LiveTown town;
   town.drive(1000);
   const auto index = town.index();
