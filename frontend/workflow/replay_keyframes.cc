@@ -1,5 +1,3 @@
-#include "frontend/workflow/replay_keyframes.h"
-
 #include <string>
 #include <utility>
 
@@ -7,6 +5,7 @@
 #include "frontend/capture/recording_identity.h"
 #include "frontend/workflow/delivery.h"
 #include "frontend/workflow/input.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 

@@ -1,5 +1,3 @@
-#include "frontend/workflow/replay_keyframes.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,6 +12,7 @@
 #include "frontend/capture/keyframe_file.h"
 #include "frontend/console.h"
 #include "frontend/workflow/testing/workflow_fixture.h"
+#include "frontend/workflow/workflows.h"
 #include "proto/keyframe/keyframe_samples.h"
 
 namespace relmap::workflow {

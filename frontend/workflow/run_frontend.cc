@@ -4,10 +4,7 @@
 
 #include "frontend/workflow/input.h"
 #include "frontend/workflow/output_paths.h"
-#include "frontend/workflow/replay_keyframes.h"
-#include "frontend/workflow/take_photographs.h"
-#include "frontend/workflow/track_camera.h"
-#include "frontend/workflow/track_recording.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 

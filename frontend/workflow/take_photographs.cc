@@ -1,5 +1,3 @@
-#include "frontend/workflow/take_photographs.h"
-
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -13,6 +11,7 @@
 #include "frontend/workflow/input.h"
 #include "frontend/workflow/pair_counts.h"
 #include "frontend/workflow/pair_reader.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 

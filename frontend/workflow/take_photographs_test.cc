@@ -1,5 +1,3 @@
-#include "frontend/workflow/take_photographs.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 #include "frontend/capture/testing/picture_files.h"
 #include "frontend/console.h"
 #include "frontend/workflow/testing/workflow_fixture.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 namespace {

@@ -1,5 +1,3 @@
-#include "frontend/workflow/track_camera.h"
-
 #include <cstdio>
 #include <memory>
 #include <thread>
@@ -9,6 +7,7 @@
 #include "frontend/rig_watch.h"
 #include "frontend/workflow/rig_findings.h"
 #include "frontend/workflow/track_pairs.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 

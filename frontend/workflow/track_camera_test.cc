@@ -1,5 +1,3 @@
-#include "frontend/workflow/track_camera.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "frontend/workflow/testing/workflow_fixture.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 namespace {

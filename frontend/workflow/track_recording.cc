@@ -1,11 +1,10 @@
-#include "frontend/workflow/track_recording.h"
-
 #include "frontend/capture/first_pairs.h"
 #include "frontend/capture/recording_identity.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/workflow/input.h"
 #include "frontend/workflow/rig_findings.h"
 #include "frontend/workflow/track_pairs.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 

@@ -1,5 +1,3 @@
-#include "frontend/workflow/track_recording.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +10,7 @@
 
 #include "frontend/console.h"
 #include "frontend/workflow/testing/workflow_fixture.h"
+#include "frontend/workflow/workflows.h"
 
 namespace relmap::workflow {
 namespace {

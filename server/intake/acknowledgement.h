@@ -28,7 +28,11 @@ class AcknowledgementSchedule {
 
   SteadyTime last_heard() const { return heard_; }
   // When the next acknowledgement is due; SteadyTime::max() if not before the robot sends something.
-  SteadyTime due(bool imperfect) const;
+  SteadyTime due(bool imperfect) const {
+    if (news_) return sent_ + times_.spacing;
+    const SteadyTime next = sent_ + (imperfect ? times_.imperfect : times_.regular);
+    return next <= heard_ + times_.active ? next : SteadyTime::max();
+  }
 
  private:
   AcknowledgementTimes times_;

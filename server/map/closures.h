@@ -38,9 +38,9 @@ ClosureChange apply_proposal(storage::EditableGraph& map, std::uint64_t sequence
 // Adds bindings of an accepted closure in one more frame. Changes nothing if the closure is not accepted.
 ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record);
 
-// Adds to `frames` all frames with an observation that stands for another landmark, comes into force or goes out of
-// force, by bindings of `closure`, when closures are in force as `holds` says. `known` holds the landmarks examined so
-// far.
+// Adds to `frames` every frame with an observation whose landmark or validity changes through bindings of `closure`, if
+// exactly the closures for which `holds` returns true are in force. `known` holds the landmarks that have been
+// examined, and grows.
 void add_bound(const storage::Graph& graph, const storage::Edge& closure, const std::function<bool(ClosureId)>& holds,
                std::set<LandmarkId>& known, std::set<FrameId>& frames);
 

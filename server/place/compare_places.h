@@ -7,7 +7,7 @@
 
 namespace relmap::place {
 
-// The least number of groups of places among which common features can be told from distinctive ones. With fewer
+// The minimum number of groups of places among which common features can be told from distinctive ones. With fewer
 // groups, words alone decide.
 inline constexpr std::uint32_t kMinGroups = 4;
 

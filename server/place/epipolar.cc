@@ -16,7 +16,7 @@ namespace {
 constexpr double kGatePixels = 2;
 constexpr double kConfidence = 0.999;
 constexpr double kOnePlane = 0.9;     // share of a fundamental matrix's inliers from which a homography is preferred
-constexpr std::size_t kToBegin = 12;  // least number of inliers with which features are matched again near by
+constexpr std::size_t kToBegin = 12;  // minimum number of inliers with which features are matched again near by
 constexpr double kNear = 0.04;        // search radius, as a share of the width over which the query's features lie
 constexpr std::size_t kAround = 3;    // nearest inliers that predict the position of a feature
 constexpr double kTogether = 5;       // pixels: inliers closer than this have about the same weight

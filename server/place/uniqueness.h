@@ -38,9 +38,9 @@ using ComparePlace = std::function<Changes(const VerifiedPlace& place)>;
 // confirms none of these.
 //
 // Trials at the place of the best (place_ranges()) are no rivals. Neither is a trial at a place that no edges join to
-// the best but that is the same place: the best is confirmed from there with at least half of its inliers and at the
-// same pose, and next to nothing differs. Mono sessions have no metric poses, so only the same photographs tell that
-// two of them show the same place.
+// the best, if it is the same place. That holds if the best is confirmed from there with at least half of its inliers
+// and at the same pose, and hardly any cell differs. Mono sessions have no metric poses, so only the same photographs
+// tell that two of them show the same place.
 //
 // `differs` is measured if the best has a metric pose. If `compare` is given, it is called for the best and for each
 // rival that would make the best ambiguous; a rival that it tells apart (told_apart()) is dismissed.

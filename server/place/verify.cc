@@ -1,6 +1,7 @@
 #include "server/place/verify.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <iterator>
 #include <numbers>
@@ -17,7 +18,6 @@
 #include "server/place/epipolar.h"
 #include "server/place/map_points.h"
 #include "server/place/place_neighbours.h"
-#include "server/place/spread.h"
 
 namespace relmap::place {
 namespace {
@@ -31,6 +31,20 @@ constexpr std::size_t kGrown = 2 * kMinToGrow;
 // An unknown lens adapts to chance matches: 26 to 37 inliers agreed on poses up to a metre off.
 constexpr int kMinOfUnknownLens = 2 * kMinInliers;
 constexpr int kMinOfAView = 16;  // inliers in a frame of a mono session; fewer agree by chance
+
+// The share (0..1) of the picture's 16 x 12 cells that hold at least one of the features whose indices are in `chosen`.
+double picture_spread(std::span<const AppearanceFeature> features, std::span<const std::uint32_t> chosen,
+                      const StereoCamera& camera) {
+  constexpr int kColumns = 16, kRows = 12;
+  std::bitset<kColumns * kRows> covered;
+  for (const std::uint32_t i : chosen) {
+    const double u = (double{features[i].u} + 0.5) / camera.width, v = (double{features[i].v} + 0.5) / camera.height;
+    const int column = std::clamp(static_cast<int>(u * kColumns), 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>(v * kRows), 0, kRows - 1);
+    covered.set(static_cast<std::size_t>(row * kColumns + column));
+  }
+  return static_cast<double>(covered.count()) / (kColumns * kRows);
+}
 
 Status poor_spread(const VerifiedPlace& place) {
   return {Reason::POOR_SPREAD,

@@ -92,8 +92,8 @@ class Region {
   std::vector<std::int32_t> active_frames_;
   std::vector<char> free_;  // by local landmark
   std::vector<std::int32_t> free_landmarks_;
-  std::size_t loaded_landmarks_ = 0;  // the first so many of free_landmarks_ have their observers loaded
-  std::size_t loaded_around_ = 0;     // the first so many of active_frames_ have the frames next to them loaded
+  std::size_t loaded_landmarks_ = 0;  // number of leading entries of free_landmarks_ whose observers are loaded
+  std::size_t loaded_around_ = 0;     // number of leading entries of active_frames_ whose neighbours are loaded
 
   // Local observations sorted by landmark, and observed landmarks sorted by base.
   std::vector<std::int32_t> first_of_landmark_, by_landmark_;

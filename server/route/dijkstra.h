@@ -7,10 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "server/route/carried.h"
 #include "server/route/passage.h"
+#include "server/route/stretches.h"
 #include "server/route/trail.h"
-#include "server/route/unmeasured.h"
 #include "server/route/weight.h"
 #include "server/route/work_limit.h"
 #include "storage/graph/compounded_chain.h"

@@ -15,7 +15,7 @@ namespace relmap::route {
 struct RouteFilter {
   std::set<SessionNumber> sessions;     // sessions whose frames may be passed; empty means all
   std::unordered_set<FrameId> avoided;  // frames that may not be passed
-  std::uint32_t min_support = 0;        // least support of an edge in force, in observations
+  std::uint32_t min_support = 0;        // minimum support of an edge in force, in observations
   bool long_loops = true;               // whether loop edges longer than kLongLoopMetres may be used
   storage::Supposed supposed;           // closures that are taken to be edges, too
 

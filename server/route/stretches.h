@@ -1,8 +1,10 @@
-// The stretches of a path that follow edges of one kind.
+// The stretches of a path along which the robot was carried, as by a lift or a train (Edge::carried_by), and those that
+// no sensor measured (is_unmeasured()), where length and course are guesses.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "storage/graph/frame.h"
@@ -36,6 +38,43 @@ class Stretches {
 
  private:
   std::vector<Stretch> list_;
+};
+
+// Consecutive frames of one session, in the order in which it drove.
+struct CarriedStretch {
+  FrameId first, last;
+  std::vector<EdgeId> closures = {};  // the closures that show it: ascending, at most kMaxNamed
+
+  static constexpr std::size_t kMaxNamed = 16;
+  bool operator==(const CarriedStretch&) const = default;
+};
+
+class CarriedStretches : public Stretches<CarriedStretch> {
+ public:
+  void add(const storage::Edge& edge) { add(edge.a, edge.b, edge.carried_by); }
+  void add(FrameId a, FrameId b, const std::vector<EdgeId>& carried_by);
+};
+
+// Consecutive frames of one session, in the order in which it drove.
+struct UnmeasuredStretch {
+  FrameId first, last;
+  std::uint32_t steps = 0;
+  double distance_m = 0;
+
+  bool operator==(const UnmeasuredStretch&) const = default;
+};
+
+class UnmeasuredStretches : public Stretches<UnmeasuredStretch> {
+ public:
+  // Adds an edge of the path, of any kind.
+  void add(const storage::Edge& edge);
+  // Totals over all stretches, including those for which list() has no room.
+  std::uint32_t steps() const { return steps_; }
+  double distance_m() const { return distance_m_; }
+
+ private:
+  std::uint32_t steps_ = 0;
+  double distance_m_ = 0;
 };
 
 }  // namespace relmap::route

@@ -1,8 +1,7 @@
 // Computes the transform between two frames along the map's path between them.
 #pragma once
 
-#include "server/route/carried.h"
-#include "server/route/unmeasured.h"
+#include "server/route/stretches.h"
 #include "server/route/work_limit.h"
 #include "storage/graph/graph.h"
 

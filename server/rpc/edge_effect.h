@@ -5,7 +5,7 @@
 
 #include "relmap/v1/map.pb.h"
 #include "server/map/edge_changes.h"
-#include "server/route/carried.h"
+#include "server/route/stretches.h"
 
 namespace relmap::rpc {
 

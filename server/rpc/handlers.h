@@ -68,7 +68,7 @@ Result<v1::LocaliseReply> localise(const v1::LocaliseRequest& request, const Dea
 Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, const Deadline& deadline,
                                         map::Mapper& mapper);
 
-// Needs that reserve too if an end is a view.
+// Needs the pictures' reserve (Lane::kPictures) if an end is a view.
 Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& request, const Deadline& deadline,
                                                 map::Mapper& mapper, Routes& routes, const RpcLimits& limits);
 bool needs_picture(const v1::FindRouteRequest& request);
@@ -86,7 +86,7 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
                                       map::Mapper& mapper, ViewKeeper& views, const RpcLimits& limits);
 Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& request, const Deadline& deadline,
                                              map::Mapper& mapper, EditLog& edits, const RpcLimits& limits);
-// Needs that reserve, too.
+// Needs the pictures' reserve (Lane::kPictures).
 Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request, const Deadline& deadline,
                                           map::Mapper& mapper, EditLog& edits, const RpcLimits& limits);
 Result<v1::SetLabelReply> set_label(const v1::SetLabelRequest& request, const Deadline& deadline, map::Mapper& mapper,

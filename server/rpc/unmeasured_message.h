@@ -3,7 +3,7 @@
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
-#include "server/route/unmeasured.h"
+#include "server/route/stretches.h"
 
 namespace relmap::rpc {
 

@@ -137,8 +137,8 @@ inline bool is_guessed(const Edge& edge) {
 // Whether the motion is a guess and too few landmarks have been seen from both sides since to support the edge.
 inline bool is_unmeasured(const Edge& edge) { return is_guessed(edge) && edge.support < kMinSupport; }
 
-// Stands in place of a closure for what was known by way of a session that has been deleted (server/map/deletion.h). It
-// always holds.
+// The closure of claims and observations whose own closure was deleted with its session (server/map/deletion.h). It is
+// always in force.
 inline constexpr ClosureId kFromDeletedSession{{}, 1};
 
 // A closure's claim that landmark `self`, with which the claim is stored, is the same point as `target`. With an

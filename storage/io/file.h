@@ -62,8 +62,8 @@ std::shared_ptr<FileSystem> posix_file_system(bool sync = true);
 
 // The folder that contains the file or folder `path`; "." for a name without a folder.
 std::string folder_of(const std::string& path);
-// Creates the folder if it is missing and makes its name durable, even where a process that was killed had created it
-// and not synced it. The parent folder must exist.
+// Creates the folder if it is missing, and syncs its parent in any case: a process that was killed may have created the
+// folder without syncing its name. The parent folder must exist.
 Status create_durable_directory(FileSystem& files, const std::string& path);
 // The same for all folders of `path` that are missing, the outermost first.
 Status create_durable_directories(FileSystem& files, const std::string& path);

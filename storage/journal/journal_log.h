@@ -1,6 +1,6 @@
 // The journal as files: append-only segments, journal-SEQUENCE-SALT.log (docs/storage-format.md). A record is durable
-// when append() has returned. Each record carries the highest sequence that was durable before it, so that after a
-// crash a damaged tail, which nobody was told of, can be told from lost records, which somebody was told of.
+// when append() has returned. Each record carries the highest sequence that was durable before it. Recovery uses it to
+// distinguish a torn tail that was never acknowledged, which is dropped, from lost acknowledged records (DATA_LOSS).
 #pragma once
 
 #include <cstdint>

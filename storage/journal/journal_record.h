@@ -85,7 +85,7 @@ struct SetEdgeStateRecord {
   // it had never been proposed. False removes those that agree with it too.
   bool alone = false;
   // With kRemoved: a mark of what would have been removed when the operator looked (removal_mark(),
-  // server/map/edge_edit.h). Nothing is removed where that has changed since. 0: no such condition.
+  // server/map/edge_edit.h). If the present mark differs, the edit removes nothing. 0: the mark is not checked.
   std::uint64_t shown = 0;
   Extensions unknown = {};  // from a later version, kept unchanged
 };

@@ -1,6 +1,6 @@
-// Accounts for the bytes that only old views hold. A part that was visible in versions [created, retired) is held, from
-// then on, by those of these views that are still alive; its bytes are charged to Share::kViews until the last of them
-// is gone. When the share exceeds its allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED.
+// Accounts for the bytes that only old views hold. When a part is replaced, each view that can still see it (versions
+// [created, retired)) keeps it. Its bytes are charged to Share::kViews until the last of these views is released. When
+// the share exceeds its allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED.
 #pragma once
 
 #include <atomic>

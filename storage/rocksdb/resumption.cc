@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "storage/rocksdb/rocksdb_property.h"
+#include "storage/rocksdb/rocksdb_maintenance.h"
 
 namespace relmap::storage {
 namespace {

@@ -19,7 +19,6 @@
 #include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/resumption.h"
 #include "storage/rocksdb/rocksdb_maintenance.h"
-#include "storage/rocksdb/rocksdb_property.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/rocksdb_status.h"
 #include "storage/rocksdb/root.h"

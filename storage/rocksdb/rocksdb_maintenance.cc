@@ -9,7 +9,6 @@
 #include <map>
 
 #include "storage/io/copy_file.h"
-#include "storage/rocksdb/rocksdb_property.h"
 #include "storage/rocksdb/rocksdb_status.h"
 
 namespace relmap::storage {

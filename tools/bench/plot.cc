@@ -33,8 +33,8 @@ class Axis {
     low_ = std::min(low_, value);
     high_ = std::max(high_, value);
   }
-  // The range, rounded outwards.
-  void settle() {
+  // Rounds the range to whole ticks.
+  void round_outwards() {
     if (low_ > high_) low_ = 1, high_ = 2;
     if (log_) {
       low_ = std::pow(10, std::floor(std::log10(low_) + 1e-9));
@@ -82,8 +82,8 @@ void save_plot(const Plot& plot, const std::string& path) {
     for (const double value : curve.x) x.include(value);
     for (const double value : curve.y) y.include(value);
   }
-  x.settle();
-  y.settle();
+  x.round_outwards();
+  y.round_outwards();
 
   const auto page = path.ends_with(".png") ? client::make_png_drawing(kWidth, kHeight, kPaper, 2)
                                            : client::make_svg_drawing(kWidth, kHeight, kPaper);

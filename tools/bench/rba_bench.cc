@@ -3,11 +3,7 @@
 #include <memory>
 
 #include "server/rba/rba.h"
-#include "tools/bench/rba_edges.h"
-#include "tools/bench/rba_euclidean.h"
-#include "tools/bench/rba_figure8.h"
-#include "tools/bench/rba_lift.h"
-#include "tools/bench/rba_scale.h"
+#include "tools/bench/rba_scenarios.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {

@@ -1,8 +1,7 @@
-#include "tools/bench/rba_edges.h"
-
 #include "tests/support/simulated_drive.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
+#include "tools/bench/rba_scenarios.h"
 
 namespace relmap::bench {
 

@@ -1,5 +1,3 @@
-#include "tools/bench/rba_euclidean.h"
-
 #include <algorithm>
 #include <chrono>
 #include <fstream>
@@ -14,6 +12,7 @@
 #include "tools/bench/euclidean_ba.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
+#include "tools/bench/rba_scenarios.h"
 #include "tools/bench/recorded_drive.h"
 
 namespace relmap::bench {

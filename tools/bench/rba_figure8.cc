@@ -1,5 +1,3 @@
-#include "tools/bench/rba_figure8.h"
-
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -13,6 +11,7 @@
 #include "tools/bench/euclidean_ba.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
+#include "tools/bench/rba_scenarios.h"
 
 namespace relmap::bench {
 

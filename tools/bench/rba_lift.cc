@@ -1,5 +1,3 @@
-#include "tools/bench/rba_lift.h"
-
 #include <cmath>
 #include <map>
 #include <optional>
@@ -10,6 +8,7 @@
 #include "client/relaxation.h"
 #include "tests/support/simulated_drive.h"
 #include "tools/bench/plot.h"
+#include "tools/bench/rba_scenarios.h"
 #include "tools/bench/recorded_drive.h"
 #include "tools/bench/transforms.h"
 

@@ -1,5 +1,3 @@
-#include "tools/bench/rba_scale.h"
-
 #include <chrono>
 #include <filesystem>
 #include <optional>
@@ -10,6 +8,7 @@
 #include "tests/support/simulated_drive.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
+#include "tools/bench/rba_scenarios.h"
 
 namespace relmap::bench {
 

@@ -472,13 +472,13 @@ void run_fleet(const RoutesOptions& options, Report& report) {
   stored.map->watch_edits(
       [&](std::uint64_t version, std::span<const storage::ChunkId> chunks) { index.changed(version, chunks); });
   index.start();
-  const auto settle = [&] {
+  const auto wait_for_cells = [&] {
     if (!index.wait_current(Clock::now() + std::chrono::hours(1)) || !index.snapshot().overlay)
       throw std::runtime_error("no cells: " + index.snapshot().missing_because);
   };
-  settle();
+  wait_for_cells();
   for (int i = 0; i < 5; ++i) beside_s.push_back(burst_s());
-  settle();
+  wait_for_cells();
 
   // Routes are asked for at intervals, first while nothing arrives, then with twenty keyframes a second and new cells.
   const auto ask_now_and_then = [&](Asked& asked, const auto& look_at) {

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "frontend/publishing/publisher.h"
 #include "proto/base/mutex.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
@@ -48,6 +49,14 @@ void LcmTransport::listen(Listener listener) {
 void LcmTransport::stop() {
   if (link_) link_->stop();
   listen({});
+}
+
+Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, SessionHeader header) {
+  const Result<std::string> url = complete_lcm_url(options.lcm_url);
+  if (!url.ok()) return url.status();
+  Result<std::unique_ptr<LcmTransport>> transport = LcmTransport::open(*url);
+  if (!transport.ok()) return transport.status();
+  return start(std::move(options), std::move(header), std::move(*transport));
 }
 
 }  // namespace relmap::publishing

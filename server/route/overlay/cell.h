@@ -1,6 +1,6 @@
-// A cell is a part of the map as a search sees it that passes through: its border frames, at which it can be entered or
-// left, the edges that lead out of it, and the costs of the cheapest paths between border frames within it (Delling,
-// Goldberg, Pajor and Werneck, "Customizable route planning", SEA 2011).
+// A cell stands for a part of the map in searches that pass through it. It holds its border frames, at which it can be
+// entered or left, the edges that lead out of it, and the costs of the cheapest paths between border frames within it
+// (Delling, Goldberg, Pajor and Werneck, "Customizable route planning", SEA 2011).
 #pragma once
 
 #include <algorithm>
@@ -77,16 +77,16 @@ struct CellFacts {
   bool joined = false;
   // Extremes over the edges between two of its frames, which a filter (passage.h) may refuse.
   std::uint32_t min_support = std::numeric_limits<std::uint32_t>::max();
-  double longest_loop_m = 0;
+  double max_loop_m = 0;
 
   void take_in(const Link& inner) {
     min_support = std::min(min_support, inner.support);
-    if (inner.loop) longest_loop_m = std::max(longest_loop_m, inner.metres);
+    if (inner.loop) max_loop_m = std::max(max_loop_m, inner.metres);
   }
   void take_in(const CellFacts& part) {
     oneway |= part.oneway;
     min_support = std::min(min_support, part.min_support);
-    longest_loop_m = std::max(longest_loop_m, part.longest_loop_m);
+    max_loop_m = std::max(max_loop_m, part.max_loop_m);
   }
   bool operator==(const CellFacts&) const = default;
 };

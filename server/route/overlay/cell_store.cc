@@ -360,7 +360,7 @@ void CellStore::put(ByteWriter& w, const StoredCell& cell) const {
   w.put(cell.facts_.oneway);
   w.put(cell.facts_.joined);
   w.put(cell.facts_.min_support);
-  w.put(cell.facts_.longest_loop_m);
+  w.put(cell.facts_.max_loop_m);
 }
 
 std::shared_ptr<const StoredCell> CellStore::get(ByteReader& r) {
@@ -372,7 +372,7 @@ std::shared_ptr<const StoredCell> CellStore::get(ByteReader& r) {
   cell->facts_.oneway = r.get<std::uint8_t>() != 0;
   cell->facts_.joined = r.get<std::uint8_t>() != 0;
   cell->facts_.min_support = r.get<std::uint32_t>();
-  cell->facts_.longest_loop_m = r.get<double>();
+  cell->facts_.max_loop_m = r.get<double>();
   const MutexLock lock(impl_->mutex);
   if (!r.ok() || bytes == 0 || bytes > impl_->file_end || offset > impl_->file_end - bytes ||
       cell->nodes_ > (1u << 20) || cell->metrics_ > 1000 || bytes != cell->matrix_offset(cell->metrics_, false) ||

@@ -382,7 +382,7 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
       open.pop_back();
       const StoredCell* cell = overlay.cell(number);
       if (cell && cell->facts().min_support >= filter.min_support &&
-          (filter.long_loops || cell->facts().longest_loop_m <= kLongLoopMetres))
+          (filter.long_loops || cell->facts().max_loop_m <= kLongLoopMetres))
         continue;
       if (cell) cells.push_back(number);  // the refused edge may be in a part of it or between two parts
       const auto& children = tree.node(number).children;

@@ -1,9 +1,10 @@
-#include "server/route/carried.h"
+#include "server/route/stretches.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "server/route/dijkstra.h"
+#include "server/route/neighbourhood.h"
 #include "server/route/testing/drawn_map.h"
 #include "server/route/transform.h"
 
@@ -79,6 +80,88 @@ TEST(CarriedStretches, KeepsNoMoreThanAnAnswerHolds) {
   ASSERT_EQ(ride.list().size(), 1u);
   EXPECT_EQ(ride.list().front().last, (FrameId{1, 100}));
   EXPECT_EQ(ride.list().front().closures.size(), CarriedStretch::kMaxNamed);
+}
+
+// A robot that saw nothing from B to D.
+class Unmeasured : public testing::Test {
+ protected:
+  Unmeasured()
+      : map_(R"(
+    E-----D
+          |
+          C
+          |
+    A-----B
+  )") {
+    map_.drive("ABCDE");
+    step_to('C').source = step_to('D').source = MotionSource::kUnsensed;
+  }
+
+  storage::Edge& step_to(char frame) { return map_.editable(map_.id(frame)).edges.front(); }
+  UnmeasuredStretches on_route(char from, char to) const {
+    const FrameId start[] = {map_.id(from)}, goal[] = {map_.id(to)};
+    return find_route(map_, start, goal).or_throw().unmeasured;
+  }
+
+  DrawnMap map_;
+};
+
+TEST_F(Unmeasured, ARouteListsUnmeasuredStretchesInEitherDirection) {
+  const UnmeasuredStretch dark{map_.id('B'), map_.id('D'), 2, 4};
+  EXPECT_THAT(on_route('A', 'E').list(), ElementsAre(dark));
+  EXPECT_THAT(on_route('E', 'A').list(), ElementsAre(dark));
+  EXPECT_EQ(on_route('E', 'A').steps(), 2u);
+  EXPECT_EQ(on_route('E', 'A').distance_m(), 4);
+  EXPECT_THAT(on_route('C', 'E').list(), ElementsAre(UnmeasuredStretch{map_.id('C'), map_.id('D'), 1, 2}));
+  EXPECT_THAT(on_route('A', 'B').list(), IsEmpty());
+  EXPECT_EQ(on_route('A', 'B').steps(), 0u);
+}
+
+TEST_F(Unmeasured, LandmarksSeenFromBothSidesMeasureAStep) {
+  step_to('C').support = storage::kMinSupport;
+  EXPECT_THAT(on_route('A', 'E').list(), ElementsAre(UnmeasuredStretch{map_.id('C'), map_.id('D'), 1, 2}));
+}
+
+TEST_F(Unmeasured, EachStepTellsWhetherItIsUnmeasured) {
+  const FrameId start[] = {map_.id('A')}, goal[] = {map_.id('E')};
+  const Route route = find_route(map_, start, goal).or_throw();
+  std::string guessed;
+  for (RouteWalk walk(map_, route); const auto step = walk.next();)
+    if (step->unmeasured) guessed += map_.name(step->frame);
+  EXPECT_EQ(guessed, "BC") << "on the way on from there";
+}
+
+TEST_F(Unmeasured, ATransformListsUnmeasuredStretches) {
+  const UnmeasuredStretch dark{map_.id('B'), map_.id('D'), 2, 4};
+  for (const auto& [a, b] : {std::pair{'A', 'E'}, {'E', 'A'}}) {
+    const Transform found = transform_between(map_, map_.id(a), map_.id(b)).or_throw();
+    EXPECT_THAT(found.unmeasured.list(), ElementsAre(dark));
+    EXPECT_EQ(found.unmeasured.distance_m(), 4);
+  }
+  EXPECT_EQ(transform_between(map_, map_.id('D'), map_.id('E')).or_throw().unmeasured.steps(), 0u);
+}
+
+TEST_F(Unmeasured, ANeighbourhoodCountsUnmeasuredStepsOfEachFrame) {
+  std::string steps;
+  const Neighbourhood around = neighbourhood(map_, map_.id('A'), {}, {}).or_throw();
+  for (const NeighbourhoodFrame& frame : around.frames)
+    steps += map_.name(frame.frame) + std::to_string(frame.unmeasured_steps);
+  EXPECT_EQ(steps, "A0B0C1D2E2");
+}
+
+TEST(UnmeasuredStretches, CountsStretchesForWhichTheListHasNoRoom) {
+  UnmeasuredStretches stretches;
+  storage::Edge gap;
+  gap.kind = storage::EdgeKind::kPrior;
+  gap.T_ab.t = {0, 0, 2};
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    gap.a = {1, 10 * i};
+    gap.b = {1, 10 * i + 1};
+    stretches.add(gap);
+  }
+  EXPECT_EQ(stretches.list().size(), UnmeasuredStretches::kMax);
+  EXPECT_EQ(stretches.steps(), 1000u);
+  EXPECT_EQ(stretches.distance_m(), 2000);
 }
 
 }  // namespace
