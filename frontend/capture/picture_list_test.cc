@@ -30,7 +30,7 @@ TEST(PictureList, RefusesByNameAndLine) {
   EXPECT_EQ(parse_picture_list("1 a\n\n0 b\n", TimeUnit::kSeconds, "").status().message().substr(0, 6), "line 3");
 }
 
-TEST(PairByTime, LeavesAloneWhatHasNoOther) {
+TEST(PairByTime, LeavesPicturesWithoutAPartnerAlone) {
   const auto timed = pair_by_time({{"l1", 10'000}, {"l2", 60'000}, {"l3", 110'000}, {"l4", 160'000}},
                                   {{"r0", 5'000}, {"r1", 11'000}, {"r3", 109'000}, {"r4", 161'001}});
   ASSERT_EQ(timed.pairs.size(), 2u);

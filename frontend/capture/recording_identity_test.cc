@@ -156,7 +156,7 @@ TEST_F(KeyframeFileIdentityTest, TellsKeyframesAndWhoseTheyAre) {
   EXPECT_NE(otherwise.recording.contents, whole.recording.contents) << "as long, and driven elsewhere";
 }
 
-TEST_F(KeyframeFileIdentityTest, IsOfWhatIsWhole) {
+TEST_F(KeyframeFileIdentityTest, ATruncatedFileHasTheIdentityOfItsWholeKeyframes) {
   const std::string path = write("a", 0, 5);
   fs::resize_file(path, fs::file_size(path) - 3);
   EXPECT_EQ(identity_of_keyframes(path)->recording, identity_of_keyframes(write("b", 0, 4))->recording);

@@ -15,7 +15,7 @@ TEST(Utf8, IsTakenCodePointByCodePoint) {
   EXPECT_TRUE(is_utf8(""));
 }
 
-TEST(Utf8, WhatIsMalformedIsNoneWhereverItStands) {
+TEST(Utf8, MalformedBytesAreRefusedAnywhereInAText) {
   for (const std::string bad :
        {"\x80", "\xc3", "\xc0\xaf", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xff"}) {
     EXPECT_FALSE(is_utf8(bad));

@@ -468,7 +468,7 @@ TEST_F(IntakeTest, SilentSessionsMakeRoomForOthers) {
   EXPECT_GT(part_refused(Reason::BUDGET_EXCEEDED), 0u);
 }
 
-TEST_F(IntakeTest, WholePayloadsTakeTheSameWay) {
+TEST_F(IntakeTest, WholePayloadsAreCheckedAndAcknowledgedLikePartsOfThem) {
   const Bytes payload = encode_keyframe(keyframe(0));
   intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_);
   intake_->take_payload(uuid_, 1, crc32c(payload) ^ 1, payload, now_);

@@ -46,7 +46,7 @@ TEST(Iidc1394FrameRing, SlotsComeBackInAnyOrder) {
   EXPECT_FALSE(filler->take());
 }
 
-TEST(Iidc1394FrameRing, WhatIsLentOrIsNotThereIsNotLent) {
+TEST(Iidc1394FrameRing, ASlotThatIsLentOrDoesNotExistIsNotLent) {
   const auto ring = FrameRing::make(3, 10).or_throw();
   EXPECT_FALSE(ring->lend(3));
   EXPECT_FALSE(ring->lend(0xffff'ffff));
