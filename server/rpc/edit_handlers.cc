@@ -4,7 +4,7 @@
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
-#include "server/map/label_edit.h"
+#include "server/map/operator_edit.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/write_and_wait.h"
@@ -49,16 +49,9 @@ Result<v1::FreezeSessionReply> freeze_session(const v1::FreezeSessionRequest& re
   const Status status = write_and_wait(
       mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,
       [&]() -> Result<storage::JournalRecord> {
-        const auto session = mapper.view()->session(request.session());
-        if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
-        if (storage::is_going(*session))
-          return {Reason::SESSION_DELETED, "session " + session->display_name + " is being deleted"};
-        if (storage::is_frozen(*session) == request.frozen())
-          return {Reason::WRONG_STATE,
-                  "session " + session->display_name + (request.frozen() ? " is frozen already" : " is not frozen")};
-        const storage::SessionState state =
-            request.frozen() ? storage::SessionState::kFrozen : storage::SessionState::kOpen;
-        return storage::JournalRecord(storage::SetSessionStateRecord{request.session(), state});
+        auto record = map::freezing(*mapper.view(), request.session(), request.frozen());
+        if (!record.ok()) return record.status();
+        return storage::JournalRecord(std::move(record).value());
       },
       sequence);
   if (!status.ok()) return status;
@@ -71,12 +64,8 @@ Result<Producer<v1::Progress>> delete_session(const v1::DeleteSessionRequest& re
                                               map::Mapper& mapper, EditLog& edits) {
   const SessionNumber number = request.session();
   std::uint64_t sequence = 0;
-  const auto before = mapper.view()->session(number);
-  if (!before) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
-  const std::string uuid = before->header.uuid.to_string();
-  if (request.uuid() != uuid)
-    return {Reason::INVALID_ARGUMENT, "session " + before->display_name + " has another uuid than '" + request.uuid() +
-                                          "': was another one meant?"};
+  const auto before = map::session_to_delete(*mapper.view(), number, request.uuid());
+  if (!before.ok()) return before.status();
   if (!storage::is_going(*before)) {
     const Status status = write_and_wait(
         mapper, edits, request.idempotency_key(), request.SerializeAsString(), deadline,

@@ -1,4 +1,4 @@
-#include "server/map/label_edit.h"
+#include "server/map/operator_edit.h"
 
 #include <algorithm>
 #include <string>
@@ -28,6 +28,26 @@ Status check_label_edit(const storage::Graph& graph, const storage::SetLabelReco
     return {Reason::BUDGET_EXCEEDED,
             frame + " has " + std::to_string(kMaxLabelsPerFrame) + " labels already, as many as a frame may have"};
   return {};
+}
+
+Result<storage::SetSessionStateRecord> freezing(const storage::Graph& graph, SessionNumber session, bool frozen) {
+  const auto found = graph.session(session);
+  if (!found) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(session)};
+  if (storage::is_going(*found))
+    return {Reason::SESSION_DELETED, "session " + found->display_name + " is being deleted"};
+  if (storage::is_frozen(*found) == frozen)
+    return {Reason::WRONG_STATE, "session " + found->display_name + (frozen ? " is frozen already" : " is not frozen")};
+  return storage::SetSessionStateRecord{session,
+                                        frozen ? storage::SessionState::kFrozen : storage::SessionState::kOpen};
+}
+
+Result<storage::Session> session_to_delete(const storage::Graph& graph, SessionNumber session, std::string_view uuid) {
+  const auto found = graph.session(session);
+  if (!found) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(session)};
+  if (uuid != found->header.uuid.to_string())
+    return {Reason::INVALID_ARGUMENT, "session " + found->display_name + " has another uuid than '" +
+                                          std::string(uuid) + "': was another one meant?"};
+  return *found;
 }
 
 }  // namespace relmap::map
