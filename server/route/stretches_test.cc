@@ -14,10 +14,10 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-// Up in a lift from B to D, back along the upper floor, and down again: E is seen from D, F from A.
-class Carried : public testing::Test {
+// A robot that drove from A to B, by C to D, and on to E.
+class Drive : public testing::Test {
  protected:
-  Carried()
+  Drive()
       : map_(R"(
     E-----D
           |
@@ -26,16 +26,26 @@ class Carried : public testing::Test {
     A-----B
   )") {
     map_.drive("ABCDE");
+  }
+
+  Route route(char from, char to) const {
+    const FrameId start[] = {map_.id(from)}, goal[] = {map_.id(to)};
+    return find_route(map_, start, goal).or_throw();
+  }
+
+  DrawnMap map_;
+};
+
+// Up in a lift from B to D, back along the upper floor, and down again: E is seen from D, F from A.
+class Carried : public Drive {
+ protected:
+  Carried() {
     for (const char frame : {'C', 'D'}) map_.editable(map_.id(frame)).edges.front().carried_by = {kFirst, kSecond};
   }
 
-  std::vector<CarriedStretch> on_route(char from, char to) {
-    const FrameId start[] = {map_.id(from)}, goal[] = {map_.id(to)};
-    return find_route(map_, start, goal).or_throw().carried.list();
-  }
+  std::vector<CarriedStretch> on_route(char from, char to) const { return route(from, to).carried.list(); }
 
   static constexpr EdgeId kFirst{{1, 40}, 1}, kSecond{{1, 41}, 1};
-  DrawnMap map_;
 };
 
 TEST_F(Carried, ARouteListsCarriedStretchesInEitherDirection) {
@@ -47,10 +57,9 @@ TEST_F(Carried, ARouteListsCarriedStretchesInEitherDirection) {
 }
 
 TEST_F(Carried, EachStepTellsWhetherTheRobotWasCarried) {
-  const FrameId start[] = {map_.id('A')}, goal[] = {map_.id('E')};
-  const Route route = find_route(map_, start, goal).or_throw();
+  const Route found = route('A', 'E');
   std::string carried;
-  for (RouteWalk walk(map_, route); const auto step = walk.next();)
+  for (RouteWalk walk(map_, found); const auto step = walk.next();)
     if (step->carried) carried += map_.name(step->frame);
   EXPECT_EQ(carried, "BC") << "on the way on from there";
 }
@@ -83,27 +92,12 @@ TEST(CarriedStretches, KeepsNoMoreThanAnAnswerHolds) {
 }
 
 // A robot that saw nothing from B to D.
-class Unmeasured : public testing::Test {
+class Unmeasured : public Drive {
  protected:
-  Unmeasured()
-      : map_(R"(
-    E-----D
-          |
-          C
-          |
-    A-----B
-  )") {
-    map_.drive("ABCDE");
-    step_to('C').source = step_to('D').source = MotionSource::kUnsensed;
-  }
+  Unmeasured() { step_to('C').source = step_to('D').source = MotionSource::kUnsensed; }
 
   storage::Edge& step_to(char frame) { return map_.editable(map_.id(frame)).edges.front(); }
-  UnmeasuredStretches on_route(char from, char to) const {
-    const FrameId start[] = {map_.id(from)}, goal[] = {map_.id(to)};
-    return find_route(map_, start, goal).or_throw().unmeasured;
-  }
-
-  DrawnMap map_;
+  UnmeasuredStretches on_route(char from, char to) const { return route(from, to).unmeasured; }
 };
 
 TEST_F(Unmeasured, ARouteListsUnmeasuredStretchesInEitherDirection) {
@@ -123,10 +117,9 @@ TEST_F(Unmeasured, LandmarksSeenFromBothSidesMeasureAStep) {
 }
 
 TEST_F(Unmeasured, EachStepTellsWhetherItIsUnmeasured) {
-  const FrameId start[] = {map_.id('A')}, goal[] = {map_.id('E')};
-  const Route route = find_route(map_, start, goal).or_throw();
+  const Route found = route('A', 'E');
   std::string guessed;
-  for (RouteWalk walk(map_, route); const auto step = walk.next();)
+  for (RouteWalk walk(map_, found); const auto step = walk.next();)
     if (step->unmeasured) guessed += map_.name(step->frame);
   EXPECT_EQ(guessed, "BC") << "on the way on from there";
 }

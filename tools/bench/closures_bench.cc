@@ -21,7 +21,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr SessionNumber kReplayed = 1;
+constexpr SessionNumber kReplayedSession = 1;
 constexpr double kFalseBeyond = 10, kTrueWithin = 3;  // metres between the ends, by the truth
 
 struct ClosuresOptions {
@@ -54,7 +54,7 @@ class Replay {
   }
 
   void run() {
-    apply(storage::SessionRecord{kReplayed, header_.name, header_});
+    apply(storage::SessionRecord{kReplayedSession, header_.name, header_});
     add_keyframe(0, SE3());
     std::size_t next = 0;
     SE3 T_odom_frame;
@@ -70,10 +70,10 @@ class Replay {
   std::vector<std::optional<storage::Edge>> closures() const {
     std::vector<std::optional<storage::Edge>> found;
     for (const g2o::PoseGraph::Edge& loop : graph_.loops) {
-      const auto hot = map_->hot({kReplayed, loop.a});
+      const auto hot = map_->hot({kReplayedSession, loop.a});
       std::optional<storage::Edge> closure;
       for (const storage::Edge& edge : hot ? hot->edges : std::vector<storage::Edge>{})
-        if (edge.kind == storage::EdgeKind::kLoop && edge.a == FrameId{kReplayed, loop.b}) closure = edge;
+        if (edge.kind == storage::EdgeKind::kLoop && edge.a == FrameId{kReplayedSession, loop.b}) closure = edge;
       found.push_back(std::move(closure));
     }
     return found;
@@ -99,13 +99,13 @@ class Replay {
     }
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    apply(storage::KeyframeRecord{kReplayed, crc, std::move(payload)});
+    apply(storage::KeyframeRecord{kReplayedSession, crc, std::move(payload)});
   }
 
   void propose(const g2o::PoseGraph::Edge& loop) {
     storage::ClosureProposalRecord proposal;
-    proposal.query = {kReplayed, loop.a};
-    proposal.match = {kReplayed, loop.b};
+    proposal.query = {kReplayedSession, loop.a};
+    proposal.match = {kReplayedSession, loop.b};
     proposal.T_match_query = loop.T_ab.inverse();
     proposal.verification = storage::Verification::kImported;
     proposal.covariance = options_.loop_scale * options_.loop_scale * inverse_covariance(loop.T_ab, loop.covariance);
