@@ -6,6 +6,7 @@
 #include <set>
 
 #include "storage/graph/frame.h"
+#include "tools/bench/stopwatch.h"
 
 namespace relmap::bench {
 
@@ -89,7 +90,7 @@ double CeresWindow::adjust(std::uint32_t newest) {
   how.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem, &summary);
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return seconds_since(begin);
 }
 
 }  // namespace relmap::bench

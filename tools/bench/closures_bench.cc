@@ -14,6 +14,7 @@
 #include "storage/engine/memory_engine.h"
 #include "storage/memory/budget.h"
 #include "tools/bench/look_alikes.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 #include "tools/g2o/pose_graph.h"
 
@@ -111,7 +112,7 @@ class Replay {
     proposal.covariance = options_.loop_scale * options_.loop_scale * inverse_covariance(loop.T_ab, loop.covariance);
     const auto begin = std::chrono::steady_clock::now();
     apply(proposal);
-    proposal_us_.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+    proposal_us_.push_back(microseconds_since(begin));
   }
 
   const g2o::PoseGraph& graph_;

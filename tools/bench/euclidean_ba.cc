@@ -8,6 +8,7 @@
 #include "server/rba/local_map.h"
 #include "server/rba/measurement.h"
 #include "storage/graph/path_tree.h"
+#include "tools/bench/stopwatch.h"
 
 namespace relmap::bench {
 
@@ -81,8 +82,7 @@ EuclideanBa::Outcome EuclideanBa::solve(double huber, int max_iterations) {
   if (summary.termination_type == ceres::FAILURE || (max_iterations > 0 && !summary.IsSolutionUsable()))
     throw StatusError(Status(Reason::NUMERICAL, "Ceres: " + summary.message));
   return {2 * summary.initial_cost, 2 * summary.final_cost, static_cast<int>(summary.iterations.size()),
-          summary.termination_type == ceres::CONVERGENCE,
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count()};
+          summary.termination_type == ceres::CONVERGENCE, seconds_since(begin)};
 }
 
 double EuclideanBa::rms_px() const {

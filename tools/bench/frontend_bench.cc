@@ -16,6 +16,7 @@
 #include "frontend/tracking/tracker.h"
 #include "tools/bench/klt_odometry.h"
 #include "tools/bench/picture_drive.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -38,9 +39,7 @@ struct FrontendOptions {
 
 class Stopwatch {
  public:
-  double ms() const {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
-  }
+  double ms() const { return 1e3 * seconds_since(begin_); }
 
  private:
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();

@@ -12,6 +12,7 @@
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
 #include "tools/bench/rba_scenarios.h"
+#include "tools/bench/stopwatch.h"
 
 namespace relmap::bench {
 
@@ -34,7 +35,7 @@ template <typename Call>
 double time_of(int repeats, const Call& call) {
   const auto start = std::chrono::steady_clock::now();
   for (int k = 0; k < repeats; ++k) call();
-  return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count() / repeats;
+  return microseconds_since(start) / repeats;
 }
 
 // The kernels on a problem the size of a keyframe's: eight active frames, about 600 measurements.

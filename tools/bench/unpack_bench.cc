@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frontend/capture/stereo_layout.h"
+#include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -23,7 +24,7 @@ template <typename Work>
 double milliseconds(Work work) {
   const auto begin = std::chrono::steady_clock::now();
   work();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return 1e3 * seconds_since(begin);
 }
 
 void run(const UnpackOptions& options, Report& report) {
