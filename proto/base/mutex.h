@@ -7,6 +7,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <shared_mutex>
 
 #if defined(__clang__)
 #define RELMAP_THREAD_ANNOTATION(x) __attribute__((x))
@@ -18,6 +19,8 @@
 #define RELMAP_GUARDED_BY(mutex) RELMAP_THREAD_ANNOTATION(guarded_by(mutex))
 // Marks a function or a lambda whose caller holds the mutex.
 #define RELMAP_REQUIRES(...) RELMAP_THREAD_ANNOTATION(requires_capability(__VA_ARGS__))
+// Marks a function in which uses of guarded fields are not checked. Its comment says why it may use them.
+#define RELMAP_NO_THREAD_SAFETY_ANALYSIS RELMAP_THREAD_ANNOTATION(no_thread_safety_analysis)
 
 namespace relmap {
 
@@ -41,6 +44,8 @@ class RELMAP_THREAD_ANNOTATION(capability("mutex")) Mutex {
 class RELMAP_THREAD_ANNOTATION(scoped_lockable) MutexLock {
  public:
   explicit MutexLock(Mutex& mutex) RELMAP_THREAD_ANNOTATION(acquire_capability(mutex)) : lock_(mutex.mutex_) {}
+  // Of a mutex that try_lock() has locked.
+  MutexLock(Mutex& mutex, std::adopt_lock_t adopt) RELMAP_REQUIRES(mutex) : lock_(mutex.mutex_, adopt) {}
   ~MutexLock() RELMAP_THREAD_ANNOTATION(release_capability()) {}
   MutexLock(const MutexLock&) = delete;
   MutexLock& operator=(const MutexLock&) = delete;
@@ -64,6 +69,45 @@ class RELMAP_THREAD_ANNOTATION(scoped_lockable) MutexUnlock {
 
  private:
   Mutex& mutex_;
+};
+
+// A mutex that any number may hold together to read what it guards, or one alone to change it.
+class RELMAP_THREAD_ANNOTATION(capability("mutex")) SharedMutex {
+ public:
+  SharedMutex() = default;
+  SharedMutex(const SharedMutex&) = delete;
+  SharedMutex& operator=(const SharedMutex&) = delete;
+
+ private:
+  friend class ExclusiveLock;
+  friend class SharedLock;
+  std::shared_mutex mutex_;
+};
+
+// Holds a shared mutex alone for as long as it lives.
+class RELMAP_THREAD_ANNOTATION(scoped_lockable) ExclusiveLock {
+ public:
+  explicit ExclusiveLock(SharedMutex& mutex) RELMAP_THREAD_ANNOTATION(acquire_capability(mutex))
+      : lock_(mutex.mutex_) {}
+  ~ExclusiveLock() RELMAP_THREAD_ANNOTATION(release_capability()) {}
+  ExclusiveLock(const ExclusiveLock&) = delete;
+  ExclusiveLock& operator=(const ExclusiveLock&) = delete;
+
+ private:
+  std::unique_lock<std::shared_mutex> lock_;
+};
+
+// Holds a shared mutex, perhaps together with others, for as long as it lives.
+class RELMAP_THREAD_ANNOTATION(scoped_lockable) SharedLock {
+ public:
+  explicit SharedLock(SharedMutex& mutex) RELMAP_THREAD_ANNOTATION(acquire_shared_capability(mutex))
+      : lock_(mutex.mutex_) {}
+  ~SharedLock() RELMAP_THREAD_ANNOTATION(release_capability()) {}
+  SharedLock(const SharedLock&) = delete;
+  SharedLock& operator=(const SharedLock&) = delete;
+
+ private:
+  std::shared_lock<std::shared_mutex> lock_;
 };
 
 // std::condition_variable for a Mutex. The caller holds the mutex. A predicate is annotated with it, too:

@@ -1,6 +1,6 @@
 #include "server/place/inverted_index.h"
 
-#include <mutex>
+#include "proto/base/mutex.h"
 
 namespace relmap::place {
 namespace {
@@ -62,8 +62,9 @@ InvertedIndex::InvertedIndex(const FabMapModel& model, Options options) : model_
 }
 
 bool InvertedIndex::contains(FrameId frame) const {
-  return packed_->frames.find(frame) != FrameTable::kNone ||
-         std::any_of(tail_.begin(), tail_.end(), [&](const PlaceWords& place) { return place.frame == frame; });
+  const std::vector<PlaceWords>& tail = writers_tail();
+  return writers_packed().frames.find(frame) != FrameTable::kNone ||
+         std::any_of(tail.begin(), tail.end(), [&](const PlaceWords& place) { return place.frame == frame; });
 }
 
 Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
@@ -72,29 +73,30 @@ Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
     return room;
   }
   {
-    const std::unique_lock lock(mutex_);
+    const ExclusiveLock lock(mutex_);
     tail_constants_.push_back(model_.place(words));
     tail_.push_back({frame, std::move(words)});
   }
-  tail_bytes_ += bytes_of(tail_.back());
+  tail_bytes_ += bytes_of(writers_tail().back());
   memory_ = memory_now();
-  if (tail_.size() >= std::min(kTail, kPlacesPerBlock - unfilled())) pack();
+  if (writers_tail().size() >= std::min(kTail, kPlacesPerBlock - unfilled())) pack();
   return {};
 }
 
 // Moves the tail into the last block, and writes the block to the file once it is full.
 void InvertedIndex::pack() {
-  if (tail_.empty()) return;
-  PackedPlaces packed = *packed_;
+  const std::vector<PlaceWords>& tail = writers_tail();
+  if (tail.empty()) return;
+  PackedPlaces packed = writers_packed();
   Bytes bytes;
   if (unfilled() == 0) {
-    bytes = encode_place_block(model_, nullptr, tail_);
+    bytes = encode_place_block(model_, nullptr, tail);
   } else {
     const auto older = std::move(packed.blocks.back().bytes);
     packed.blocks.pop_back();
     packed.frames.truncate(packed.frames.places() - unfilled());
     const PlaceBlock block = PlaceBlock::trusted(*older);
-    bytes = encode_place_block(model_, &block, tail_);
+    bytes = encode_place_block(model_, &block, tail);
     resident_bytes_ -= older->size();
   }
   packed.frames.append(PlaceBlock::trusted(bytes).frames());
@@ -103,7 +105,7 @@ void InvertedIndex::pack() {
   packed.blocks.push_back({{}, std::make_shared<const Bytes>(std::move(bytes))});
   {
     auto shared = std::make_shared<const PackedPlaces>(std::move(packed));
-    const std::unique_lock lock(mutex_);
+    const ExclusiveLock lock(mutex_);
     packed_.swap(shared);
     tail_.clear();
     tail_constants_.clear();
@@ -117,7 +119,7 @@ void InvertedIndex::pack() {
 void InvertedIndex::publish(PackedPlaces packed) {
   auto shared = std::make_shared<const PackedPlaces>(std::move(packed));
   {
-    const std::unique_lock lock(mutex_);
+    const ExclusiveLock lock(mutex_);
     packed_.swap(shared);
   }
   memory_ = memory_now();
@@ -128,7 +130,7 @@ Status InvertedIndex::open_file(Status* emptied) {
   auto file = PlaceFile::open(options_.folder, options_.vocabulary_crc, emptied);
   if (!file.ok()) return file.status();
   file_ = std::move(file).value();
-  PackedPlaces packed = *packed_;
+  PackedPlaces packed = writers_packed();
   packed.file = file_;
   publish(std::move(packed));
   return {};
@@ -139,7 +141,7 @@ Status InvertedIndex::write_blocks() {
   if (options_.folder.empty()) return {};
   Status emptied;
   if (Status opened = open_file(&emptied); !opened.ok()) return opened;
-  PackedPlaces packed = *packed_;
+  PackedPlaces packed = writers_packed();
   const std::size_t full = packed.frames.places() / kPlacesPerBlock;
   Status status;
   for (std::size_t i = 0; i < full; ++i) {
@@ -161,7 +163,7 @@ Status InvertedIndex::save() {
   pack();
   if (Status written = write_blocks(); !written.ok()) return written;
   if (options_.folder.empty() || unfilled() == 0) return {};
-  const auto& blocks = packed_->blocks;
+  const auto& blocks = writers_packed().blocks;
   const std::uint64_t at = blocks.size() == 1 ? PlaceFile::kBegin : blocks[blocks.size() - 2].extent.end();
   return file_->write(at, *blocks.back().bytes).status();
 }
@@ -170,7 +172,7 @@ Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map
   if (options_.folder.empty()) return {};
   Status why;
   if (Status opened = open_file(&why); !opened.ok()) return opened;
-  PackedPlaces packed = *packed_;
+  PackedPlaces packed = writers_packed();
   std::uint64_t offset = PlaceFile::kBegin;
   for (bool last = false;;) {
     Bytes bytes;
@@ -208,7 +210,7 @@ Status InvertedIndex::make_room() {
   if (fits()) return {};
   Status written;
   if (refused_ % kPatience == 0) written = write_blocks();
-  PackedPlaces packed = *packed_;
+  PackedPlaces packed = writers_packed();
   for (auto& block : packed.blocks) {
     if (memory_now() + kAddBytes + max_block_ <= options_.allowance) break;
     if (!block.bytes || block.extent.size == 0) continue;
@@ -229,7 +231,7 @@ void InvertedIndex::score(BlockScores& query, std::span<const storage::FrameRang
   scores.tail.clear();
   std::vector<LogLikelihood> of_tail;
   {
-    const std::shared_lock lock(mutex_);
+    const SharedLock lock(mutex_);
     scores.packed = packed_;
     for (std::size_t i = 0; i < tail_.size(); ++i) {
       scores.tail.push_back(tail_[i].frame);
@@ -270,7 +272,7 @@ void InvertedIndex::score(BlockScores& query, std::span<const storage::FrameRang
 }
 
 std::uint32_t InvertedIndex::size() const {
-  const std::shared_lock lock(mutex_);
+  const SharedLock lock(mutex_);
   return packed_->frames.places() + static_cast<std::uint32_t>(tail_.size());
 }
 
@@ -279,9 +281,10 @@ std::size_t InvertedIndex::memory_bytes() const { return memory_; }
 // Memory in use, plus what may be needed besides: the scores of a query, a block that is being made from the tail, and
 // a block that a query reads.
 std::size_t InvertedIndex::memory_now() const {
-  const std::size_t places = packed_->frames.places() + tail_.size();
-  return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * max_block_ + 2 * packed_->frames.memory_bytes() +
-         2 * packed_->blocks.size() * sizeof(PackedPlaces::Block);
+  const PackedPlaces& packed = writers_packed();
+  const std::size_t places = packed.frames.places() + writers_tail().size();
+  return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * max_block_ + 2 * packed.frames.memory_bytes() +
+         2 * packed.blocks.size() * sizeof(PackedPlaces::Block);
 }
 
 std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words) {

@@ -9,11 +9,11 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <shared_mutex>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "proto/base/mutex.h"
 #include "server/place/block_scores.h"
 #include "server/place/frame_table.h"
 #include "server/place/place_block.h"
@@ -91,18 +91,24 @@ class InvertedIndex {
   void publish(PackedPlaces packed);
   std::size_t memory_now() const;
   // Places in the last block if it is not full, or else 0.
-  std::uint32_t unfilled() const { return packed_->frames.places() % kPlacesPerBlock; }
+  std::uint32_t unfilled() const { return writers_packed().frames.places() % kPlacesPerBlock; }
+
+  // What the writer reads without mutex_, since nobody else changes it. Clang cannot be told that only one thread
+  // writes, so it does not check these two.
+  const PackedPlaces& writers_packed() const RELMAP_NO_THREAD_SAFETY_ANALYSIS { return *packed_; }
+  const std::vector<PlaceWords>& writers_tail() const RELMAP_NO_THREAD_SAFETY_ANALYSIS { return tail_; }
 
   const FabMapModel& model_;
   const Options options_;
   std::shared_ptr<PlaceFile> file_;  // null if it could not be opened or there is no folder
 
-  mutable std::shared_mutex mutex_;  // guards what follows; the writer, who alone changes it, reads without
-  std::shared_ptr<const PackedPlaces> packed_ = std::make_shared<const PackedPlaces>();
-  std::vector<PlaceWords> tail_;
-  std::vector<LogLikelihood> tail_constants_;
+  mutable SharedMutex mutex_;
+  std::shared_ptr<const PackedPlaces> packed_ RELMAP_GUARDED_BY(mutex_) = std::make_shared<const PackedPlaces>();
+  std::vector<PlaceWords> tail_ RELMAP_GUARDED_BY(mutex_);
+  std::vector<LogLikelihood> tail_constants_ RELMAP_GUARDED_BY(mutex_);
 
   std::atomic<std::size_t> memory_ = 0;
+  // The writer's own.
   std::size_t resident_bytes_ = 0, max_block_ = 0, tail_bytes_ = 0;
   std::uint32_t refused_ = 0;  // places that were left out since the last one that had room
 };
