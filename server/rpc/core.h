@@ -6,12 +6,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <type_traits>
 
+#include "proto/base/mutex.h"
 #include "server/intake/ingest_server.h"
 #include "server/map/mapper.h"
 #include "server/route/overlay/route_index.h"
@@ -67,9 +67,10 @@ struct Routes {
   std::atomic<std::uint64_t> searched = 0;
 };
 
-// Locked during an import. A piece of a graph is checked against what the map holds, so imports take turns.
+// Locked during an import, and guards no data: a piece of a graph is checked against what the map holds, so imports
+// take turns.
 struct ImportTurn {
-  std::mutex mutex;
+  Mutex mutex;
 };
 
 // Owns what the handlers work on. A handler does not see it: it declares the parts that it uses as its last parameters,

@@ -1,5 +1,9 @@
 #include "server/rpc/edit_log.h"
 
+#include <memory>
+
+#include "proto/base/mutex.h"
+
 namespace relmap::rpc {
 
 Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& content, const Deadline& deadline,
@@ -7,18 +11,27 @@ Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& c
   if (key.size() > kMaxKeyBytes)
     return {Reason::INVALID_ARGUMENT,
             "idempotency key of " + std::to_string(key.size()) + " bytes; at most " + std::to_string(kMaxKeyBytes)};
-  const std::unique_lock lock(mutex_, deadline.at);
-  if (!lock.owns_lock()) return {Reason::DEADLINE, "another edit is still running"};
   const std::size_t hash = std::hash<std::string>()(content);
-  if (!key.empty()) {
-    const auto found = done_.find(key);
+  {
+    const MutexLock lock(mutex_);
+    if (!ended_.wait_until(mutex_, deadline.at, [this]() RELMAP_REQUIRES(mutex_) { return !running_; }))
+      return {Reason::DEADLINE, "another edit is still running"};
+    const auto found = key.empty() ? done_.end() : done_.find(key);
     if (found != done_.end()) {
       if (found->second.content == hash) return found->second.sequence;
       return {Reason::INVALID_ARGUMENT, "idempotency key '" + key + "' was used for another edit"};
     }
+    running_ = true;
   }
+  // Ends the turn also if the edit throws, and otherwise only once the edit is remembered.
+  const std::shared_ptr<const void> turn(this, [this](const void*) {
+    const MutexLock lock(mutex_);
+    running_ = false;
+    ended_.notify_all();  // one that finds its edit done passes the turn to nobody
+  });
   auto sequence = edit();
   if (!sequence.ok() || key.empty()) return sequence;
+  const MutexLock lock(mutex_);
   done_.emplace(key, Done{hash, *sequence});
   order_.push_back(key);
   if (order_.size() > kKept) {

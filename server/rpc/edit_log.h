@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <unordered_map>
 
+#include "proto/base/mutex.h"
 #include "server/rpc/deadline.h"
 
 namespace relmap::rpc {
@@ -29,9 +29,11 @@ class EditLog {
     std::size_t content = 0;  // hash
     std::uint64_t sequence = 0;
   };
-  std::timed_mutex mutex_;
-  std::unordered_map<std::string, Done> done_;
-  std::deque<std::string> order_;
+  Mutex mutex_;
+  ConditionVariable ended_;
+  bool running_ RELMAP_GUARDED_BY(mutex_) = false;  // an edit, without the mutex
+  std::unordered_map<std::string, Done> done_ RELMAP_GUARDED_BY(mutex_);
+  std::deque<std::string> order_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::rpc

@@ -1,9 +1,9 @@
 #include <future>
 #include <memory>
-#include <mutex>
 #include <thread>
 
 #include "proto/base/crc32c.h"
+#include "proto/base/mutex.h"
 #include "proto/base/names.h"
 #include "proto/geometry/camera.h"
 #include "proto/wire/convert.h"
@@ -136,8 +136,8 @@ class Writer {
 Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request, const Deadline& deadline,
                                           map::Mapper& mapper, ImportTurn& turn) {
   // One at a time, since a piece is checked against the map, and pieces must not occupy the threads of all other calls.
-  const std::unique_lock held(turn.mutex, std::try_to_lock);
-  if (!held.owns_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
+  if (!turn.mutex.try_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
+  const MutexLock held(turn.mutex, std::adopt_lock);
   auto piece = piece_of(request);
   if (!piece.ok()) return piece.status();
   if (Status fits = piece->fit(*mapper.view()); !fits.ok()) return fits;
