@@ -251,6 +251,23 @@ TEST(IncludeRules, NothingLinksBenchmarksAndTheyLinkNoTest) {
   }
 }
 
+// Clang checks the use of our own mutexes only (proto/base/mutex.h). Tests may use others.
+TEST(IncludeRules, CodeThatIsNoTestUsesMutexesThatClangChecks) {
+  const std::string own = "proto/base/mutex.h";
+  const auto unchecked = [](const std::string& text) {
+    for (const char* name : {"std::mutex", "std::timed_mutex", "std::recursive_mutex", "std::recursive_timed_mutex",
+                             "std::shared_mutex", "std::shared_timed_mutex", "std::condition_variable"})
+      if (text.find(name) != std::string::npos) return name;
+    return "";
+  };
+  ASSERT_STREQ(unchecked(content_of(own)), "std::mutex") << "which it wraps";
+  for (const std::string& file :
+       relmap::testing::sources_in({"proto", "storage", "server", "client", "frontend", "tools"}))
+    if (file != own && !file.ends_with("_test.cc") && file.find("/testing/") == std::string::npos) {
+      EXPECT_STREQ(unchecked(content_of(file)), "") << file;
+    }
+}
+
 // Headers are read by every user of a library: OpenCV and generated code would become theirs. proto/wire/convert.h is
 // the adapters' own.
 TEST(IncludeRules, HeadersKeepOpenCvAndGeneratedCodeToThemselves) {

@@ -133,18 +133,18 @@ class RocksDbEngine final : public Engine {
   Result<std::uint64_t> acquire() override {
     const MutexLock append_lock(append_mutex_),
         write_lock(write_mutex_);  // no append of the former owner is under way after this
-    Root next = root_;
+    Root next = writers_root();
     ++next.epoch;
     rocksdb::WriteBatch batch;
     if (Status status = write(next, batch); !status.ok()) return status;
-    return root_.epoch;
+    return next.epoch;
   }
 
   Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
     const MutexLock lock(append_mutex_);
     {
       const MutexLock root_lock(mutex_);
-      if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+      if (Status owner = check_owner(epoch, root_); !owner.ok()) return owner;
     }
     if (Status room = database_->space->check(); !room.ok()) return room;
     auto appended = journal_->append(records);
@@ -164,10 +164,11 @@ class RocksDbEngine final : public Engine {
   Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
                 std::span<const std::string> deletes) override {
     const MutexLock lock(write_mutex_);
-    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
-    if (applied_sequence < root_.applied)
+    const Root& root = writers_root();
+    if (Status owner = check_owner(epoch, root); !owner.ok()) return owner;
+    if (applied_sequence < root.applied)
       return Status(Reason::INVALID_ARGUMENT, "a commit of journal sequence " + std::to_string(applied_sequence) +
-                                                  " after one of " + std::to_string(root_.applied));
+                                                  " after one of " + std::to_string(root.applied));
     std::size_t bytes = 64;
     for (const Put& put : puts) bytes += put.key.size() + put.value.size() + 16;
     rocksdb::WriteBatch batch(bytes);
@@ -175,7 +176,7 @@ class RocksDbEngine final : public Engine {
       batch.Put(database_->map->family(put.key), put.key,
                 rocksdb::Slice(reinterpret_cast<const char*>(put.value.data()), put.value.size()));
     for (const std::string& key : deletes) batch.Delete(database_->map->family(key), key);
-    Root next = root_;
+    Root next = root;
     next.applied = applied_sequence;
     ++next.commits;
     if (Status status = write(next, batch); !status.ok()) return status;
@@ -195,13 +196,13 @@ class RocksDbEngine final : public Engine {
 
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
     const MutexLock lock(write_mutex_);
-    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    Root next = writers_root();
+    if (Status owner = check_owner(epoch, next); !owner.ok()) return owner;
     if (Status room = database_->space->check(); !room.ok()) return room;
-    Root next = root_;
     ++next.session;
     rocksdb::WriteBatch batch;
     if (Status status = write(next, batch); !status.ok()) return status;
-    return root_.session;
+    return next.session;
   }
 
   // The journal's files are opened first: what is applied and trimmed before the map is looked at is then in the map.
@@ -250,14 +251,18 @@ class RocksDbEngine final : public Engine {
   }
 
  private:
-  Status check_owner(std::uint64_t epoch) const {
+  // The root for holders of write_mutex_, who need not lock mutex_ too: nobody else changes it. Clang cannot be told of
+  // a field that two mutexes guard so.
+  const Root& writers_root() const RELMAP_REQUIRES(write_mutex_) RELMAP_NO_THREAD_SAFETY_ANALYSIS { return root_; }
+
+  Status check_owner(std::uint64_t epoch, const Root& root) const {
     if (!read_only_.ok()) return read_only_;
-    if (epoch == root_.epoch) return {};
+    if (epoch == root.epoch) return {};
     return Status(Reason::STALE_OWNER,
-                  "epoch " + std::to_string(epoch) + ", the map is owned by " + std::to_string(root_.epoch));
+                  "epoch " + std::to_string(epoch) + ", the map is owned by " + std::to_string(root.epoch));
   }
 
-  Status write(const Root& next, rocksdb::WriteBatch& batch) {
+  Status write(const Root& next, rocksdb::WriteBatch& batch) RELMAP_REQUIRES(write_mutex_) {
     if (!read_only_.ok()) return read_only_;
     batch.Put(kRootKey, next.encode());
     Status status = write_if_room(batch);
@@ -272,7 +277,7 @@ class RocksDbEngine final : public Engine {
 
   // RocksDB does not survive a flush that finds no room (Debian's build asserts). So it is given nothing that could not
   // be flushed together with all that waits to be.
-  Status write_if_room(rocksdb::WriteBatch& batch) {
+  Status write_if_room(rocksdb::WriteBatch& batch) RELMAP_REQUIRES(write_mutex_) {
     constexpr std::uint64_t kBeside = std::uint64_t{1} << 20;  // tables and lists of files
     const std::uint64_t waiting = property(database_->db(), rocksdb::DB::Properties::kCurSizeAllMemTables);
     if (Status room = database_->space->spare(waiting + 2 * batch.GetDataSize() + kBeside); !room.ok()) return room;
@@ -282,12 +287,13 @@ class RocksDbEngine final : public Engine {
   // Goes on after a failure as soon as the disk does. The log that failed must not be written to again, since its syncs
   // cannot be trusted; but Resume() leaves that log only if something has to be flushed. Therefore the root is put into
   // memory, beside the log, before anything is written to the log.
-  Status write(rocksdb::WriteBatch& batch) {
+  Status write(rocksdb::WriteBatch& batch) RELMAP_REQUIRES(write_mutex_) {
     rocksdb::WriteOptions logged, beside_the_log;
     logged.sync = options_.sync;
     beside_the_log.disableWAL = true;
     rocksdb::Status status = resumption_.go_on();
-    if (status.ok()) status = database_->db().Put(beside_the_log, kRootKey, root_.encode());  // takes a new memtable
+    if (status.ok())
+      status = database_->db().Put(beside_the_log, kRootKey, writers_root().encode());  // takes a new memtable
     if (status.ok()) {
       resumption_.let_flush_start();
       status = database_->db().Write(logged, &batch);
@@ -303,13 +309,13 @@ class RocksDbEngine final : public Engine {
   const std::unique_ptr<JournalLog> journal_;
 
   // Locked in this order. Neither a slow sync of the journal nor one of the map holds up anything else.
-  Mutex append_mutex_;
-  Mutex write_mutex_;    // changes of the root
-  mutable Mutex mutex_;  // root_, snapshot_: read under either of these, written under both
-  Root root_;
-  std::shared_ptr<const EngineSnapshot> snapshot_;
-  Resumption resumption_;
-  Reclaimer reclaimer_;
+  Mutex append_mutex_;  // guards no data: a new owner waits for the append that is under way
+  Mutex write_mutex_;   // held while the map is changed
+  mutable Mutex mutex_;
+  Root root_ RELMAP_GUARDED_BY(mutex_);  // changed under both, so writers_root() reads it under write_mutex_
+  std::shared_ptr<const EngineSnapshot> snapshot_ RELMAP_GUARDED_BY(mutex_);
+  Resumption resumption_ RELMAP_GUARDED_BY(write_mutex_);
+  Reclaimer reclaimer_ RELMAP_GUARDED_BY(write_mutex_);
 };
 
 // RocksDB would begin a new database in place of one that has lost its CURRENT, and delete the files that it does not

@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
 #include "proto/base/json.h"
+#include "proto/base/mutex.h"
 #include "proto/keyframe/keyframe.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
@@ -275,11 +275,13 @@ struct PicturesCommand {
   }
 
   void render(const relmap::sim::PictureWorld& scene, const fs::path& folder) const {
-    relmap::terminal::ProgressBar progress(std::cerr, relmap::terminal::is_terminal());
+    struct {
+      relmap::Mutex mutex;
+      relmap::terminal::ProgressBar progress RELMAP_GUARDED_BY(mutex){std::cerr, relmap::terminal::is_terminal()};
+      int done RELMAP_GUARDED_BY(mutex) = 0;
+      std::exception_ptr failure RELMAP_GUARDED_BY(mutex);
+    } shared;
     std::atomic<int> next = 0;
-    int done = 0;
-    std::mutex mutex;  // of done, progress and failure
-    std::exception_ptr failure;
     const auto work = [&] {
       try {
         for (int i = next++; i < world.frames; i = next++) {
@@ -288,21 +290,22 @@ struct PicturesCommand {
             write_picture(pair.left, folder / "image_0", i);
             write_picture(pair.right, folder / "image_1", i);
           }
-          const std::lock_guard lock(mutex);
-          progress.show("rendering", static_cast<std::uint64_t>(++done), static_cast<std::uint64_t>(world.frames),
-                        "pairs");
+          const relmap::MutexLock lock(shared.mutex);
+          shared.progress.show("rendering", static_cast<std::uint64_t>(++shared.done),
+                               static_cast<std::uint64_t>(world.frames), "pairs");
         }
       } catch (...) {
         next = world.frames;
-        const std::lock_guard lock(mutex);
-        failure = std::current_exception();
+        const relmap::MutexLock lock(shared.mutex);
+        shared.failure = std::current_exception();
       }
     };
     {
       std::vector<std::jthread> workers;
       for (int k = 0; k < threads; ++k) workers.emplace_back(work);
     }
-    if (failure) std::rethrow_exception(failure);
+    const relmap::MutexLock lock(shared.mutex);
+    if (shared.failure) std::rethrow_exception(shared.failure);
   }
 
   void write_picture(const relmap::sim::GreyPicture& picture, const fs::path& folder, int i) const {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <atomic>
-#include <mutex>
 #include <thread>
 
 #include "frontend/vision/picture_appearance.h"
+#include "proto/base/mutex.h"
 #include "tools/vocab/training_views.h"
 
 namespace relmap::vocab {
@@ -43,26 +43,31 @@ Result<std::vector<Descriptors>> describe_pictures(const std::vector<std::string
                                                    const std::function<void(double)>& progress) {
   std::vector<std::vector<Descriptors>> of_file(files.size());
   std::atomic<std::size_t> next = 0;
-  std::mutex mutex;  // guards what follows
-  std::size_t done = 0;
-  Status failure;
+  struct {
+    Mutex mutex;  // `progress` is called under it, too
+    std::size_t done RELMAP_GUARDED_BY(mutex) = 0;
+    Status failure RELMAP_GUARDED_BY(mutex);
+  } shared;
   const auto work = [&] {
     for (std::size_t i; (i = next++) < files.size();) {
       auto described = describe_safely(files[i], views);
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(shared.mutex);
       if (!described.ok()) {
-        failure = described.status();
+        shared.failure = described.status();
         next = files.size();
         return;
       }
       of_file[i] = std::move(described).value();
-      progress(static_cast<double>(++done) / static_cast<double>(files.size()));
+      progress(static_cast<double>(++shared.done) / static_cast<double>(files.size()));
     }
   };
   std::vector<std::thread> threads;
   for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
-  if (!failure.ok()) return failure;
+  {
+    const MutexLock lock(shared.mutex);
+    if (!shared.failure.ok()) return shared.failure;
+  }
 
   std::vector<Descriptors> result;
   for (auto& pictures : of_file) std::move(pictures.begin(), pictures.end(), std::back_inserter(result));

@@ -1,10 +1,9 @@
 // Some robots of a fleet as a process of their own, which may be killed: each pushes keyframes into its spool at its
 // rate until SIGTERM, then waits until all are settled. Started by `relmap-bench fleet`.
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 
 #include "frontend/publishing/publisher.h"
+#include "proto/base/mutex.h"
 #include "server/ops/signals.h"
 #include "tools/bench/fleet/keyframes.h"
 #include "tools/bench/fleet/robot_transport.h"
@@ -29,20 +28,20 @@ struct RobotsOptions {
 class Stop {
  public:
   void set() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopped_ = true;
     changed_.notify_all();
   }
   // False if it was set before.
   bool wait_until(Clock::time_point time) {
-    std::unique_lock lock(mutex_);
-    return !changed_.wait_until(lock, time, [this] { return stopped_; });
+    const MutexLock lock(mutex_);
+    return !changed_.wait_until(mutex_, time, [this]() RELMAP_REQUIRES(mutex_) { return stopped_; });
   }
 
  private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool stopped_ = false;
+  Mutex mutex_;
+  ConditionVariable changed_;
+  bool stopped_ RELMAP_GUARDED_BY(mutex_) = false;
 };
 
 class DrivingRobot {

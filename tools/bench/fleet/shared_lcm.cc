@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "proto/base/mutex.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 
@@ -14,7 +15,7 @@ LcmLink::Handler SharedLcm::handler(
   return [this, decode, heard](ByteSpan bytes) {
     const Result<Message> message = decode(bytes);
     if (!message.ok()) return;
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto listener = listeners_.find(message->session);
     if (listener != listeners_.end() && listener->second.*heard) (listener->second.*heard)(*message);
   };
@@ -31,7 +32,7 @@ std::shared_ptr<SharedLcm> SharedLcm::open(const std::string& url) {
 }
 
 void SharedLcm::listen(const SessionUuid& session, publishing::PublishTransport::Listener listener) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (listener.acknowledged || listener.news)
     listeners_[session] = std::move(listener);
   else

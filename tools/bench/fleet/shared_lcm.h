@@ -3,10 +3,10 @@
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "frontend/publishing/publish_transport.h"
+#include "proto/base/mutex.h"
 #include "proto/wire/lcm_link.h"
 
 namespace relmap::bench {
@@ -25,8 +25,8 @@ class SharedLcm {
   LcmLink::Handler handler(Result<Message> (*decode)(ByteSpan),
                            std::function<void(const Message&)> publishing::PublishTransport::Listener::*heard);
 
-  std::mutex mutex_;
-  std::map<SessionUuid, publishing::PublishTransport::Listener> listeners_;
+  Mutex mutex_;  // listeners are called under it
+  std::map<SessionUuid, publishing::PublishTransport::Listener> listeners_ RELMAP_GUARDED_BY(mutex_);
   std::unique_ptr<LcmLink> link_;
 };
 
