@@ -8,15 +8,6 @@
 
 namespace relmap::map {
 
-namespace {
-
-Result<storage::Session> existing_session(const storage::Graph& graph, SessionNumber session) {
-  if (auto found = graph.session(session)) return *std::move(found);
-  return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(session)};
-}
-
-}  // namespace
-
 Status check_label(const storage::SetLabelRecord& record) {
   return record.present ? check_name("label", record.label) : Status();
 }
@@ -40,7 +31,7 @@ Status check_label_edit(const storage::Graph& graph, const storage::SetLabelReco
 }
 
 Result<storage::SetSessionStateRecord> freezing(const storage::Graph& graph, SessionNumber session, bool frozen) {
-  const auto found = existing_session(graph, session);
+  const auto found = storage::existing_session(graph, session);
   if (!found.ok()) return found.status();
   if (storage::is_going(*found))
     return {Reason::SESSION_DELETED, "session " + found->display_name + " is being deleted"};
@@ -51,7 +42,7 @@ Result<storage::SetSessionStateRecord> freezing(const storage::Graph& graph, Ses
 }
 
 Result<storage::Session> session_to_delete(const storage::Graph& graph, SessionNumber session, std::string_view uuid) {
-  const auto found = existing_session(graph, session);
+  const auto found = storage::existing_session(graph, session);
   if (!found.ok()) return found.status();
   if (uuid != found->header.uuid.to_string())
     return {Reason::INVALID_ARGUMENT, "session " + found->display_name + " has another uuid than '" +

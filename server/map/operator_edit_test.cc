@@ -71,7 +71,7 @@ TEST_F(OperatorEdit, ASessionIsFrozenOnceAndOpenedOnce) {
   EXPECT_EQ(freezing(graph_, 1, false).or_throw().state, storage::SessionState::kOpen);
   EXPECT_EQ(freezing(graph_, 1, true).reason(), Reason::WRONG_STATE);
   EXPECT_EQ(freezing(graph_, kDeleted.session, true).reason(), Reason::SESSION_DELETED);
-  EXPECT_EQ(freezing(graph_, 3, true).reason(), Reason::NO_SUCH_SESSION);
+  EXPECT_EQ(freezing(graph_, 3, true).status().to_string(), "NO_SUCH_SESSION: no session 3");
 }
 
 TEST_F(OperatorEdit, ASessionIsDeletedOnlyByItsUuid) {

@@ -131,9 +131,11 @@ Result<Producer<v1::VerifyReply>> verify_request(const v1::VerifyRequest& reques
   storage::VerifyOptions options;
   options.sessions.assign(request.sessions().begin(), request.sessions().end());
   const auto view = mapper.view();
-  for (const SessionNumber session : options.sessions)
-    if (const auto known = view->session(session); !known || storage::is_deleted(*known))
-      return Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(session));
+  for (const SessionNumber session : options.sessions) {
+    const auto known = storage::existing_session(*view, session);
+    if (!known.ok()) return known.status();
+    if (storage::is_deleted(*known)) return storage::no_such_session(session);
+  }
   return start<v1::VerifyReply>(
       maintenance, "Admin.Verify", deadline,
       [&mapper, options](JobStream<v1::VerifyReply>& stream) { return verify_map(mapper, options, stream); });

@@ -67,8 +67,7 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
     filter.kinds.insert(*known);
   }
   if (request.session() != 0) {
-    if (!view.session(request.session()))
-      return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
+    if (const auto session = storage::existing_session(view, request.session()); !session.ok()) return session.status();
     filter.session = request.session();
   }
   if (request.has_frame()) {

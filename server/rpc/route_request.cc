@@ -91,7 +91,7 @@ Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteF
   if (given.avoid_labels_size() > kMaxLabels) return too_many("labels to be avoided", kMaxLabels);
   route::RouteFilter filter;
   for (const SessionNumber number : given.sessions()) {
-    if (!map.session(number)) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
+    if (const auto session = storage::existing_session(map, number); !session.ok()) return session.status();
     filter.sessions.insert(number);
   }
   if (static_cast<std::size_t>(given.avoid_frames_size()) > kMaxFrames)

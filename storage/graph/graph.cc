@@ -15,6 +15,15 @@ std::size_t count_sessions(const Graph& graph) {
   return sessions.size() - static_cast<std::size_t>(std::count_if(sessions.begin(), sessions.end(), is_deleted));
 }
 
+Result<Session> existing_session(const Graph& graph, SessionNumber number) {
+  if (auto session = graph.session(number)) return *std::move(session);
+  return no_such_session(number);
+}
+
+Status no_such_session(SessionNumber number) {
+  return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
+}
+
 std::optional<Edge> find_edge(const Graph& graph, EdgeId id) {
   const auto hot = graph.hot(id.frame);
   const Edge* edge = hot ? hot->edge(id) : nullptr;

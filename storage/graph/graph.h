@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/base/status.h"
 #include "storage/graph/chunk.h"
 #include "storage/graph/frame.h"
 
@@ -41,6 +42,11 @@ class Graph {
 
 // The number of sessions, without those that have been deleted.
 std::size_t count_sessions(const Graph& graph);
+
+// The session that somebody names by its number; it may be deleted. NO_SUCH_SESSION.
+Result<Session> existing_session(const Graph& graph, SessionNumber number);
+// NO_SUCH_SESSION, as existing_session() says it.
+Status no_such_session(SessionNumber number);
 
 // The edge `id`, or nullopt.
 std::optional<Edge> find_edge(const Graph& graph, EdgeId id);

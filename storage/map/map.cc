@@ -224,8 +224,7 @@ Session& Map::edit_session(SessionNumber number) { return impl_->edit_session(nu
 Session& Map::Impl::edit_session(SessionNumber number) {
   const auto at = std::lower_bound(sessions.begin(), sessions.end(), number,
                                    [](const auto& entry, SessionNumber key) { return entry->number < key; });
-  if (at == sessions.end() || (*at)->number != number)
-    throw StatusError(Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)));
+  if (at == sessions.end() || (*at)->number != number) throw StatusError(no_such_session(number));
   if (fresh_sessions.insert(number).second) *at = std::make_shared<Session>(**at);
   dirty_sessions.insert(number);
   return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
