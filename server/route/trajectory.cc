@@ -1,8 +1,45 @@
 #include "server/route/trajectory.h"
 
+#include <algorithm>
+#include <string>
+
+#include "storage/graph/binding.h"
 #include "storage/graph/frame.h"
 
 namespace relmap::route {
+
+Result<std::vector<storage::Session>> sessions_with_trajectory(const storage::Graph& graph,
+                                                               std::vector<SessionNumber> numbers) {
+  std::vector<storage::Session> sessions;
+  if (numbers.empty()) {
+    sessions = graph.sessions();
+    std::erase_if(sessions, [](const storage::Session& session) {
+      return !session.header.camera.is_stereo() || storage::is_deleted(session);
+    });
+    return sessions;
+  }
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  for (const SessionNumber number : numbers) {
+    auto session = storage::existing_session(graph, number);
+    if (!session.ok()) return session.status();
+    if (storage::is_deleted(*session))
+      return {Reason::SESSION_DELETED, "session " + std::to_string(number) + " was deleted"};
+    if (!session->header.camera.is_stereo())
+      return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is a mono session and has no trajectory"};
+    sessions.push_back(std::move(session).value());
+  }
+  return sessions;
+}
+
+std::vector<std::uint32_t> shown_landmarks(const storage::Graph& graph, const TrajectoryPose& pose) {
+  std::vector<std::uint32_t> shown;
+  for (std::uint32_t slot = 0; slot < pose.hot->landmarks.size(); ++slot) {
+    const LandmarkId id{pose.frame, slot};
+    if (!pose.hot->landmarks[slot].depth_prior && storage::resolve(graph, id) == id) shown.push_back(slot);
+  }
+  return shown;
+}
 
 TrajectoryReader::TrajectoryReader(const storage::Graph& graph, const storage::Session& session)
     : graph_(graph), last_{session.number, session.last} {

@@ -3,8 +3,10 @@
 // affects all later poses.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "storage/graph/graph.h"
 
@@ -18,6 +20,16 @@ struct TrajectoryPose {
   // it; otherwise null.
   const storage::Edge* doubtful_step = nullptr;
 };
+
+// The sessions with these numbers, ascending and each once. If no numbers are given, all that have a trajectory: those
+// of a stereo camera that have not been deleted. NO_SUCH_SESSION; SESSION_DELETED; NOT_STEREO (the motion of a single
+// camera has no metres, so a mono session has no odometry edges).
+Result<std::vector<storage::Session>> sessions_with_trajectory(const storage::Graph& graph,
+                                                               std::vector<SessionNumber> numbers);
+
+// The slots of the landmarks of the pose's frame that show where something is: their depth is measured, and they are in
+// force, so that each point is a landmark of one frame only.
+std::vector<std::uint32_t> shown_landmarks(const storage::Graph& graph, const TrajectoryPose& pose);
 
 // Reads one pose after another, each when it is asked for. `graph` must outlive it.
 class TrajectoryReader {

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+#include <vector>
+
+#include "proto/geometry/camera.h"
 #include "server/route/testing/drawn_map.h"
 
 namespace relmap::route {
@@ -62,6 +66,41 @@ TEST_F(Trajectory, GapsAreSkippedInOneStep) {
     EXPECT_EQ(pose->frame, expected);
   }
   EXPECT_FALSE(reader.next().or_throw().has_value());
+}
+
+TEST_F(Trajectory, StereoSessionsThatStayHaveOne) {
+  const auto numbers = [&](std::vector<SessionNumber> chosen) {
+    std::vector<SessionNumber> found;
+    for (const storage::Session& session : sessions_with_trajectory(map_, std::move(chosen)).or_throw())
+      found.push_back(session.number);
+    return found;
+  };
+  for (int i = 0; i < 3; ++i) map_.drive("ABC");
+  for (const SessionNumber number : {1u, 3u, 4u}) map_.edit_session(number).header.camera = kNoCamera;
+  EXPECT_EQ(numbers({}), (std::vector<SessionNumber>{1, 3, 4}));
+  EXPECT_EQ(numbers({4, 1, 4}), (std::vector<SessionNumber>{1, 4}));
+  EXPECT_EQ(sessions_with_trajectory(map_, {4, 2}).status().to_string(),
+            "NOT_STEREO: session 2 is a mono session and has no trajectory");
+  EXPECT_EQ(sessions_with_trajectory(map_, {2, 5, 0}).status().to_string(), "NO_SUCH_SESSION: no session 0");
+
+  for (const SessionNumber number : {2u, 3u, 4u}) map_.edit_session(number).state = storage::SessionState::kDeleting;
+  for (const SessionNumber number : {2u, 3u}) map_.edit_session(number).frames = 0;
+  EXPECT_EQ(numbers({}), (std::vector<SessionNumber>{1, 4})) << "of one that is being deleted there is some left";
+  EXPECT_EQ(sessions_with_trajectory(map_, {2}).status().to_string(), "SESSION_DELETED: session 2 was deleted");
+}
+
+TEST_F(Trajectory, ShowsLandmarksInForceWhoseDepthIsMeasured) {
+  const EdgeId closure = map_.close("AC");
+  map_.editable(map_.id('A')).landmarks.resize(1);
+  auto& landmarks = map_.editable(map_.id('C')).landmarks;
+  landmarks.resize(4);
+  landmarks[0].depth_prior = true;
+  landmarks[2].claims.push_back({{map_.id('A'), 0}, closure});
+  landmarks[3].claims.push_back({{}, closure});  // not needed
+  const auto shown = [&] { return shown_landmarks(map_, {map_.id('C'), map_.hot(map_.id('C')), {}}); };
+  EXPECT_EQ(shown(), (std::vector<std::uint32_t>{1}));
+  map_.set_state(closure, storage::EdgeState::kRemoved);
+  EXPECT_EQ(shown(), (std::vector<std::uint32_t>{1, 2, 3}));
 }
 
 TEST_F(Trajectory, ABrokenChainIsDataLoss) {

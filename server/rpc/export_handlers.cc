@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <charconv>
 #include <memory>
 
 #include "proto/wire/convert.h"
@@ -8,7 +6,6 @@
 #include "server/rpc/limits.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/trajectory_text.h"
-#include "storage/graph/binding.h"
 
 namespace relmap::rpc {
 
@@ -116,11 +113,9 @@ class ExportStream {
     v1::ExportedFrame& frame = *reply.add_frames();
     *frame.mutable_id() = relmap::to_wire(pose.frame);
     frame.set_time_us(pose.hot->time_us);
-    const std::vector<storage::Landmark>& landmarks = pose.hot->landmarks;
-    for (std::uint32_t slot = 0; contents_.landmarks && slot < landmarks.size(); ++slot) {
-      const storage::Landmark& landmark = landmarks[slot];
-      const LandmarkId id{pose.frame, slot};
-      if (landmark.depth_prior || storage::resolve(*view_, id) != id) continue;
+    if (!contents_.landmarks) return frame.ByteSizeLong();
+    for (const std::uint32_t slot : route::shown_landmarks(*view_, pose)) {
+      const storage::Landmark& landmark = pose.hot->landmarks[slot];
       const Vector3 point = landmark.point();
       for (const double coordinate : {point.x(), point.y(), point.z()})
         frame.add_landmarks(static_cast<float>(coordinate));
@@ -140,30 +135,6 @@ class ExportStream {
   std::uint32_t frames_ = 0;  // frames taken from the current session
   std::uint64_t done_ = 0, total_ = 0;
 };
-
-Result<std::vector<storage::Session>> chosen_sessions(const storage::MapView& view, const v1::ExportRequest& request) {
-  if (request.sessions_size() == 0) {
-    std::vector<storage::Session> sessions = view.sessions();
-    std::erase_if(sessions, [](const storage::Session& session) {
-      return !session.header.camera.is_stereo() || storage::is_deleted(session);
-    });
-    return sessions;
-  }
-  std::vector<SessionNumber> numbers(request.sessions().begin(), request.sessions().end());
-  std::sort(numbers.begin(), numbers.end());
-  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
-  std::vector<storage::Session> sessions;
-  for (const SessionNumber number : numbers) {
-    auto session = view.session(number);
-    if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
-    if (storage::is_deleted(*session))
-      return {Reason::SESSION_DELETED, "session " + std::to_string(number) + " was deleted"};
-    if (!session->header.camera.is_stereo())
-      return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is a mono session and has no trajectory"};
-    sessions.push_back(*std::move(session));
-  }
-  return sessions;
-}
 
 }  // namespace
 
@@ -185,7 +156,8 @@ Result<Producer<v1::ExportReply>> export_trajectories(const v1::ExportRequest& r
   }
   const auto opened = views.open(request.resume_token(), mapper.view());
   if (!opened.ok()) return opened.status();
-  auto sessions = chosen_sessions(*opened->kept, request);
+  auto sessions =
+      route::sessions_with_trajectory(*opened->kept, {request.sessions().begin(), request.sessions().end()});
   if (!sessions.ok()) return sessions.status();
   const auto stream =
       std::make_shared<ExportStream>(views, opened->kept, contents, std::move(sessions).value(), deadline);
