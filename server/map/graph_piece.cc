@@ -1,8 +1,13 @@
 #include "server/map/graph_piece.h"
 
 #include <algorithm>
+#include <future>
+#include <memory>
 #include <string>
+#include <thread>
 #include <utility>
+
+#include "proto/base/crc32c.h"
 
 namespace relmap::map {
 
@@ -11,7 +16,49 @@ namespace {
 constexpr double kMaxLoopLength = 1e7;             // metres
 constexpr std::uint64_t kMaxIndices = 0xfffffffe;  // frames of a session
 
+constexpr std::chrono::milliseconds kFullQueue{5};  // between attempts to queue a record
+constexpr std::chrono::milliseconds kLookAround{50};
+
 std::string frame_text(std::uint32_t index) { return "frame " + std::to_string(index); }
+
+// Writes records to the journal, one after another.
+class PieceWriter {
+ public:
+  PieceWriter(Mapper& mapper, const std::function<Status()>& proceed) : mapper_(mapper), proceed_(proceed) {}
+
+  Status write(const storage::JournalRecord& record) {
+    for (;;) {
+      auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
+      outcomes_.push_back(promise->get_future());
+      const Status queued =
+          mapper_.submit(record, [promise](const Result<std::uint64_t>& sequence) { promise->set_value(sequence); });
+      if (queued.ok()) return {};
+      outcomes_.pop_back();
+      if (queued.reason() != Reason::BUDGET_EXCEEDED) return queued;
+      if (Status going = proceed_(); !going.ok()) return going;
+      std::this_thread::sleep_for(kFullQueue);
+    }
+  }
+  // Waits until all records are durable and applied. Returns the sequence of the last one; 0 if there were none.
+  Result<std::uint64_t> finish(std::chrono::steady_clock::time_point deadline) {
+    std::uint64_t last = 0;
+    for (auto& outcome : outcomes_) {
+      while (outcome.wait_for(kLookAround) != std::future_status::ready)
+        if (Status going = proceed_(); !going.ok()) return going;
+      const auto sequence = outcome.get();
+      if (!sequence.ok()) return sequence.status();
+      last = *sequence;
+    }
+    if (last > 0)
+      if (Status applied = mapper_.wait_applied(last, deadline); !applied.ok()) return applied;
+    return last;
+  }
+
+ private:
+  Mapper& mapper_;
+  const std::function<Status()>& proceed_;
+  std::vector<std::future<Result<std::uint64_t>>> outcomes_;
+};
 
 }  // namespace
 
@@ -51,8 +98,23 @@ Status GraphPiece::fit(const storage::Graph& map) {
 Result<SessionNumber> GraphPiece::begin(Mapper& mapper) {
   const auto number = mapper.begin_session(header_);
   if (!number.ok()) return number.status();
+  session_ = *number;
   for (storage::ClosureProposalRecord& loop : loops_) loop.query.session = loop.match.session = *number;
   return *number;
+}
+
+Result<std::uint64_t> GraphPiece::write(Mapper& mapper, std::chrono::steady_clock::time_point deadline,
+                                        const std::function<Status()>& proceed) const {
+  PieceWriter writer(mapper, proceed);
+  for (const Keyframe& keyframe : frames_) {
+    Bytes payload = encode_keyframe(keyframe);
+    const std::uint32_t crc = crc32c(payload);
+    if (Status taken = writer.write(storage::KeyframeRecord{session_, crc, std::move(payload)}); !taken.ok())
+      return taken;
+  }
+  for (const storage::ClosureProposalRecord& loop : loops_)
+    if (Status taken = writer.write(loop); !taken.ok()) return taken;
+  return writer.finish(deadline);
 }
 
 Status check_loop_ends(std::uint32_t query, std::uint32_t match) {

@@ -2,7 +2,9 @@
 // It is checked before anything of it is written.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -38,14 +40,22 @@ class GraphPiece {
   // Begins the session if it is new, and returns its number. The reasons are those of Mapper::begin_session().
   Result<SessionNumber> begin(Mapper& mapper);
 
+  // Writes the frames and the loops to the journal after begin(), and waits until they are applied, since the next
+  // piece is checked against them. Returns the sequence of the last record; 0 if there was none to write. While the
+  // journal's queue is full, and until the records are durable, `proceed` is called again and again; a status of it
+  // that is not ok ends the wait. Other reasons are those of Mapper::submit() and Mapper::wait_applied(). What has been
+  // written by then stays.
+  Result<std::uint64_t> write(Mapper& mapper, std::chrono::steady_clock::time_point deadline,
+                              const std::function<Status()>& proceed) const;
+
   const std::vector<Keyframe>& frames() const { return frames_; }
-  const std::vector<storage::ClosureProposalRecord>& loops() const { return loops_; }
 
  private:
   GraphPiece(SessionHeader header, std::uint32_t first) : header_(std::move(header)), first_(first) {}
 
   SessionHeader header_;
   std::uint32_t first_ = 0;
+  SessionNumber session_ = 0;  // set by begin()
   std::vector<Keyframe> frames_;
   std::vector<storage::ClosureProposalRecord> loops_;
 };

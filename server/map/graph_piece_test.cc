@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include "server/place/testing/hand_made_graph.h"
+#include "storage/engine/memory_engine.h"
 
 namespace relmap::map {
 namespace {
@@ -114,6 +118,65 @@ TEST_F(GraphPieceTest, EndsOfALoopMoreThan10000KmApartAreRefused) {
   EXPECT_EQ(check_loop_motion({Matrix3::Identity(), {1.1e7, 0, 0}}).reason(), Reason::BAD_MOTION);
   EXPECT_EQ(check_loop_motion({Matrix3::Identity(), {std::numeric_limits<double>::quiet_NaN(), 0, 0}}).reason(),
             Reason::BAD_MOTION);
+}
+
+// A running map whose queue can be filled.
+class GraphPieceWrite : public GraphPieceTest {
+ protected:
+  // Sanitized builds take their time.
+  static std::chrono::steady_clock::time_point soon() {
+    return std::chrono::steady_clock::now() + std::chrono::seconds(600);
+  }
+  // Begins the session, and then takes all the room of the queue.
+  void begin_and_fill(GraphPiece& piece) {
+    session_ = piece.begin(*mapper_).or_throw();
+    ASSERT_TRUE(mapper_->wait_idle(soon()).ok());
+    budget_->charge(storage::Share::kQueues, room_);
+  }
+  void make_room() { budget_->release(storage::Share::kQueues, room_); }
+
+  const std::shared_ptr<storage::Budget> budget_ = std::make_shared<storage::Budget>(std::size_t{64} << 20);
+  const std::size_t room_ = budget_->allowance(storage::Share::kQueues);
+  const std::unique_ptr<Mapper> mapper_ = Mapper::open(storage::make_memory_engine(), budget_, nullptr, {}).or_throw();
+  SessionNumber session_ = 0;
+};
+
+TEST_F(GraphPieceWrite, WaitsForRoomInTheQueueAndUntilAllIsApplied) {
+  GraphPiece whole = piece(0, 5);
+  storage::ClosureProposalRecord loop = loop_between(4, 1);
+  loop.verification = storage::Verification::kImported;
+  whole.add_loop(std::move(loop));
+  begin_and_fill(whole);
+  const std::uint64_t before = mapper_->stats().durable_sequence;
+  int asked = 0;
+  const auto last = whole.write(*mapper_, soon(), [&]() -> Status {
+    if (++asked == 2) make_room();
+    return {};
+  });
+  ASSERT_TRUE(last.ok()) << last.status().to_string();
+  EXPECT_GE(asked, 2);
+  EXPECT_GE(*last, before + 6);
+  const auto view = mapper_->view();
+  EXPECT_EQ(view->session(session_)->frames, 5u);
+  const auto hot = view->hot({session_, 4});
+  ASSERT_TRUE(hot);
+  ASSERT_EQ(hot->edges.size(), 2u) << "the odometry and the loop";
+  EXPECT_EQ(hot->edges[1].a, (FrameId{session_, 1}));
+
+  // A piece of which the map holds all frames has nothing to write.
+  GraphPiece again = piece(0, 5);
+  ASSERT_TRUE(again.fit(*view).ok());
+  EXPECT_EQ(again.begin(*mapper_).or_throw(), session_);
+  EXPECT_EQ(again.write(*mapper_, soon(), [] { return Status(); }).or_throw(), 0u);
+}
+
+TEST_F(GraphPieceWrite, EndsWhenItMayNotProceed) {
+  GraphPiece whole = piece(0, 5);
+  begin_and_fill(whole);
+  const auto last = whole.write(*mapper_, soon(), [] { return Status(Reason::SHUTTING_DOWN, "the caller has gone"); });
+  EXPECT_EQ(last.status().to_string(), "SHUTTING_DOWN: the caller has gone");
+  EXPECT_EQ(mapper_->view()->session(session_)->frames, 0u);
+  make_room();
 }
 
 TEST_F(GraphPieceTest, IndicesBeyondTheLargestAreRefused) {

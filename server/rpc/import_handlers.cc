@@ -1,8 +1,3 @@
-#include <future>
-#include <memory>
-#include <thread>
-
-#include "proto/base/crc32c.h"
 #include "proto/base/mutex.h"
 #include "proto/base/names.h"
 #include "proto/geometry/camera.h"
@@ -16,8 +11,6 @@ namespace relmap::rpc {
 namespace {
 
 constexpr int kMaxPerMessage = 1000;
-constexpr std::chrono::milliseconds kPause{5};
-constexpr std::chrono::milliseconds kPatience{50};
 
 Result<SessionHeader> header_of(const v1::ImportGraphRequest& request) {
   const auto uuid = uuid_from_wire(request.session_uuid());
@@ -92,45 +85,6 @@ Result<map::GraphPiece> piece_of(const v1::ImportGraphRequest& request) {
   return piece;
 }
 
-// Writes records to the journal, one after another.
-class Writer {
- public:
-  Writer(map::Mapper& mapper, const Deadline& deadline) : mapper_(mapper), deadline_(deadline) {}
-
-  Status write(const storage::JournalRecord& record) {
-    for (;;) {
-      auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
-      outcomes_.push_back(promise->get_future());
-      const Status queued =
-          mapper_.submit(record, [promise](const Result<std::uint64_t>& sequence) { promise->set_value(sequence); });
-      if (queued.ok()) return {};
-      outcomes_.pop_back();
-      if (queued.reason() != Reason::BUDGET_EXCEEDED) return queued;
-      if (Status in_time = deadline_.check(); !in_time.ok()) return in_time;
-      std::this_thread::sleep_for(kPause);
-    }
-  }
-  // Waits until all records are durable and applied. Returns the sequence of the last one; 0 if there were none.
-  Result<std::uint64_t> finish() {
-    std::uint64_t last = 0;
-    for (auto& outcome : outcomes_) {
-      while (outcome.wait_for(kPatience) != std::future_status::ready)
-        if (Status in_time = deadline_.check(); !in_time.ok()) return in_time;
-      const auto sequence = outcome.get();
-      if (!sequence.ok()) return sequence.status();
-      last = *sequence;
-    }
-    if (last > 0)
-      if (Status applied = mapper_.wait_applied(last, deadline_.at); !applied.ok()) return applied;
-    return last;
-  }
-
- private:
-  map::Mapper& mapper_;
-  const Deadline& deadline_;
-  std::vector<std::future<Result<std::uint64_t>>> outcomes_;
-};
-
 }  // namespace
 
 Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request, const Deadline& deadline,
@@ -147,17 +101,7 @@ Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request,
   reply.set_session(*session);
   reply.set_frames_known(static_cast<std::uint32_t>(request.frames_size()) -
                          static_cast<std::uint32_t>(piece->frames().size()));
-  Writer writer(mapper, deadline);
-  for (const Keyframe& keyframe : piece->frames()) {
-    Bytes payload = encode_keyframe(keyframe);
-    const std::uint32_t crc = crc32c(payload);
-    if (Status taken = writer.write(storage::KeyframeRecord{*session, crc, std::move(payload)}); !taken.ok())
-      return taken;
-  }
-  for (const storage::ClosureProposalRecord& loop : piece->loops())
-    if (Status taken = writer.write(loop); !taken.ok()) return taken;
-  // The next piece is checked against the frames of this one, so they must be in the map first.
-  const auto written = writer.finish();
+  const auto written = piece->write(mapper, deadline.at, [&] { return deadline.check(); });
   if (!written.ok()) return written.status();
   reply.set_journal_sequence(*written);
   reply.set_map_version(mapper.view()->version());
