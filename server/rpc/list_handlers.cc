@@ -3,9 +3,9 @@
 #include <set>
 
 #include "proto/wire/convert.h"
+#include "server/map/label_words.h"
 #include "server/route/edge_list.h"
 #include "server/rpc/handlers.h"
-#include "server/rpc/label_words.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/search_work.h"
 
@@ -112,8 +112,8 @@ Result<v1::FindLabelsReply> find_labels(const v1::FindLabelsRequest& request, co
   std::size_t bytes = 0;
   for (const std::string& label : opened->kept->labels("")) {
     if (Status status = deadline.check(); !status.ok()) return status;
-    if ((!after.empty() && label <= after) || !begins_with(label, request.prefix()) ||
-        !has_words(label, request.words()))
+    if ((!after.empty() && label <= after) || !map::begins_with(label, request.prefix()) ||
+        !map::has_words(label, request.words()))
       continue;
     if (static_cast<std::uint32_t>(reply.labels_size()) == max_labels || bytes > kMaxPageBytes) {
       reply.set_next_page_token(views.token(opened->kept, reply.labels(reply.labels_size() - 1).label()));

@@ -1,8 +1,8 @@
-#include "server/rpc/label_words.h"
+#include "server/map/label_words.h"
 
 #include <gtest/gtest.h>
 
-namespace relmap::rpc {
+namespace relmap::map {
 namespace {
 
 TEST(LabelWords, EachWordBeginsOneOfTheLabel) {
@@ -34,4 +34,4 @@ TEST(LabelWords, APrefixIsFoundInAnyCase) {
 }
 
 }  // namespace
-}  // namespace relmap::rpc
+}  // namespace relmap::map

@@ -1,15 +1,15 @@
-#include "server/rpc/label_words.h"
+#include "server/map/label_words.h"
 
 #include <algorithm>
 #include <string>
 #include <vector>
 
-namespace relmap::rpc {
+namespace relmap::map {
 namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-std::vector<std::string> words_of(std::string_view text) {
+std::vector<std::string> label_words_of(std::string_view text) {
   std::vector<std::string> words;
   bool within = false;
   for (const char given : text) {
@@ -26,7 +26,7 @@ std::vector<std::string> words_of(std::string_view text) {
 }  // namespace
 
 bool has_words(std::string_view label, std::string_view wanted) {
-  const std::vector<std::string> words = words_of(label), asked = words_of(wanted);
+  const std::vector<std::string> words = label_words_of(label), asked = label_words_of(wanted);
   return std::all_of(asked.begin(), asked.end(), [&](const std::string& word) {
     return std::any_of(words.begin(), words.end(), [&](const std::string& one) { return one.starts_with(word); });
   });
@@ -37,4 +37,4 @@ bool begins_with(std::string_view label, std::string_view prefix) {
          std::equal(prefix.begin(), prefix.end(), label.begin(), [](char a, char b) { return lower(a) == lower(b); });
 }
 
-}  // namespace relmap::rpc
+}  // namespace relmap::map
