@@ -26,7 +26,7 @@ struct SeenView {
 
 // Decodes and describes pictures, and checks features. INVALID_ARGUMENT (an empty view, a frame with a camera, options
 // that do not fit), NO_CALIBRATION (the session has no camera), NO_SUCH_SESSION, SESSION_DELETED, NO_SUCH_FRAME, and
-// the reasons of describe_picture() and from_wire().
+// the reasons of place::camera_of_session(), place::describe_picture() and from_wire().
 Result<SeenView> see(const v1::View& view, const storage::Graph& graph);
 
 // The view without its camera, nor what can only be said of pictures of a session's camera: see() takes it for one of

@@ -1,16 +1,17 @@
-#include "server/rpc/picture_query.h"
+#include "server/place/picture_query.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <random>
 
 #include "frontend/vision/picture.h"
 #include "frontend/vision/picture_appearance.h"
 
-namespace relmap::rpc {
+namespace relmap::place {
 namespace {
 
 constexpr int kWidth = 320, kHeight = 240, kShift = 12;
@@ -119,6 +120,36 @@ TEST_F(PictureQuery, RawPicturesAreRectified) {
   EXPECT_GT(described->features.size(), 100u);
 }
 
+TEST_F(PictureQuery, ThePictureTellsWhichCameraOfItsSessionTookIt) {
+  storage::Session session;
+  session.number = 4;
+  session.display_name = "tour";
+  session.header.camera = kCamera;
+  session.header.camera.width = kWidth - 20;
+  const PictureCalibration rectified = session.header.camera;
+  const Bytes smaller = png(wall_(cv::Rect(0, 0, kWidth - 20, kHeight)));
+  const Bytes other = png(wall_(cv::Rect(0, 0, kWidth - 40, kHeight)));
+  const auto camera = [&](std::optional<ByteSpan> left, bool said_rectified) {
+    return camera_of_session(session, left, said_rectified);
+  };
+  EXPECT_TRUE(camera(other, false).or_throw() == rectified) << "it has no other";
+
+  session.header.raw.emplace();
+  session.header.raw->width = kWidth;
+  session.header.raw->height = kHeight;
+  EXPECT_TRUE(camera(left_, false).or_throw() == PictureCalibration(*session.header.raw));
+  EXPECT_TRUE(camera(left_, true).or_throw() == rectified);
+  EXPECT_TRUE(camera(smaller, false).or_throw() == rectified);
+  EXPECT_TRUE(camera({}, false).or_throw() == rectified);
+  EXPECT_EQ(camera(other, false).status().to_string(),
+            "BAD_SIZE: the picture has 280 x 240 pixels; the camera of session 4 takes 320 x 240, rectified 300 x 240");
+
+  session.header.camera = kNoCamera;
+  EXPECT_EQ(camera(left_, false).status().to_string(), "NO_CALIBRATION: session 4 was imported without a camera");
+  session.state = storage::SessionState::kDeleting;
+  EXPECT_EQ(camera(left_, false).status().to_string(), "SESSION_DELETED: session tour was deleted");
+}
+
 TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
   cv::Mat large;
   cv::resize(wall_(cv::Rect(0, 0, kWidth, kHeight)), large, cv::Size(4 * kWidth, 4 * kHeight));
@@ -131,4 +162,4 @@ TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
 }
 
 }  // namespace
-}  // namespace relmap::rpc
+}  // namespace relmap::place

@@ -2,6 +2,7 @@
 // describes it.
 #pragma once
 
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -10,11 +11,19 @@
 #include "proto/calibration/calibration.h"
 #include "proto/geometry/camera.h"
 #include "proto/keyframe/keyframe.h"
+#include "storage/graph/frame.h"
 
-namespace relmap::rpc {
+namespace relmap::place {
 
 // The calibration of the pictures as given: none, that of rectified pictures, or that of raw ones.
 using PictureCalibration = std::variant<std::monostate, StereoCamera, StereoCalibration>;
+
+// The camera of a session that took a picture, `left`: the raw one or, if the picture is said to be rectified or has
+// the size that only rectified pictures have, the rectified one. Features, which have no picture, are of the rectified
+// one. SESSION_DELETED, NO_CALIBRATION (the session was imported without a camera), BAD_SIZE (no picture of the session
+// has this size), and the reasons of vision::picture_size().
+Result<PictureCalibration> camera_of_session(const storage::Session& session, std::optional<ByteSpan> left,
+                                             bool rectified);
 
 // JPEG or PNG files; `right` may be empty.
 struct PictureQuestion {
@@ -37,4 +46,4 @@ struct DescribedPicture {
 // it), EYE_DEAD (the left picture of a pair shows nothing), ROWS_APART (a pair of different times, or not rectified).
 Result<DescribedPicture> describe_picture(const PictureQuestion& question);
 
-}  // namespace relmap::rpc
+}  // namespace relmap::place

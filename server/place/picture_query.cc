@@ -1,7 +1,8 @@
-#include "server/rpc/picture_query.h"
+#include "server/place/picture_query.h"
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "frontend/vision/exposure.h"
 #include "frontend/vision/picture.h"
@@ -12,7 +13,7 @@
 #include "proto/base/number_text.h"
 #include "server/place/stereo_pair.h"
 
-namespace relmap::rpc {
+namespace relmap::place {
 
 namespace {
 
@@ -75,6 +76,24 @@ Status check_files(const PictureQuestion& question, const vision::PictureSize& l
 
 }  // namespace
 
+Result<PictureCalibration> camera_of_session(const storage::Session& session, std::optional<ByteSpan> left,
+                                             bool rectified) {
+  if (storage::is_going(session)) return {Reason::SESSION_DELETED, "session " + session.display_name + " was deleted"};
+  const StereoCamera& camera = session.header.camera;
+  if (camera == kNoCamera)
+    return {Reason::NO_CALIBRATION, "session " + std::to_string(session.number) + " was imported without a camera"};
+  const auto& raw = session.header.raw;
+  if (!raw || rectified || !left) return PictureCalibration(camera);
+  const auto size = vision::picture_size(*left);
+  if (!size.ok()) return size.status();
+  if (size->width == raw->width && size->height == raw->height) return PictureCalibration(*raw);
+  if (size->width == camera.width && size->height == camera.height) return PictureCalibration(camera);
+  return {Reason::BAD_SIZE, "the picture has " + size_text(size->width, size->height) +
+                                " pixels; the camera of session " + std::to_string(session.number) + " takes " +
+                                size_text(raw->width, raw->height) + ", rectified " +
+                                size_text(camera.width, camera.height)};
+}
+
 Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   const auto size = vision::picture_size(question.left);
   if (!size.ok()) return size.status();
@@ -119,7 +138,7 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   if (!right_grey.empty() && vision::measure_exposure(right_grey).blind())
     right_grey = vision::Image();  // the left picture is used alone
   if (!right_grey.empty())
-    if (Status status = place::check_stereo_pair(left_grey, right_grey, result.camera); !status.ok()) return status;
+    if (Status status = check_stereo_pair(left_grey, right_grey, result.camera); !status.ok()) return status;
   result.features = vision::picture_appearance(left_grey);
   if (!right_grey.empty())
     add_disparities(left_grey, right_grey, result.features);
@@ -128,4 +147,4 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   return result;
 }
 
-}  // namespace relmap::rpc
+}  // namespace relmap::place
