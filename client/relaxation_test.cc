@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "proto/geometry/covariance.h"
+
 namespace relmap::client {
 namespace {
 
@@ -62,7 +64,7 @@ double cost(const std::vector<RelaxationEdge>& edges, const std::vector<SE3>& po
   double sum = 0;
   for (const RelaxationEdge& e : edges) {
     const Vector6 r = (e.T_ab.inverse() * poses[e.a.index].inverse() * poses[e.b.index]).log();
-    sum += r.dot(e.covariance.inverse() * r);
+    sum += mahalanobis_squared(r, e.covariance);
   }
   return sum;
 }

@@ -48,11 +48,12 @@ function(relmap_apart)
 endfunction()
 
 # Much of the time to compile a file goes into the headers of others, so the commonest are compiled once:
-#   relmap_precompiled           the standard library and Eigen
-#   relmap_precompiled_terminal  the same for command lines, which are compiled with -O1: what they ask for is done elsewhere,
-#                                and CLI11 takes GCC half as long again with -O3 (GCC obeys the -O of the precompiled headers)
-#   relmap_precompiled_test      and GoogleTest, for tests; they are compiled with -O1, for what they measure is in the
-#                                libraries
+#   relmap_precompiled        the standard library and Eigen
+#   relmap_precompiled_quick  the same for command lines and what tests share, which are compiled with -O1: the work that
+#                             they ask for is done elsewhere, and CLI11 takes GCC half as long again with -O3 (GCC obeys
+#                             the -O of the precompiled headers)
+#   relmap_precompiled_test   and GoogleTest, for tests; they are compiled with -O1, for what they measure is in the
+#                             libraries
 # (CLI11 is better left out: it has objects that each file which sees them must build.) The headers are named, not
 # gathered in a file of our own, so that the compiler cache serves every checkout. CMAKE_DISABLE_PRECOMPILE_HEADERS=ON
 # builds without; tools/fuzz does, and so finds an #include that is missing.
@@ -72,14 +73,14 @@ function(relmap_precompile name)
     <unordered_map> <unordered_set> <variant> <vector> <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> ${arg_HEADERS})
 endfunction()
 relmap_precompile(relmap_precompiled)
-relmap_precompile(relmap_precompiled_terminal OPTIONS ${RELMAP_QUICK_OPTIONS})
+relmap_precompile(relmap_precompiled_quick OPTIONS ${RELMAP_QUICK_OPTIONS})
 relmap_precompile(relmap_precompiled_test LINK GTest::gmock HEADERS <gmock/gmock.h> <gtest/gtest.h>
                   OPTIONS ${RELMAP_QUICK_OPTIONS})
-# In a folder of command lines: set(RELMAP_COMMAND_LINE ON)
+# In a folder whose libraries and programs are compiled with -O1: set(RELMAP_QUICK ON)
 function(relmap_precompiled_headers name)
-  if(RELMAP_COMMAND_LINE)
+  if(RELMAP_QUICK)
     target_compile_options(${name} PRIVATE ${RELMAP_QUICK_OPTIONS})
-    target_precompile_headers(${name} REUSE_FROM relmap_precompiled_terminal)
+    target_precompile_headers(${name} REUSE_FROM relmap_precompiled_quick)
   else()
     target_precompile_headers(${name} REUSE_FROM relmap_precompiled)
   endif()

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "frontend/capture/stereo_source.h"
+#include "proto/geometry/covariance.h"
 #include "server/map/lookup.h"
 #include "tests/support/data_test.h"
 #include "tests/support/euroc_truth.h"
@@ -169,7 +170,7 @@ class EurocPictures : public DataTest {
       const SE3 off = truth.inverse() * answer.T_frame_view;
       const Vector6 error = off.log();
       const Matrix6 covariance = answer.covariance + Matrix6(of_truth.asDiagonal());
-      const double nees = error.dot(covariance.ldlt().solve(error));
+      const double nees = mahalanobis_squared(error, covariance);
       judged.metres.push_back(off.t.norm());
       judged.nees += nees;
       std::printf("%s, %s: %s off by %.3f m (sigma %.3f), %.2f degrees (sigma %.2f), NEES %.1f, %u inliers\n",

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "proto/calibration/calibration.h"
+#include "proto/geometry/covariance.h"
 #include "tests/support/drive_evaluation.h"
 #include "tests/support/other_camera.h"
 #include "tests/support/process.h"
@@ -144,7 +145,7 @@ TEST(WrongCamera, PicturesThroughAnUnknownLensHaveHonestCovariances) {
   for (const auto& [share, pair, found] : answers) {
     const SE3 off = (world.pose(found.frame).inverse() * truth.poses[pair]).inverse() * found.T_frame_view;
     const Vector6 error = off.log();
-    const double of_it = error.dot(found.covariance.ldlt().solve(error));
+    const double of_it = mahalanobis_squared(error, found.covariance);
     nees += of_it / static_cast<double>(answers.size());
     std::printf("%.1f, pair %zu: off by %.2f m (sigma %.2f), NEES %.1f, %u inliers\n", share, pair, off.t.norm(),
                 std::sqrt(found.covariance.topLeftCorner<3, 3>().trace()), of_it, found.inliers);

@@ -16,6 +16,7 @@
 #include "frontend/tracking/stereo_offset.h"
 #include "frontend/vision/motion.h"
 #include "frontend/vision/rotation.h"
+#include "proto/geometry/covariance.h"
 
 namespace relmap::tracking {
 
@@ -314,7 +315,7 @@ struct StereoTracker::Impl {
     const Matrix6 own = chosen.covariance;
     const auto make_room = [&](const SE3& T_keyframe_rival, const Matrix6& covariance) {
       const Vector6 apart = (chosen.T_keyframe_pair.inverse() * T_keyframe_rival).log();
-      if (apart.dot((chosen.covariance + covariance).ldlt().solve(apart)) > kElsewhere)
+      if (mahalanobis_squared(apart, chosen.covariance + covariance) > kElsewhere)
         chosen.covariance += apart * apart.transpose();
     };
     for (std::size_t i = 0; i < found.size(); ++i)

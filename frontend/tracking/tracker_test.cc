@@ -13,6 +13,7 @@
 #include "frontend/tracking/drift.h"
 #include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/wall_for_test.h"
+#include "proto/geometry/covariance.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 
@@ -122,7 +123,7 @@ double nees(const Keyframe& from, const Keyframe& to) {
   const SE3 truth = Street::get().step(frame_at(from.time_us), frame_at(to.time_us));
   const SE3 estimate = from.T_odom_frame.inverse() * to.T_odom_frame;
   const Vector6 error = (estimate.inverse() * truth).log();
-  return error.dot(to.step_covariance.ldlt().solve(error));
+  return mahalanobis_squared(error, to.step_covariance);
 }
 
 double rotation_error(const SE3& estimate, const SE3& truth) {
@@ -482,7 +483,7 @@ Keyframe after_a_gap(const testing_wall::Wall& first, const testing_wall::Wall& 
 
 double nees_of(const Keyframe& keyframe, const SE3& truth) {
   const Vector6 error = (keyframe.T_odom_frame.inverse() * truth).log();
-  return error.dot(keyframe.step_covariance.ldlt().solve(error));
+  return mahalanobis_squared(error, keyframe.step_covariance);
 }
 
 // The middle of the wall repeats every 24 cm, as a chequerboard does, and the robot has moved by 20 cm: most of the

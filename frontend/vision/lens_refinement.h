@@ -15,6 +15,7 @@
 #include "frontend/vision/lens.h"
 #include "frontend/vision/motion.h"
 #include "frontend/vision/robust_refinement.h"
+#include "proto/geometry/covariance.h"
 
 namespace relmap::vision {
 
@@ -129,7 +130,7 @@ class LensProblem {
     double sum = 0;
     for (const Correspondence& c : all_) {
       const Residual r = residual(inverse, state.lens, c, false);
-      sum += r.rows == 0 ? max_cost : std::min(max_cost, r.value.dot(r.covariance.ldlt().solve(r.value)));
+      sum += r.rows == 0 ? max_cost : std::min(max_cost, mahalanobis_squared(r.value, r.covariance));
     }
     return sum;
   }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <random>
 
+#include "proto/geometry/covariance.h"
+
 namespace relmap::vision {
 namespace {
 
@@ -47,7 +49,7 @@ Scene make_scene(unsigned seed, std::size_t count, double outlier_share, double 
 
 double chi2(const Scene& scene, const Motion& motion) {
   const Vector6 error = (motion.T_reference_camera.inverse() * scene.truth).log();
-  return error.dot(motion.covariance.ldlt().solve(error));
+  return mahalanobis_squared(error, motion.covariance);
 }
 
 TEST(Motion, IsExactWithoutNoise) {

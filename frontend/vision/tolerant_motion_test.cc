@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <random>
 
 #include "frontend/vision/lens.h"
+#include "proto/geometry/covariance.h"
 
 namespace relmap::vision {
 namespace {
@@ -34,7 +34,7 @@ struct Errors {
 
   void add(const Motion& motion) {
     const Vector6 error = (kPose.inverse() * motion.T_reference_camera).log();
-    nees += error.dot(motion.covariance.ldlt().solve(error));
+    nees += mahalanobis_squared(error, motion.covariance);
     metres += (motion.T_reference_camera.t - kPose.t).norm();
     sigma += std::sqrt(motion.covariance.topLeftCorner<3, 3>().trace());
     ++count;

@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <random>
 #include <string>
+
+#include "proto/geometry/covariance.h"
 
 namespace relmap::vision {
 namespace {
@@ -37,7 +38,7 @@ Lens plain(double f) { return {f, 319.5, 239.5, 0, 0}; }
 
 double nees_of(const MotionAndLens& found) {
   const Vector6 error = (kPose.inverse() * found.motion.T_reference_camera).log();
-  return error.dot(found.motion.covariance.ldlt().solve(error));
+  return mahalanobis_squared(error, found.motion.covariance);
 }
 
 MotionOptions options() {

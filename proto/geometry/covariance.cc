@@ -41,4 +41,17 @@ Status check_covariance(const Matrix6& covariance) {
   return {};
 }
 
+// Not templates, so that Eigen's solvers are compiled here only.
+double mahalanobis_squared(const Vector2& error, const Eigen::Matrix2d& covariance) {
+  return error.dot(covariance.ldlt().solve(error));
+}
+
+double mahalanobis_squared(const Vector3& error, const Matrix3& covariance) {
+  return error.dot(covariance.ldlt().solve(error));
+}
+
+double mahalanobis_squared(const Vector6& error, const Matrix6& covariance) {
+  return error.dot(covariance.ldlt().solve(error));
+}
+
 }  // namespace relmap

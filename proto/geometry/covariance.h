@@ -1,4 +1,5 @@
-// Covariances of SE(3) that come from outside: their plausibility, and the 21 numbers of their upper triangle.
+// Covariances: the distance of an error in units of one, the plausibility of those that come from outside, and the 21
+// numbers of the upper triangle.
 #pragma once
 
 #include <array>
@@ -18,5 +19,12 @@ Matrix6 from_upper_triangle(const UpperTriangle& values);
 // 1e-9 .. 1e6 m or rad, and it is positive definite: each coordinate keeps at least 1e-9 of its variance when those
 // before it are given.
 Status check_covariance(const Matrix6& covariance);
+
+// The squared Mahalanobis distance of `error` from zero: error^T covariance^-1 error. It is chi-squared distributed
+// with as many degrees of freedom as `error` has components if the error is Gaussian with this covariance. The result
+// means nothing if the covariance is not positive definite; it may be negative or NaN then.
+double mahalanobis_squared(const Vector2& error, const Eigen::Matrix2d& covariance);
+double mahalanobis_squared(const Vector3& error, const Matrix3& covariance);
+double mahalanobis_squared(const Vector6& error, const Matrix6& covariance);
 
 }  // namespace relmap

@@ -48,5 +48,21 @@ TEST(Covariance, ImplausibleOnesAreNamed) {
   EXPECT_EQ(check_covariance(askew).reason(), Reason::BAD_COVARIANCE);
 }
 
+TEST(Covariance, TheMahalanobisDistanceIsTheNormOfTheWhitenedError) {
+  Matrix6 root = Matrix6::Zero();  // lower triangular, so its product with its transpose is positive definite
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j) root(i, j) = i == j ? 0.1 * (i + 1) : 0.03 * (i - 2 * j);
+  const Matrix6 covariance = root * root.transpose();
+  Vector6 white;
+  white << 1, -2, 0.5, 3, -1, 0.25;
+  EXPECT_NEAR(mahalanobis_squared(Vector6(root * white), covariance), white.squaredNorm(), 1e-9);
+  const Matrix3 root3 = root.topLeftCorner<3, 3>();
+  EXPECT_NEAR(mahalanobis_squared(Vector3(root3 * white.head<3>()), Matrix3(root3 * root3.transpose())),
+              white.head<3>().squaredNorm(), 1e-9);
+  const Eigen::Matrix2d root2 = root.topLeftCorner<2, 2>();
+  EXPECT_NEAR(mahalanobis_squared(Vector2(root2 * white.head<2>()), Eigen::Matrix2d(root2 * root2.transpose())),
+              white.head<2>().squaredNorm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace relmap

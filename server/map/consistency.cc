@@ -1,10 +1,10 @@
 #include "server/map/consistency.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <set>
 #include <unordered_map>
 
+#include "proto/geometry/covariance.h"
 #include "server/map/carried_stretch.h"
 #include "server/map/sorted.h"
 #include "server/map/uncertain.h"
@@ -18,7 +18,7 @@ bool returns_home(const Uncertain& loop, const ConsistencyRules& rules) {
   Matrix6 covariance = loop.covariance;
   covariance.diagonal().head<3>().array() += rules.floor_metres * rules.floor_metres;
   covariance.diagonal().tail<3>().array() += rules.floor_radians * rules.floor_radians;
-  const double chi2 = error.dot(covariance.ldlt().solve(error));
+  const double chi2 = mahalanobis_squared(error, covariance);
   return std::isfinite(chi2) && chi2 <= kChi2With6At99;
 }
 

@@ -1,8 +1,8 @@
 #include "server/map/unmeasured_steps.h"
 
-#include <Eigen/Cholesky>
 #include <set>
 
+#include "proto/geometry/covariance.h"
 #include "server/map/uncertain.h"
 #include "server/route/edge_access.h"
 #include "storage/graph/frame.h"
@@ -36,7 +36,7 @@ bool is_near(const SE3& T) { return T.t.norm() <= kNearMetres && rotation_angle(
 
 bool allows(const storage::Edge& step, const SE3& T_ab) {
   const Vector6 change = (step.prior_T_ab.inverse() * T_ab).log();
-  const double chi2 = change.dot(step.prior_covariance.ldlt().solve(change));
+  const double chi2 = mahalanobis_squared(change, step.prior_covariance);
   return chi2 <= kChi2With6At99;  // false for NaN
 }
 

@@ -13,7 +13,7 @@ bool one_point(const MapPoint& p, const MapPoint& q) {
   const double floor = 0.01 * p.point.norm();
   const Matrix3 covariance = p.covariance + q.covariance + floor * floor * Matrix3::Identity();
   const Vector3 apart = p.point - q.point;
-  return apart.dot(covariance.ldlt().solve(apart)) < 16;
+  return mahalanobis_squared(apart, covariance) < 16;
 }
 
 std::uint32_t nearest(const std::uint32_t* distances, std::size_t count, std::size_t step) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <unordered_set>
 
+#include "proto/geometry/covariance.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
@@ -32,9 +33,9 @@ bool inside_gate(const AppearanceFeature& feature, const StereoCamera& camera, c
   if (is_mono(z)) {
     const Eigen::Matrix2d S2 = S.topLeftCorner<2, 2>();
     const Vector2 r = residual.head<2>();
-    return r.dot(S2.ldlt().solve(r)) <= kChi2With2At99;
+    return mahalanobis_squared(r, S2) <= kChi2With2At99;
   }
-  return residual.dot(S.ldlt().solve(residual)) <= kChi2With3At99;
+  return mahalanobis_squared(residual, S) <= kChi2With3At99;
 }
 
 std::uint32_t distance(const AppearanceFeature& feature, const Target& target) {

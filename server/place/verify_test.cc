@@ -6,6 +6,7 @@
 #include <map>
 #include <random>
 
+#include "proto/geometry/covariance.h"
 #include "server/place/testing/synthetic_street.h"
 
 namespace relmap::place {
@@ -142,7 +143,7 @@ double mean_nees(bool stereo, int trials) {
     EXPECT_TRUE(place.ok()) << place.status().to_string();
     if (!place.ok()) continue;
     const Vector6 error = (truth(street, *place).inverse() * place->T_match_query).log();
-    sum += error.dot(place->covariance.ldlt().solve(error)) / trials;
+    sum += mahalanobis_squared(error, place->covariance) / trials;
   }
   return sum;
 }

@@ -14,6 +14,7 @@
 #include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/stamps.h"
 #include "frontend/tracking/tracker.h"
+#include "proto/geometry/covariance.h"
 #include "tools/bench/klt_odometry.h"
 #include "tools/bench/picture_drive.h"
 #include "tools/bench/stopwatch.h"
@@ -228,7 +229,7 @@ class Drive {
       const SE3 true_step = last_->truth.inverse() * truth;
       const SE3 step = last_->estimate.inverse() * keyframe.T_odom_frame;
       const Vector6 error = (step.inverse() * true_step).log();
-      const double nees = error.dot(keyframe.step_covariance.ldlt().solve(error));
+      const double nees = mahalanobis_squared(error, keyframe.step_covariance);
       totals_.nees.push_back(nees);
       if (!is_vision(keyframe.source)) totals_.blind_nees.push_back(nees);
       if (keyframe.source == MotionSource::kGyro)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "proto/geometry/covariance.h"
 #include "server/rba/local_map.h"
 #include "server/rba/measurement.h"
 #include "server/rba/region.h"
@@ -48,7 +49,7 @@ double nees_of_chains(testing::SimulatedDrive& drive, std::uint32_t edges) {
     if (found.edges != edges) continue;  // there is a shorter way, over a loop edge
     const SE3 truth = drive.world().T_world_frame(end - edges).inverse() * drive.world().T_world_frame(end);
     const Vector6 error = (truth.inverse() * found.T_ab).log();
-    sum += error.dot(found.covariance.llt().solve(error));
+    sum += mahalanobis_squared(error, found.covariance);
     ++chains;
   }
   return sum / chains;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "proto/geometry/covariance.h"
 #include "proto/keyframe/motion_source_name.h"
 
 namespace relmap::cli {
@@ -68,7 +69,7 @@ std::optional<Tear> tear_of(const RelaxedMap::Spring& spring, const MapPart& par
   const client::RelaxationEdge& edge = spring.relaxed;
   const SE3 off = edge.T_ab.inverse() * (part.find(edge.a)->inverse() * *part.find(edge.b));
   const Vector6 xi = off.log();
-  const double sigmas = std::sqrt(std::max(0.0, xi.dot(edge.covariance.ldlt().solve(xi))));
+  const double sigmas = std::sqrt(std::max(0.0, mahalanobis_squared(xi, edge.covariance)));
   if (sigmas <= kTearSigmas) return std::nullopt;
   return Tear{spring.edge, edge.a, edge.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
 }

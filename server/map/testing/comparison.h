@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/geometry/covariance.h"
 #include "storage/graph/binding.h"
 #include "storage/graph/graph.h"
 
@@ -65,7 +66,7 @@ inline Difference largest_difference(const storage::Graph& a, const storage::Gra
     if (!mine || !other) continue;
     const storage::Edge& step = other->edges.front();
     const Vector6 xi = (step.T_ab.inverse() * mine->edges.front().T_ab).log();
-    const double sigmas = std::sqrt(xi.dot(step.covariance.llt().solve(xi)) / 6);
+    const double sigmas = std::sqrt(mahalanobis_squared(xi, step.covariance) / 6);
     if (!std::isfinite(sigmas)) return {sigmas, sigmas, sigmas};
     max_difference.sigmas = std::max(max_difference.sigmas, sigmas);
     max_difference.metres = std::max(max_difference.metres, xi.head<3>().norm());
