@@ -19,8 +19,7 @@
 #include "storage/maintenance/rebuild.h"
 #include "storage/map/map.h"
 #include "storage/map/pending_frames.h"
-#include "storage/migrate/format1_frames.h"
-#include "storage/migrate/format1_state.h"
+#include "storage/migrate/format1.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
