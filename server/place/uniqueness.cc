@@ -6,7 +6,6 @@
 #include <set>
 
 #include "server/place/place_neighbours.h"
-#include "server/place/same_photograph.h"
 #include "server/place/same_place.h"
 
 namespace relmap::place {
