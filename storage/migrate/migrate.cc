@@ -14,7 +14,6 @@
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
 #include "storage/graph/precision.h"
-#include "storage/io/copy_file.h"
 #include "storage/io/file.h"
 #include "storage/maintenance/rebuild.h"
 #include "storage/map/map.h"

@@ -7,7 +7,7 @@
 
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
-#include "storage/io/copy_file.h"
+#include "storage/io/file.h"
 #include "storage/rocksdb/partial_folder.h"
 #include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/rocksdb_engine.h"

@@ -7,8 +7,8 @@
 #include <filesystem>
 
 #include "proto/base/mutex.h"
-#include "storage/io/copy_file.h"
 #include "storage/io/disk_space.h"
+#include "storage/io/file.h"
 #include "storage/journal/journal_log.h"
 #include "storage/journal/journal_segment.h"
 #include "storage/maintenance/stored_hash.h"

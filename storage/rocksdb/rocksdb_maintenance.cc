@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "storage/io/copy_file.h"
+#include "storage/io/file.h"
 #include "storage/rocksdb/rocksdb_status.h"
 
 namespace relmap::storage {
