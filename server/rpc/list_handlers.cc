@@ -4,10 +4,10 @@
 
 #include "proto/wire/convert.h"
 #include "server/route/edge_list.h"
+#include "server/rpc/charge.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/label_words.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/search_work.h"
 
 namespace relmap::rpc {
 
