@@ -1,12 +1,15 @@
 #include "frontend/report_file.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <iomanip>
+#include <ios>
 #include <numeric>
 #include <utility>
 
 #include "frontend/figures.h"
-#include "frontend/table_file.h"
 
 namespace relmap::frontend {
 
@@ -17,6 +20,23 @@ constexpr const char* kNames =
     "anew\tlandmarks\texpected\tfound\tinliers\trms_px\tspeed\t"
     "turn_deg\tcorrelation\toffset_px\tleft_ms\tright_ms\tfeatures_ms\trotation_ms\tmatch_ms\tmotion_ms\ttracking_ms\t"
     "description_ms";
+
+// Opens a file for writing, whose first line is `names`. Replaces an existing file; if an interrupted run `goes_on`,
+// appends to it. IO_ERROR; INVALID_ARGUMENT if the existing file has other columns, so that it is no report of this
+// kind.
+Result<std::ofstream> open_table(const std::string& path, const std::string& names, bool goes_on) {
+  std::error_code error;
+  std::string found;
+  const bool is_file = std::filesystem::is_regular_file(path, error);  // a device may give lines without end
+  if (is_file) std::getline(std::ifstream(path), found);
+  if (found != names && is_file && std::filesystem::file_size(path, error) > 0)
+    return {Reason::INVALID_ARGUMENT, path + " has not the columns of a report: it is neither replaced nor gone on in"};
+  std::ofstream out(path, goes_on ? std::ios::app : std::ios::trunc);
+  if (!out) return {Reason::IO_ERROR, path + " cannot be written: " + std::strerror(errno)};
+  if (!goes_on || found.empty()) out << names << '\n';
+  out << std::fixed << std::flush;
+  return out;
+}
 
 double turn_deg(const tracking::PairReport& report) { return kDegrees * rotation_angle(report.R_previous_this); }
 
@@ -114,6 +134,29 @@ void ReportFile::write_summary() {
 
 Status ReportFile::close() {
   write_summary();
+  out_.close();
+  if (!out_) return {Reason::IO_ERROR, path_ + " is not complete"};
+  return {};
+}
+
+Result<PictureReport> PictureReport::open(const std::string& path, bool goes_on) {
+  auto out = open_table(path, "picture\tfile\ttime_us\tkeyframe\tfeatures\tdescription_ms", goes_on);
+  if (!out.ok()) return out.status();
+  return PictureReport(path, std::move(*out));
+}
+
+void PictureReport::add(const tracking::MonoPicture& picture) {
+  const Keyframe& keyframe = picture.keyframe;
+  out_ << picture.index << '\t' << picture.picture << '\t' << keyframe.time_us << '\t' << keyframe.sequence << '\t'
+       << keyframe.appearance.size() << '\t' << std::setprecision(3) << picture.description_ms << std::endl;
+  ++keyframes_;
+  features_ += keyframe.appearance.size();
+}
+
+Status PictureReport::close() {
+  out_ << "# keyframes\t" << keyframes_ << '\n';
+  if (keyframes_ > 0)
+    out_ << "# features, mean\t" << static_cast<double>(features_) / static_cast<double>(keyframes_) << '\n';
   out_.close();
   if (!out_) return {Reason::IO_ERROR, path_ + " is not complete"};
   return {};

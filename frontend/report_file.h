@@ -1,4 +1,5 @@
-// Writes the figures of each pair to a file of tab-separated lines, with a summary.
+// Writes the figures of each pair, or of each picture of a mono session, to a file of tab-separated lines, with a
+// summary.
 #pragma once
 
 #include <array>
@@ -9,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/tracking/mono_keyframes.h"
 #include "frontend/tracking/pipeline.h"
 
 namespace relmap::frontend {
@@ -61,6 +63,24 @@ class ReportFile {
   std::uint64_t pairs_ = 0, tracked_ = 0, keyframes_ = 0, steps_ = 0, metric_steps_ = 0;
   std::optional<Vector3> position_;
   double distance_ = 0;
+};
+
+// The same for a mono session: a line for each picture that became a keyframe, and at the end their number and the mean
+// of their features.
+class PictureReport {
+ public:
+  // Like ReportFile::open().
+  static Result<PictureReport> open(const std::string& path, bool goes_on);
+
+  void add(const tracking::MonoPicture& picture);
+  Status close();  // IO_ERROR if something did not reach the disk
+
+ private:
+  PictureReport(std::string path, std::ofstream out) : path_(std::move(path)), out_(std::move(out)) {}
+
+  std::string path_;
+  std::ofstream out_;
+  std::uint64_t keyframes_ = 0, features_ = 0;
 };
 
 }  // namespace relmap::frontend

@@ -1,4 +1,5 @@
-// Like forgetful_disk_test, with the engine of a data folder: the power fails for RocksDB and the journal together.
+// Like forgetful_disk_test, with the engine of a data folder: the power fails for RocksDB, the journal and the folders
+// together.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,6 +26,7 @@ class Disk final : public FailingDisk {
     options.cache_bytes = std::size_t{8} << 20;
     options.journal_files = journal_;
     options.map_files = map_;
+    options.folder_files = std::make_shared<storage::ForgetfulFolders>(map_);
     return storage::open_rocksdb(folder_ / "data", options);
   }
   void fail_power_after(std::uint64_t operations) override {

@@ -18,8 +18,8 @@
 #include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
-#include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
+#include "server/ingest/mapper_sink.h"
 #include "server/intake/testing/fake_sink.h"
 
 namespace relmap::testing {

@@ -14,7 +14,6 @@
 #include "frontend/publishing/spool_file.h"
 #include "proto/base/crc32c.h"
 #include "proto/keyframe/extension_codec.h"
-#include "proto/keyframe/header_extensions.h"
 #include "proto/keyframe/keyframe.h"
 
 namespace relmap::publishing {

@@ -1,5 +1,7 @@
 #include "frontend/vision/picture.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,7 +11,6 @@
 #include <utility>
 
 #include "frontend/vision/jpeg.h"
-#include "frontend/vision/png.h"
 
 namespace relmap::vision {
 
@@ -48,6 +49,24 @@ Result<PictureSize> png_size(ByteSpan file) {
     return {Reason::PICTURE_TOO_LARGE,
             "declares " + std::to_string(width) + " x " + std::to_string(height) + " pixels"};
   return refuse_if_large({static_cast<int>(width), static_cast<int>(height), true});
+}
+
+// Checks the chunks of a PNG up to IEND before it is decoded: each must have the length and the CRC that it states.
+// OpenCV lets libpng write to standard error without the file's name.
+Status check_png(ByteSpan file) {
+  constexpr std::size_t kSignature = 8, kFrame = 12;  // length, type and CRC of a chunk
+  for (std::size_t at = kSignature; at + kFrame <= file.size();) {
+    const std::size_t length = big_endian(file, at, 4);
+    if (length > file.size() - at - kFrame) break;
+    const std::string type(file.begin() + static_cast<std::ptrdiff_t>(at) + 4,
+                           file.begin() + static_cast<std::ptrdiff_t>(at) + 8);
+    if (crc32_z(0, &file[at + 4], 4 + length) != big_endian(file, at + 8 + length, 4))
+      return {Reason::PICTURE_DAMAGED,
+              "PNG is damaged in the chunk of " + std::to_string(length) + " bytes at byte " + std::to_string(at)};
+    if (type == "IEND") return {};
+    at += kFrame + length;
+  }
+  return {Reason::PICTURE_DAMAGED, "PNG is cut short"};
 }
 
 // Walks the markers of a JPEG (ITU T.81, B): finds its size, whether it is complete, and how much memory decoding

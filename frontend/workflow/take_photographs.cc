@@ -5,7 +5,7 @@
 
 #include "frontend/capture/recording_identity.h"
 #include "frontend/capture/stereo_source.h"
-#include "frontend/picture_report.h"
+#include "frontend/report_file.h"
 #include "frontend/tracking/mono_keyframes.h"
 #include "frontend/workflow/delivery.h"
 #include "frontend/workflow/input.h"

@@ -2,12 +2,18 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
+
+#include "proto/calibration/calibration_bytes.h"
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap {
 namespace {
 
 constexpr std::size_t kCountBytes = 2;
 constexpr std::size_t kHeadBytes = 4 + 4;  // tag, length
+
+constexpr std::uint32_t kRawCalibration = 21;  // tag in a session's header
 
 auto place_of(Extensions& extensions, std::uint32_t tag) {
   return std::lower_bound(extensions.begin(), extensions.end(), tag,
@@ -96,6 +102,22 @@ std::size_t heap_bytes(const Extensions& extensions) {
   std::size_t bytes = extensions.capacity() == 0 ? 0 : extensions.capacity() * sizeof(Extension) + kAllocation;
   for (const Extension& extension : extensions) bytes += extension.bytes.capacity() + kAllocation;
   return bytes;
+}
+
+Extensions header_extensions(const SessionHeader& header) {
+  Extensions all = header.unknown;
+  if (header.raw) add_extension(all, kRawCalibration, encode_calibration(*header.raw));
+  return all;
+}
+
+bool set_header_extensions(SessionHeader& header, Extensions all) {
+  const auto raw = take_extension(all, kRawCalibration);
+  header.unknown = std::move(all);
+  if (!raw) return true;
+  auto calibration = decode_calibration(*raw);
+  if (!calibration.ok()) return false;
+  header.raw = std::move(*calibration);
+  return true;
 }
 
 }  // namespace relmap

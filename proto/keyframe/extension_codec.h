@@ -11,6 +11,8 @@
 
 namespace relmap {
 
+struct SessionHeader;  // keyframe.h
+
 // Limits for one record. Unknown extensions are kept in memory and written again, so they must be small.
 inline constexpr std::size_t kMaxExtensions = 32;
 inline constexpr std::size_t kMaxExtensionBytes = 4096;  // encoded, including count, tags and lengths
@@ -34,5 +36,11 @@ void add_extension(Extensions& extensions, std::uint32_t tag, Bytes bytes);
 
 // The heap memory of `extensions`, for the budget.
 std::size_t heap_bytes(const Extensions& extensions);
+
+// The extensions of a session's header, wherever it is stored: in keyframes, in the map, in the journal and in a
+// robot's spool. They are the fields that this version knows, and header.unknown.
+Extensions header_extensions(const SessionHeader& header);
+// Sets the fields that this version knows from `all`, and header.unknown to the rest. False: a field is malformed.
+bool set_header_extensions(SessionHeader& header, Extensions all);
 
 }  // namespace relmap

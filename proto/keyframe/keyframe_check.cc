@@ -8,7 +8,6 @@
 #include "proto/geometry/canonical_rotation.h"
 #include "proto/geometry/covariance.h"
 #include "proto/keyframe/extension_codec.h"
-#include "proto/keyframe/header_extensions.h"
 #include "proto/keyframe/keyframe.h"
 
 namespace relmap {

@@ -10,4 +10,19 @@ std::size_t MapperSink::free_bytes() const {
   return allowed - std::min(allowed, budget.used(storage::Share::kQueues));
 }
 
+std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure) {
+  const auto session = map.session(closure.b.session);
+  if (!session || !storage::is_metric(closure.verification)) return std::nullopt;
+  PoseNews news;
+  news.session = session->header.uuid;
+  news.kind = closure.state == storage::EdgeState::kAccepted    ? PoseNews::Kind::kClosure
+              : closure.state == storage::EdgeState::kCandidate ? PoseNews::Kind::kLocalised
+                                                                : PoseNews::Kind::kClosureOut;
+  news.keyframe = closure.b;
+  news.frame = closure.a;
+  news.T_frame_keyframe = closure.T_ab;
+  news.covariance = closure.covariance;
+  return news;
+}
+
 }  // namespace relmap::ingest

@@ -1,8 +1,12 @@
-// The map as a sink of the intake.
+// The map as the intake sees it: a sink of keyframes, and a source of news for robots.
 #pragma once
 
+#include <optional>
+
+#include "proto/keyframe/ingest_messages.h"
 #include "server/intake/keyframe_sink.h"
 #include "server/map/mapper.h"
+#include "storage/graph/graph.h"
 
 namespace relmap::ingest {
 
@@ -21,5 +25,9 @@ class MapperSink final : public intake::KeyframeSink {
  private:
   map::Mapper& mapper_;
 };
+
+// News of a closure for the robot whose keyframe is its newer end. `map` and `closure` are as passed to Mapper's
+// watcher. Nullopt if the closure has no transform in metres.
+std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure);
 
 }  // namespace relmap::ingest

@@ -1,7 +1,9 @@
-// Counts of what came in and what became of it, since the daemon started.
+// What the intake tells of itself: counts of what came in and what became of it, since the daemon started; the state of
+// each robot; and events of robots for the log.
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -51,6 +53,21 @@ struct RobotStats {
   double limit_hz = 0;                 // 0: no limit
   std::vector<SessionUuid> same_name;  // sessions that other robots of this name send at the same time
   bool silent = false;                 // it fell silent without an end and was forgotten; values as last heard
+};
+
+// An event of a robot that sends keyframes.
+struct RobotEvent {
+  enum class Kind : std::uint8_t {
+    kHeard,     // keyframes of the session come in for the first time, or again after a silence or a restart
+    kSilent,    // nothing came for a while, although the robot has not ended the session
+    kSameName,  // another robot of this name sends another session at the same time
+  };
+  Kind kind = Kind::kHeard;
+  SessionUuid uuid;
+  SessionNumber session = 0;
+  std::string robot, name;          // from the session's header
+  std::uint64_t next_sequence = 0;  // everything below is settled
+  std::chrono::seconds silent{0};   // time since the robot was last heard
 };
 
 }  // namespace relmap::intake

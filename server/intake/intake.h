@@ -13,7 +13,6 @@
 #include "server/intake/acknowledgement.h"
 #include "server/intake/ingest_stats.h"
 #include "server/intake/rate_meter.h"
-#include "server/intake/robot_event.h"
 #include "server/intake/session_intake.h"
 
 namespace relmap::intake {

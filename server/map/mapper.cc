@@ -17,6 +17,7 @@
 #include "server/map/commit_scheduler.h"
 #include "server/map/deterministic_driver.h"
 #include "server/map/journal_writer.h"
+#include "server/map/known_places.h"
 #include "server/map/lookup.h"
 #include "server/map/lookup_queue.h"
 #include "server/map/map_builder.h"
@@ -62,9 +63,6 @@ struct Mapper::Impl {
   Status load();
   void give_identity();
   void recover();
-  void find_open_lookups(const Replayed& replayed);
-  Status index_known_places();
-  void add_place(FrameId frame, std::span<const std::uint32_t> words);
   void start();
   Status stop();
 
@@ -259,49 +257,12 @@ void Mapper::Impl::recover() {
     fail("the journal could not be re-applied beyond record " + std::to_string(through), replayed.trouble);
   } else {
     background.resume(view->pending_frames() > 0);
-    find_open_lookups(replayed);
+    if (recognises_places()) find_open_lookups(map->state().lookups, replayed, options.deterministic, lookups);
   }
   // With some words missing, places would silently not be recognised.
-  if (Status indexed = index_known_places(); !indexed.ok()) fail("the words of the map's places", indexed);
-}
-
-// Opens the frames whose lookup may not have been made, or may not have reached the journal. A proposal made twice
-// changes nothing.
-void Mapper::Impl::find_open_lookups(const Replayed& replayed) {
-  if (!recognises_places()) return;
-  const std::set<FrameId>& known = map->state().lookups;
-  if (options.deterministic) {  // every lookup was done before the next keyframe was taken in
-    for (const FrameId frame : known) lookups.open(frame);
-    if (!replayed.frames.empty() && !replayed.looked_up) lookups.open(replayed.frames.back());
-    return;
-  }
-  std::set<FrameId> open = known;
-  open.insert(replayed.frames.begin(), replayed.frames.end());
-  for (const FrameId frame : open) lookups.push(frame);
-}
-
-Status Mapper::Impl::index_known_places() {
-  if (!recognises_places()) return {};
-  const auto view = map->view();
-  if (const Status restored = places->restore(*view); !restored.ok())
-    spdlog::warn("the place index is made again from the map, in part or whole: {}", restored.to_string());
-  const auto is_known = [&](FrameId frame) { return places->contains(frame); };
-  const Status scanned = view->scan_words(is_known, [&](FrameId frame, std::span<const std::uint32_t> words) {
-    if (lookups.is_open(frame)) return;
-    if (!words.empty()) return add_place(frame, words);
-    // After a repair a frame may have lost its words. They are computed again from its features, if it has any.
-    const auto cold = view->cold(frame);
-    if (cold && !cold->appearance.empty()) add_place(frame, vocabulary->words(cold->appearance));
-  });
-  budget->set(storage::Share::kPlaceIndex, places->memory_bytes());
-  return scanned;
-}
-
-void Mapper::Impl::add_place(FrameId frame, std::span<const std::uint32_t> words) {
-  const Status added = places->add(frame, words);
-  if (!added.ok() && places->left_out() == 1)
-    spdlog::error("frame {} will not be recognised, and others after it: {}", frame.to_string(), added.to_string());
-  budget->set(storage::Share::kPlaceIndex, places->memory_bytes());
+  if (recognises_places())
+    if (Status indexed = index_known_places(*view, *vocabulary, lookups, *places, *budget); !indexed.ok())
+      fail("the words of the map's places", indexed);
 }
 
 void Mapper::Impl::start() {
@@ -461,7 +422,7 @@ std::vector<storage::JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   } catch (const StatusError& error) {
     trouble = error.status();
   }
-  if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(frame, cold->words);  // as at a start
+  if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(*places, *budget, frame, cold->words);
   if (!trouble.ok()) throw StatusError(trouble);
   count_doubts(frame.session, found);
   return std::move(found.records);

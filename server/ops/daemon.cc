@@ -11,7 +11,6 @@
 #include "proto/base/clock.h"
 #include "proto/base/hex.h"
 #include "proto/base/mutex.h"
-#include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
 #include "server/ops/endpoint.h"

@@ -5,8 +5,6 @@
 #include <random>
 #include <vector>
 
-#include "server/place/picture_cells.h"
-
 namespace relmap::place {
 namespace {
 

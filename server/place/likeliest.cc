@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "server/place/same_photograph.h"
+#include "server/place/same_place.h"
 
 namespace relmap::place {
 

@@ -7,7 +7,6 @@
 #include "proto/base/crc32c.h"
 #include "proto/base/number_text.h"
 #include "server/place/likeliest.h"
-#include "server/place/metric_places.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"

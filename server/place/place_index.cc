@@ -283,4 +283,18 @@ std::size_t PlaceIndex::left_out() const { return impl_->left_out; }
 
 std::size_t PlaceIndex::memory_bytes() const { return impl_->fixed_bytes() + impl_->places.memory_bytes(); }
 
+PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
+                          const storage::Graph& graph, std::span<const storage::FrameRange> masked,
+                          std::span<const AppearanceFeature> features) {
+  const bool mono = std::any_of(answer.candidates.begin(), answer.candidates.end(), [&](const PlaceCandidate& place) {
+    return is_mono_session(graph, place.frame.session);
+  });
+  if (!mono) return answer;
+  std::vector<storage::FrameRange> left_out(masked.begin(), masked.end());
+  for (const storage::Session& session : graph.sessions())
+    if (!session.header.camera.is_stereo())
+      left_out.push_back({session.number, 0, std::numeric_limits<std::uint32_t>::max()});
+  return places.query(words, graph, left_out, {}, features);
+}
+
 }  // namespace relmap::place

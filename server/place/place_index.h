@@ -93,4 +93,11 @@ class PlaceIndex {
   std::unique_ptr<Impl> impl_;
 };
 
+// For callers that need a metric pose, so that photographs of the same places do not compete. Returns `answer`, which
+// PlaceIndex::query() gave to the same question, if no candidate is of a mono session. Otherwise asks again without
+// mono sessions, so that their frames take no probability and no room from the others.
+PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
+                          const storage::Graph& graph, std::span<const storage::FrameRange> masked,
+                          std::span<const AppearanceFeature> features);
+
 }  // namespace relmap::place

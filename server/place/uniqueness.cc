@@ -5,9 +5,7 @@
 #include <map>
 #include <set>
 
-#include "server/place/differs.h"
 #include "server/place/place_neighbours.h"
-#include "server/place/same_photograph.h"
 #include "server/place/same_place.h"
 
 namespace relmap::place {

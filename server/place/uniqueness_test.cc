@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "server/place/differs.h"
 #include "server/place/testing/random_vocabulary.h"
 #include "server/place/testing/synthetic_street.h"
 

@@ -4,11 +4,11 @@
 #include "server/map/edge_edit.h"
 #include "server/map/operator_proposal.h"
 #include "server/map/propose.h"
+#include "server/rpc/charge.h"
 #include "server/rpc/edge_effect.h"
+#include "server/rpc/edit_log.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/search_work.h"
-#include "server/rpc/write_and_wait.h"
 
 namespace relmap::rpc {
 

@@ -15,9 +15,10 @@
 #include "server/intake/ingest_server.h"
 #include "server/map/mapper.h"
 #include "server/route/overlay/route_index.h"
+#include "server/route/overlay/route_search.h"
+#include "server/rpc/charge.h"
 #include "server/rpc/deadline.h"
 #include "server/rpc/edit_log.h"
-#include "server/rpc/found_route.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/maintenance_turn.h"
 #include "server/rpc/metrics.h"
@@ -56,6 +57,18 @@ using ProcessProbe = std::function<ProcessFacts()>;
 struct Intake {
   intake::IngestServer* server = nullptr;  // null if this daemon takes in no keyframes
   std::function<IngestFacts()> facts;      // empty if nothing is counted
+};
+
+// A route that is being streamed; it is kept as long as its stream may be resumed.
+struct FoundRoute {
+  FoundRoute(storage::Budget& budget, std::uint64_t n) : number(n), charge(budget, storage::Share::kReplies) {}
+
+  const std::uint64_t number;  // counts the routes of this run of the daemon
+  std::shared_ptr<const storage::MapView> view;
+  route::RouteAnswer answer;
+  std::uint32_t fingerprint = 0;  // of the request without its ends
+  std::uint32_t ends_fingerprint = 0;
+  Charge charge;
 };
 
 // The index that FindRoute searches, and the routes that it found.

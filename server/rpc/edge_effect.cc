@@ -1,6 +1,7 @@
 #include "server/rpc/edge_effect.h"
 
 #include "proto/wire/convert.h"
+#include "server/route/stretches.h"
 #include "server/rpc/messages.h"
 
 namespace relmap::rpc {
@@ -31,14 +32,6 @@ void fill(const map::EdgeChange& change, v1::ClosureChange& message) {
 }
 
 }  // namespace
-
-v1::CarriedStretch carried_message(const route::CarriedStretch& stretch) {
-  v1::CarriedStretch message;
-  *message.mutable_first() = to_wire(stretch.first);
-  *message.mutable_last() = to_wire(stretch.last);
-  for (const EdgeId closure : stretch.closures) *message.add_closures() = to_wire(closure);
-  return message;
-}
 
 v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes) {
   v1::EditEffect message;

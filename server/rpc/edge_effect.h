@@ -5,11 +5,9 @@
 
 #include "relmap/v1/map.pb.h"
 #include "server/map/edge_changes.h"
-#include "server/route/stretches.h"
 
 namespace relmap::rpc {
 
 v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);
-v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 
 }  // namespace relmap::rpc

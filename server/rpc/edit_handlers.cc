@@ -5,9 +5,9 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "server/map/operator_edit.h"
+#include "server/rpc/edit_log.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/write_and_wait.h"
 
 namespace relmap::rpc {
 

@@ -1,4 +1,5 @@
-// Makes edits idempotent by their keys: an edit that is sent again with the same key is done only once.
+// Makes edits durable and visible, and idempotent by their keys: an edit that is sent again with the same key is done
+// only once.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <unordered_map>
 
 #include "proto/base/mutex.h"
+#include "server/map/mapper.h"
 #include "server/rpc/deadline.h"
 
 namespace relmap::rpc {
@@ -35,5 +37,15 @@ class EditLog {
   std::unordered_map<std::string, Done> done_ RELMAP_GUARDED_BY(mutex_);
   std::deque<std::string> order_ RELMAP_GUARDED_BY(mutex_);
 };
+
+// Makes an edit durable, and waits until it is applied and visible. Calls `make_record` unless the edit with this key
+// and content was done before, and sets `sequence` to that of the journal record. The reasons are those of
+// `make_record`, EditLog::once(), Mapper::submit() and wait_applied().
+Status write_and_wait(map::Mapper& mapper, EditLog& edits, const std::string& key, const std::string& content,
+                      const Deadline& deadline, const std::function<Result<storage::JournalRecord>()>& make_record,
+                      std::uint64_t& sequence);
+
+// INVALID_ARGUMENT if the note is too long.
+Status check_note(const std::string& note);
 
 }  // namespace relmap::rpc

@@ -3,11 +3,9 @@
 #include "proto/wire/convert.h"
 #include "server/route/neighbourhood.h"
 #include "server/route/transform.h"
-#include "server/rpc/edge_effect.h"
+#include "server/rpc/charge.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/search_work.h"
-#include "server/rpc/unmeasured_message.h"
 
 namespace relmap::rpc {
 

@@ -5,9 +5,9 @@
 #include "proto/wire/convert.h"
 #include "server/map/label_words.h"
 #include "server/route/edge_list.h"
+#include "server/rpc/charge.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/search_work.h"
 
 namespace relmap::rpc {
 

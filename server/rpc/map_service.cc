@@ -1,7 +1,6 @@
 #include "relmap/v1/map.grpc.pb.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/services.h"
-#include "server/rpc/unimplemented.h"
 
 namespace relmap::rpc {
 
@@ -59,7 +58,7 @@ class MapService final : public v1::Map::CallbackService {
     return unary(context, "Map.FindLabels", request, reply, find_labels);
   }
   Stream<v1::MapEvent>* WatchMap(Context* context, const v1::WatchMapRequest* request) override {
-    return unimplemented_stream<v1::MapEvent>(gateway_, context, "Map.WatchMap", request);
+    return unimplemented<v1::MapEvent>(context, "Map.WatchMap", request);
   }
   Unary* ListRobots(Context* context, const v1::ListRobotsRequest* request, v1::ListRobotsReply* reply) override {
     return unary(context, "Map.ListRobots", request, reply, list_robots);
@@ -85,6 +84,15 @@ class MapService final : public v1::Map::CallbackService {
     return gateway_.stream<Reply>(context, method, lane, request, [this, handler](const Request& r, const Deadline& d) {
       return call(core_, handler, r, d);
     });
+  }
+
+  // For an RPC that is defined but not served yet. It answers with its name, through the gateway like all others.
+  template <typename Reply, typename Request>
+  Stream<Reply>* unimplemented(Context* context, const char* method, const Request* request) {
+    return gateway_.stream<Reply>(
+        context, method, Lane::kGeneral, request, [method](const Request&, const Deadline&) -> Result<Producer<Reply>> {
+          return Status(Reason::UNIMPLEMENTED, std::string(method) + " is not served by this version of relmapd");
+        });
   }
 
   Core& core_;

@@ -128,6 +128,14 @@ v1::Session session_message(const storage::Session& session) {
   return message;
 }
 
+v1::CarriedStretch carried_message(const route::CarriedStretch& stretch) {
+  v1::CarriedStretch message;
+  *message.mutable_first() = to_wire(stretch.first);
+  *message.mutable_last() = to_wire(stretch.last);
+  for (const EdgeId closure : stretch.closures) *message.add_closures() = to_wire(closure);
+  return message;
+}
+
 namespace {
 
 void add_landmarks(FrameId id, const storage::FrameHot& hot, v1::Frame& message) {

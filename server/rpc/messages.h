@@ -1,14 +1,17 @@
-// Converts stored values to relmap.v1 messages. Internal to server/rpc, since it exposes generated code.
+// Converts values of the map and of its paths to relmap.v1 messages. Internal to server/rpc, since it exposes generated
+// code.
 #pragma once
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
+#include "server/route/stretches.h"
 #include "storage/graph/graph.h"
 
 namespace relmap::rpc {
 
 v1::Edge edge_message(const storage::Edge& edge);
 v1::Session session_message(const storage::Session& session);
+v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 
 // The functions of proto/wire/convert.h, which those below would hide.
 using relmap::from_wire;
@@ -19,6 +22,20 @@ v1::Verification to_wire(storage::Verification verification);
 // INVALID_ARGUMENT for an unknown number.
 Result<storage::EdgeState> from_wire(v1::EdgeState state);
 Result<storage::EdgeKind> from_wire(v1::EdgeKind kind);
+
+// Writes the unmeasured stretches of a path into a reply. `Message` is a RouteSummary or a TransformBetweenReply.
+template <typename Message>
+void tell_unmeasured(const route::UnmeasuredStretches& stretches, Message& message) {
+  for (const route::UnmeasuredStretch& stretch : stretches.list()) {
+    v1::UnmeasuredStretch& told = *message.add_unmeasured();
+    *told.mutable_first() = to_wire(stretch.first);
+    *told.mutable_last() = to_wire(stretch.last);
+    told.set_steps(stretch.steps);
+    told.set_distance_m(stretch.distance_m);
+  }
+  message.set_unmeasured_steps(stretches.steps());
+  message.set_unmeasured_m(stretches.distance_m());
+}
 
 struct FrameParts {
   bool landmarks = false, observations = false, appearance = false, thumbnail = false;

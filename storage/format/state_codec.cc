@@ -1,7 +1,6 @@
 #include "storage/format/state_codec.h"
 
 #include "proto/keyframe/extension_codec.h"
-#include "proto/keyframe/header_extensions.h"
 #include "storage/format/codec.h"
 #include "storage/format/extension_tags.h"
 #include "storage/format/sealed.h"

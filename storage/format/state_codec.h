@@ -22,7 +22,7 @@ Result<MapState> decode_state(ByteSpan bytes);
 // The header as session records and journal records contain it.
 void put_header(ByteWriter& w, const SessionHeader& header);
 SessionHeader get_header(ByteReader& r);
-// The fields with which records of all formats begin (migrate/format1_state.h): of a session all but `refused` and
+// The fields with which records of all formats begin (migrate/format1.h): of a session all but `refused` and
 // `given_up`; of the state its facts. get_facts() returns false if they are incomplete.
 Session get_session(ByteReader& r);
 bool get_facts(ByteReader& r, MapFacts& facts);

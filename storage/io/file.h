@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -67,5 +68,11 @@ std::string folder_of(const std::string& path);
 Status create_durable_directory(FileSystem& files, const std::string& path);
 // The same for all folders of `path` that are missing, the outermost first.
 Status create_durable_directories(FileSystem& files, const std::string& path);
+
+// Copies the first `size` bytes of `from` to the new file `to` and syncs it; the file's name is durable only after
+// sync_directory(). `copied` is called with the size of each piece; if it returns a status other than OK, the copy ends
+// with that status. IO_ERROR.
+Status copy_file(const ReadFile& from, std::uint64_t size, FileSystem& files, const std::string& to,
+                 const std::function<Status(std::uint64_t bytes)>& copied);
 
 }  // namespace relmap::storage

@@ -1,7 +1,8 @@
 #include "storage/maintenance/rebuild.h"
 
+#include "storage/maintenance/recount.h"
 #include "storage/maintenance/references.h"
-#include "storage/maintenance/verify_derived.h"
+#include "storage/maintenance/verify.h"
 
 namespace relmap::storage {
 namespace {

@@ -315,7 +315,7 @@ class Rewriter {
     SkippedCursor old(*snapshot_, session.number, [&](const std::string& key, const std::string& what) {
       if (key.empty()) throw StatusError(Status(Reason::IO_ERROR, what));  // the records behind it must not be lost
       tell(Reason::DATA_LOSS, {}, what);
-      remove(key, "settled-" + std::to_string(session.number));
+      remove(key, "skipped-" + std::to_string(session.number));
     });
     bool intact = false,
          changed = false;  // `intact`: the record at `old` stays as it is; `changed`: some record does not

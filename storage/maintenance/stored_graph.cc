@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "storage/map/label_index.h"
-
 namespace relmap::storage {
 
 std::shared_ptr<const StoredPart<FrameHot>> StoredGraph::hot_chunk(ChunkId id) const {

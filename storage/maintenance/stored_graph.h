@@ -11,7 +11,7 @@
 
 #include "storage/graph/graph.h"
 #include "storage/maintenance/stored_parts.h"
-#include "storage/map/skipped_index.h"
+#include "storage/map/indices.h"
 
 namespace relmap::storage {
 

@@ -8,10 +8,10 @@
 #include "storage/format/keys.h"
 #include "storage/journal/journal_record.h"
 #include "storage/maintenance/frame_check.h"
+#include "storage/maintenance/recount.h"
 #include "storage/maintenance/references.h"
 #include "storage/maintenance/skipped_cursor.h"
 #include "storage/maintenance/stored_sessions.h"
-#include "storage/maintenance/verify_derived.h"
 
 namespace relmap::storage {
 namespace {

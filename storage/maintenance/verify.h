@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "proto/base/status.h"
@@ -16,6 +17,8 @@
 #include "storage/map/map.h"
 
 namespace relmap::storage {
+
+struct Difference;  // recount.h
 
 struct VerifyOptions {
   std::vector<SessionNumber> sessions;               // only their frames; empty: all
@@ -42,6 +45,11 @@ Result<VerifySummary> verify(const MapView& view, const VerifyOptions& options, 
 // want to hold a view (and what is dirty in it) for so long.
 Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
                              const OnProgress& on_progress);
+
+// The same for what corrects derived items (rebuild.h): also reports what each wrong one should be.
+using OnDifference = std::function<void(const Difference&)>;
+Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
+                             const OnProgress& on_progress, const OnDifference& on_difference);
 
 // Verifies every record of the journal from applied_sequence + 1 on: whole, decodable, contiguous.
 Result<VerifySummary> verify_journal(const Engine& engine, const OnFinding& on_finding, const OnProgress& on_progress);

@@ -7,10 +7,9 @@
 #include "proto/base/mutex.h"
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
-#include "storage/map/label_index.h"
+#include "storage/map/indices.h"
 #include "storage/map/map_impl.h"
 #include "storage/map/pending_frames.h"
-#include "storage/map/skipped_index.h"
 
 namespace relmap::storage {
 namespace {

@@ -4,7 +4,7 @@
 #include <unordered_map>
 
 #include "proto/base/crc32c.h"
-#include "proto/keyframe/header_extensions.h"
+#include "proto/keyframe/extension_codec.h"
 #include "storage/format/extension_tags.h"
 #include "storage/graph/precision.h"
 #include "storage/map/map.h"

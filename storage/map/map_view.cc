@@ -1,8 +1,7 @@
 #include "storage/format/keys.h"
-#include "storage/map/label_index.h"
+#include "storage/map/indices.h"
 #include "storage/map/map_view_impl.h"
 #include "storage/map/part_loader.h"
-#include "storage/map/skipped_index.h"
 
 namespace relmap::storage {
 

@@ -1,10 +1,13 @@
 #include "storage/rocksdb/restore_folder.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <span>
 #include <vector>
 
-#include "storage/io/copy_file.h"
-#include "storage/maintenance/restored.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
+#include "storage/io/file.h"
 #include "storage/rocksdb/partial_folder.h"
 #include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -40,6 +43,26 @@ Status copy_files(const std::string& from, const std::string& to, const EnginePr
     if (!copied.ok()) return copied;
   }
   return {};
+}
+
+// Takes the engine over, and leaves the map committed with the epoch `now_us`, or with the former epoch + 1 where that
+// is later. From then on robots that know the map learn that it lacks what came after the backup. Returns the identity
+// that the map has now. A map without an identity is left as it is, and an unknown identity is returned. IO_ERROR,
+// DISK_FULL, STALE_OWNER; DATA_LOSS if the map's state cannot be read.
+Result<MapIdentity> mark_restored(Engine& engine, std::uint64_t now_us) {
+  const auto stored = engine.snapshot()->get(keys::map_state());
+  if (!stored.ok()) return stored.status();
+  if (!stored->has_value()) return MapIdentity{};
+  auto state = decode_state(**stored);
+  if (!state.ok()) return {Reason::DATA_LOSS, "the map's state: " + state.status().message()};
+  if (!state->identity.known()) return MapIdentity{};
+  state->identity.epoch = std::max(now_us, state->identity.epoch + 1);
+  const auto owner = engine.acquire();
+  if (!owner.ok()) return owner.status();
+  const Put put{keys::map_state(), encode_state(*state)};
+  const Status done = engine.commit(*owner, engine.applied_sequence(), std::span(&put, 1), {});
+  if (!done.ok()) return done;
+  return state->identity;
 }
 
 // Moves the recorded hash on: one commit later the map still has it.

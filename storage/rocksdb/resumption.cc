@@ -37,10 +37,10 @@ Resumption::~Resumption() {
 }
 
 rocksdb::Status Resumption::go_on() {
-  const std::uint64_t errors = property(db_, Properties::kBackgroundErrors);
+  const std::uint64_t errors = rocksdb_property(db_, Properties::kBackgroundErrors);
   if (!failed_ && errors == background_errors_) return {};
   if (!resuming_.valid()) {
-    if (!becomes_true([&] { return property(db_, Properties::kNumRunningFlushes) == 0; }, kPatience))
+    if (!becomes_true([&] { return rocksdb_property(db_, Properties::kNumRunningFlushes) == 0; }, kPatience))
       return rocksdb::Status::TimedOut("a flush that was running when another failed has not ended");
     resuming_ = std::async(std::launch::async, [this] { return db_.Resume(); });
     background_errors_ = errors;  // the next call handles one that comes after this
@@ -53,7 +53,8 @@ rocksdb::Status Resumption::go_on() {
 
 void Resumption::let_flush_start() const {
   const auto started = [&] {
-    return property(db_, Properties::kMemTableFlushPending) == 0 || property(db_, Properties::kNumRunningFlushes) > 0;
+    return rocksdb_property(db_, Properties::kMemTableFlushPending) == 0 ||
+           rocksdb_property(db_, Properties::kNumRunningFlushes) > 0;
   };
   (void)becomes_true(started, kStart);
 }

@@ -7,8 +7,8 @@
 #include <filesystem>
 
 #include "proto/base/mutex.h"
-#include "storage/io/copy_file.h"
 #include "storage/io/disk_space.h"
+#include "storage/io/file.h"
 #include "storage/journal/journal_log.h"
 #include "storage/journal/journal_segment.h"
 #include "storage/maintenance/stored_hash.h"
@@ -246,7 +246,7 @@ class RocksDbEngine final : public Engine {
   }
 
   std::size_t memory_bytes() const override {
-    const std::uint64_t pinned = property(database_->db(), rocksdb::DB::Properties::kEstimateTableReadersMem);
+    const std::uint64_t pinned = rocksdb_property(database_->db(), rocksdb::DB::Properties::kEstimateTableReadersMem);
     return database_->settings.cache->GetUsage() + pinned;  // the cache does not count what is pinned
   }
 
@@ -279,7 +279,7 @@ class RocksDbEngine final : public Engine {
   // be flushed together with all that waits to be.
   Status write_if_room(rocksdb::WriteBatch& batch) RELMAP_REQUIRES(write_mutex_) {
     constexpr std::uint64_t kBeside = std::uint64_t{1} << 20;  // tables and lists of files
-    const std::uint64_t waiting = property(database_->db(), rocksdb::DB::Properties::kCurSizeAllMemTables);
+    const std::uint64_t waiting = rocksdb_property(database_->db(), rocksdb::DB::Properties::kCurSizeAllMemTables);
     if (Status room = database_->space->spare(waiting + 2 * batch.GetDataSize() + kBeside); !room.ok()) return room;
     return write(batch);
   }

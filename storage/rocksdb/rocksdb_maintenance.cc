@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "storage/io/copy_file.h"
+#include "storage/io/file.h"
 #include "storage/rocksdb/rocksdb_status.h"
 
 namespace relmap::storage {
@@ -136,12 +136,12 @@ EngineStats map_stats(const MapDatabase& map) {
   rocksdb::DB& db = map.db();
   EngineStats stats;
   for (const auto& [name, size] : file_sizes(db.GetName())) stats.map_bytes += size;
-  stats.blob_bytes = property(db, Properties::kLiveBlobFileSize);
-  stats.garbage_bytes = property(db, Properties::kLiveBlobFileGarbageSize);
+  stats.blob_bytes = rocksdb_property(db, Properties::kLiveBlobFileSize);
+  stats.garbage_bytes = rocksdb_property(db, Properties::kLiveBlobFileGarbageSize);
   for (const auto& name : {Properties::kEstimateNumKeys, Properties::kLiveSstFilesSize, Properties::kNumBlobFiles,
                            Properties::kCurSizeAllMemTables, Properties::kEstimateTableReadersMem,
                            Properties::kEstimatePendingCompactionBytes, Properties::kBackgroundErrors})
-    stats.properties.emplace_back(name, std::to_string(property(db, name)));
+    stats.properties.emplace_back(name, std::to_string(rocksdb_property(db, name)));
   for (const auto& name : {Properties::kBlockCacheUsage, Properties::kNumRunningCompactions,
                            Properties::kNumRunningFlushes, Properties::kIsWriteStopped, Properties::kNumSnapshots})
     if (std::string value; db.GetProperty(name, &value)) stats.properties.emplace_back(name, value);

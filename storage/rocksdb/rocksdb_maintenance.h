@@ -43,7 +43,7 @@ EngineStats map_stats(const MapDatabase& map);
 
 // A number that RocksDB knows about itself, summed over the column families. `name`: one of rocksdb::DB::Properties; 0
 // if RocksDB does not say.
-inline std::uint64_t property(rocksdb::DB& db, const std::string& name) {
+inline std::uint64_t rocksdb_property(rocksdb::DB& db, const std::string& name) {
   std::uint64_t value = 0;
   db.GetAggregatedIntProperty(name, &value);
   return value;

@@ -8,7 +8,7 @@
 #include "server/place/older_views.h"
 #include "storage/engine/memory_engine.h"
 #include "storage/graph/path_tree.h"
-#include "tools/sim/random_stream.h"
+#include "tools/sim/random.h"
 
 namespace relmap::testing {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "tools/sim/random_stream.h"
+#include "tools/sim/random.h"
 
 namespace relmap::bench {
 

@@ -4,8 +4,8 @@
 #include "proto/base/clock.h"
 #include "storage/rocksdb/restore_folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "tools/relmap-admin/findings.h"
 #include "tools/relmap-admin/target.h"
-#include "tools/relmap-admin/verification.h"
 
 namespace relmap::admin {
 

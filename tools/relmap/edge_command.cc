@@ -8,7 +8,7 @@
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/view_options.h"
-#include "tools/terminal/confirmation.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 

@@ -5,7 +5,7 @@
 
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
-#include "tools/terminal/confirmation.h"
+#include "tools/terminal/console.h"
 #include "tools/terminal/interrupt.h"
 #include "tools/terminal/progress_bar.h"
 

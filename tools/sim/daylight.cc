@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "tools/sim/random_stream.h"
+#include "tools/sim/random.h"
 
 namespace relmap::sim {
 namespace {

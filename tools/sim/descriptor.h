@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "tools/sim/random_stream.h"
+#include "tools/sim/random.h"
 
 namespace relmap::sim {
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "tools/sim/descriptor.h"
-#include "tools/sim/random_stream.h"
+#include "tools/sim/random.h"
 
 namespace relmap::sim {
 

@@ -1,9 +1,11 @@
 #include "tools/terminal/console.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
-#include <ostream>
+#include <iostream>
 
 #include "proto/base/bar_text.h"
 
@@ -95,6 +97,17 @@ std::string bar_text(std::uint64_t used, std::uint64_t whole) {
 std::size_t width_of(const std::string& utf8) {
   return static_cast<std::size_t>(
       std::count_if(utf8.begin(), utf8.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
+bool can_ask() { return isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0; }
+
+Status ask(Console& console, const std::string& question) {
+  console.err() << question << " [y/N] " << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  if (answer == "y" || answer == "Y" || answer == "yes" || answer == "Yes") return {};
+  if (!std::cin) console.err() << '\n';  // after an end of input the cursor is still behind the question
+  return {Reason::NOT_CONFIRMED, "nothing is changed"};
 }
 
 }  // namespace relmap::terminal

@@ -1,4 +1,4 @@
-// Output of the command lines: data on stdout, everything else on stderr.
+// Output of the command lines: data on stdout, everything else on stderr; and questions to the user at a terminal.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/base/number_text.h"
+#include "proto/base/status.h"
 #include "proto/geometry/geometry.h"
 
 namespace relmap::terminal {
@@ -50,6 +51,13 @@ class Console {
   std::ostream& err_;
   bool aside_ = false;
 };
+
+// Whether standard input and standard error are a terminal, so that a question can be seen and answered.
+bool can_ask();
+
+// Asks "QUESTION [y/N]" on standard error and reads a line of standard input. NOT_CONFIRMED: the answer is not yes.
+// `question` ends in a question mark; can_ask() must hold.
+Status ask(Console& console, const std::string& question);
 
 using relmap::fixed;
 // "1.2 GB", "340 kB"

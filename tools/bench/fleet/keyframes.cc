@@ -9,7 +9,7 @@
 #include "frontend/capture/keyframe_file.h"
 #include "tools/sim/descriptor.h"
 #include "tools/sim/points_world.h"
-#include "tools/sim/random_stream.h"
+#include "tools/sim/random.h"
 
 namespace relmap::bench {
 

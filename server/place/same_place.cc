@@ -1,4 +1,4 @@
-#include "server/place/same_photograph.h"
+#include "server/place/same_place.h"
 
 #include <algorithm>
 
