@@ -14,6 +14,7 @@
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/data_test.h"
 #include "tests/support/process.h"
+#include "tests/support/published.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"
 
@@ -105,9 +106,13 @@ struct Counts {
   }
 };
 
-// Every `step`-th question against fourteen floors in one map. Thresholds (server/place/uniqueness.h) were chosen on
-// six of them, and are judged on the others.
-void expect_unique(const std::string& data, std::size_t step) {
+// Thresholds (server/place/uniqueness.h) were chosen on six of fourteen floors, and are judged on the others.
+struct CountsOnFloors {
+  Counts chosen, judged;
+};
+
+// Asks every `step`-th question of a map of all floors.
+void ask_on_floors(const std::string& data, std::size_t step, CountsOnFloors& floors) {
   const std::set<std::string> chosen_on{"basement0", "basement2", "basement4", "floor4", "floor11", "floor13"};
   Tower tower;
   tower.add(data + "/ie_tower");
@@ -118,7 +123,7 @@ void expect_unique(const std::string& data, std::size_t step) {
   ASSERT_TRUE(map.client().wait_idle().ok());
   const auto names = map.sessions();
 
-  Counts chosen, judged;
+  auto& [chosen, judged] = floors;
   for (std::size_t i = 0; i < tower.questions.size(); i += step) {
     const auto& [picture, floor] = tower.questions[i];
     client::View view;
@@ -145,8 +150,32 @@ void expect_unique(const std::string& data, std::size_t step) {
   }
 }
 
-TEST_F(PlacesData, OfFourteenFloorsThatLookAlikeVerifiedMeansUnique) { expect_unique(data_, 4); }
-TEST_F(LongPlacesData, OfFourteenFloorsThatLookAlikeVerifiedMeansUnique) { expect_unique(data_, 1); }
+const char* const kFigures = "docs/figures.md";
+
+// Compares with the row of docs/figures.md that begins with `name`.
+void expect_as_published(const Counts& counts, const std::string& name) {
+  const auto row = published(kFigures, "\\| " + name + " \\| ([0-9]+) \\| [^|]*\\| ([0-9]+) \\| ([0-9]+) \\|");
+  EXPECT_EQ(counts.questions, row.at(0)) << name;
+  EXPECT_GE(counts.verified, row.at(1) / 1.5) << name;
+  EXPECT_LE(counts.wrong, row.at(2)) << name;
+}
+
+TEST_F(PlacesData, OfFourteenFloorsThatLookAlikeVerifiedMeansUnique) {
+  CountsOnFloors floors;
+  ASSERT_NO_FATAL_FAILURE(ask_on_floors(data_, 4, floors));
+  expect_as_published(floors.chosen, "fourteen floors that look alike, the pictures on which thresholds were chosen");
+  expect_as_published(floors.judged, "the same floors, the pictures on which the thresholds are tested");
+}
+
+TEST_F(LongPlacesData, OfFourteenFloorsThatLookAlikeVerifiedMeansUnique) {
+  CountsOnFloors floors;
+  ASSERT_NO_FATAL_FAILURE(ask_on_floors(data_, 1, floors));
+  const auto all =
+      published(kFigures, "Of all ([0-9]+) pictures of the fourteen floors ([0-9]+) are confirmed, one of");
+  EXPECT_EQ(floors.chosen.questions + floors.judged.questions, all.at(0));
+  EXPECT_GE(floors.chosen.verified + floors.judged.verified, all.at(1) / 1.5);
+  EXPECT_LE(floors.chosen.wrong + floors.judged.wrong, 1);
+}
 
 TEST_F(PlacesData, APictureOfOneFloorIsNeverConfirmedOnAnother) {
   Tower tower;
@@ -181,8 +210,12 @@ TEST_F(PlacesData, APictureOfOneFloorIsNeverConfirmedOnAnother) {
   }
   std::printf("tower: %zu questions, %d confirmed, none on another floor; %d right by the first place\n",
               questions.size(), confirmed, first_right);
-  EXPECT_GE(confirmed, 20);
-  EXPECT_GE(first_right, 44);
+  const auto row = published(kFigures,
+                             "\\| two floors that look alike \\(ie_tower\\) \\| ([0-9]+) \\| ([0-9]+) \\| ([0-9]+) \\| "
+                             "0 \\|");
+  EXPECT_EQ(static_cast<double>(questions.size()), row.at(0));
+  EXPECT_GE(first_right, row.at(1) - 2);
+  EXPECT_GE(confirmed, row.at(2) - 3);
 }
 
 TEST_F(PlacesData, PhotographsOfOneFrontFindEachOtherAmongFiveHundredPlaces) {
@@ -229,9 +262,12 @@ TEST_F(PlacesData, PhotographsOfOneFrontFindEachOtherAmongFiveHundredPlaces) {
   }
   std::printf("front: %d of 10 find another photograph of it first among %zu other places, %d confirmed\n", first,
               others, confirmed);
-  EXPECT_GE(others, 490u);
-  EXPECT_GE(first, 9);
-  EXPECT_GE(confirmed, 3);
+  const auto row =
+      published(kFigures, "among ([0-9]+) other places: [^|]*\\| ([0-9]+) \\| ([0-9]+) \\| ([0-9]+) \\| 0 \\|");
+  EXPECT_NEAR(static_cast<double>(others), row.at(0), 7);
+  EXPECT_EQ(static_cast<double>(photographs.size()), row.at(1));
+  EXPECT_GE(first, row.at(2) - 1);
+  EXPECT_GE(confirmed, row.at(3) - 1);
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
 // Checks the figures that docs/ publish of the benchmarks, with shorter runs: counts must be equal, ratios and errors
 // may be 1.5 times the published ones. The figures are read from the documents, so that these and the code cannot
-// change without each other. Times are not tested, except for one ratio; `relmap-bench` measures them.
+// change without each other. Times are not tested, only ratios of times of the same run; `relmap-bench` measures them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -40,6 +41,23 @@ void expect_excess_about(double ratio, double published, const std::string& what
   expect_about(ratio - 1, published - 1, what + ", beyond 1");
 }
 
+// Compares how many of `steps` a share is. So few steps cannot tell shares that are smaller than one of them.
+void expect_share_at_most(double share, double steps, double published_percent, const std::string& what) {
+  std::printf("%s: %g of %g, published %g %%\n", what.c_str(), std::round(share * steps), steps, published_percent);
+  EXPECT_LE(std::round(share * steps), std::ceil(kFactor * published_percent / 100 * steps)) << what;
+}
+
+// How many times as long as relmap a sliding window takes, both times being medians of one run. A disturbance may
+// affect only one of them, but hardly in three runs.
+void expect_time_of_a_sliding_window(const BenchFigures& found, const std::vector<std::string>& again,
+                                     double published) {
+  double best = found["ceres_over_relmap"];
+  for (int round = 0; round < 2 && best < published / kFactor; ++round)
+    best = std::max(best, BenchFigures(again)["ceres_over_relmap"]);
+  std::printf("%g times as long, published %g\n", best, published);
+  EXPECT_GE(best, published / kFactor) << "a sliding window over relmap";
+}
+
 // The figures of a table's row that begins with `name`, one in each of its `columns`.
 std::vector<double> published_row(const std::string& document, const std::string& name, std::size_t columns) {
   std::string pattern = "\\| " + name + " \\|";
@@ -58,16 +76,24 @@ TEST(PublishedFigures, HoldForTheUpdateOfAKeyframe) {
   EXPECT_EQ(found["unsupported_edges"], 0);
   EXPECT_EQ(found["allocations_per_update"], 0);
   EXPECT_EQ(found["numerical_failures"], 0);
+  const auto drive = published(kRba, "figure eight of ([0-9]+) keyframes, driven twelve keyframes beyond");
+  EXPECT_EQ(found["frames"], drive.at(0) + 12);
   EXPECT_NEAR(found["measurements_per_keyframe"], published_figure(kRba, "([0-9]+) measurements per keyframe\\. Eight"),
               1);
   EXPECT_NEAR(found["active_mean"], 8, 0.5) << "eight frames move";
   expect_excess_about(found["registration_error_ceres_local_m"] / found["registration_error_m"],
                       published_figure(kRba, "its registration error is ([0-9.]+) times relmap's"),
                       "error of a sliding window over relmap's");
+  expect_about(found["registration_error_m"] / 3,
+               published_figure(kFigures, "registration error, m \\| ([0-9.]+) \\|") / 20, "registration error, m");
+  EXPECT_NEAR(found["rms_px"], published_figure(kFigures, "reprojection, px [^|]*\\| ([0-9.]+) \\("), 0.005);
+  expect_time_of_a_sliding_window(found, {"rba", "--seeds", "1", "--no-full"},
+                                  published_figure(kRba, "in the same run, ([0-9.]+) times as long"));
 }
 
 TEST(PublishedFigures, HoldForTheUpdateOfAKeyframeWithManyMeasurements) {
-  const BenchFigures found({"rba", "--observations", "120", "--seeds", "1", "--no-full"});
+  const std::vector<std::string> command{"rba", "--observations", "120", "--seeds", "1", "--no-full"};
+  const BenchFigures found(command);
   EXPECT_NEAR(found["measurements_per_keyframe"],
               published_figure(kRba, "With ([0-9]+) measurements per keyframe \\(`--observations 120`\\)"), 1);
   const auto errors = published(kFigures,
@@ -76,6 +102,10 @@ TEST(PublishedFigures, HoldForTheUpdateOfAKeyframeWithManyMeasurements) {
   expect_about(found["registration_error_m"], errors.at(0) / 5, "registration error, m");
   expect_excess_about(found["registration_error_ceres_local_m"] / found["registration_error_m"],
                       errors.at(1) / errors.at(0), "error of a sliding window over relmap's");
+  EXPECT_NEAR(found["rms_px"], published_figure(kFigures, "reprojection, px [^|]*\\| [^|]*\\| [^|]*\\| ([0-9.]+) \\("),
+              0.005);
+  expect_time_of_a_sliding_window(found, command,
+                                  published_figure(kRba, "an update takes [0-9.]+ ms, Ceres ([0-9.]+) times as long"));
   EXPECT_EQ(found["unsupported_edges"], 0);
   EXPECT_EQ(found["allocations_per_update"], 0);
   EXPECT_EQ(found["numerical_failures"], 0);
@@ -93,8 +123,9 @@ TEST(PublishedFigures, HoldForTheWidthOfTheRegion) {
     const std::string frames = std::to_string(static_cast<int>(windows[i])) + " frames";
     const double error = found.series("registration_error_over_full").at(i);
     EXPECT_NEAR(found.series("active_mean").at(i), active[i], 0.3) << frames;
-    expect_about(error, adaptive[i], "error over the full solution's, " + frames);
-    // The published ratios are means over five seeds; with a wide region they are 1 for every seed.
+    // The published ratios are means over five seeds, from which one seed differs by up to 0.07; with a wide region
+    // they are 1 for every seed.
+    EXPECT_NEAR(error, adaptive[i], 0.1) << "over the full solution's, " << frames;
     if (windows[i] >= 12) {
       EXPECT_NEAR(error, 1, 0.02) << frames;
     }
@@ -105,7 +136,8 @@ TEST(PublishedFigures, HoldForTheWidthOfTheRegion) {
 }
 
 TEST(PublishedFigures, HoldForClosuresThatBecomeEdges) {
-  const BenchFigures found({"rba", "--scenario", "edges", "--seeds", "1", "--no-full"});
+  const BenchFigures found({"rba", "--scenario", "edges", "--seeds", "1"});
+  EXPECT_EQ(found["frames"], 1.5 * published_figure(kRba, "Half of a circuit of ([0-9]+) keyframes driven twice"));
   const auto spacings = found.series("loop_edge_spacing");
   const auto columns = published(kRba,
                                  "minimum number of edges between the ends, exclusive \\| ([0-9]+) \\| ([0-9]+) \\| "
@@ -113,9 +145,10 @@ TEST(PublishedFigures, HoldForClosuresThatBecomeEdges) {
   const auto edges = published_row(kRba, "loop edges", columns.size());
   const auto weak = published_row(kRba, "edges held by their prior alone", columns.size());
   const auto errors = published_row(kRba, "registration error, m, sum of five seeds", columns.size());
+  const auto full_errors = published_row(kRba, "the full solution's with the same edges", columns.size());
   const auto revisits = published_row(kRba, "error at revisits, mm", columns.size());
   const auto active = published_row(kRba, "frames that a keyframe activates, mean", columns.size());
-  std::vector<double> measured;
+  std::vector<double> measured, measured_full;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const auto column = std::find(spacings.begin(), spacings.end(), columns[i]);
     ASSERT_NE(column, spacings.end()) << columns[i];
@@ -125,11 +158,15 @@ TEST(PublishedFigures, HoldForClosuresThatBecomeEdges) {
     EXPECT_EQ(found.series("edges_with_prior").at(at), weak[i]) << beyond;
     measured.push_back(found.series("registration_error_m").at(at));
     expect_about(measured.back(), errors[i] / 5, "registration error, m" + beyond);
+    measured_full.push_back(found.series("registration_error_full_m").at(at));
+    expect_about(measured_full.back(), full_errors[i] / 5, "the full solution's" + beyond);
     expect_about(1e3 * found.series("revisit_error_m").at(at), revisits[i], "error at revisits, mm" + beyond);
     EXPECT_NEAR(found.series("active_mean").at(at), active[i], 0.3) << beyond;
   }
   const auto over_least = [](const std::vector<double>& row) { return row.front() / *std::ranges::min_element(row); };
   expect_excess_about(over_least(measured), over_least(errors), "error with an edge for every closure, over the least");
+  // This seed's loss is less than that of the five together, by a factor of 1.6.
+  EXPECT_GE(over_least(measured_full) - 1, (over_least(full_errors) - 1) / 2) << "even in the full solution";
 }
 
 TEST(PublishedFigures, HoldForTheSameSolutionInOneFrame) {
@@ -156,16 +193,6 @@ TEST(PublishedFigures, HoldForTheSameSolutionInOneFrame) {
   }
 }
 
-// Both times are medians of the same run. A disturbance may affect only one of them, but hardly in three runs.
-TEST(PublishedFigures, HoldForTheTimeOfASlidingWindow) {
-  const double times = published_figure(kRba, "in the same run, ([0-9.]+) times as long");
-  double best = 0;
-  for (int round = 0; round < 3 && best < times / kFactor; ++round)
-    best = std::max(best, BenchFigures({"rba", "--seeds", "1", "--no-full"})["ceres_over_relmap"]);
-  std::printf("%g times, published %g\n", best, times);
-  EXPECT_GE(best, times / kFactor);
-}
-
 TEST(PublishedFigures, HoldForClosingALoopOfAnyLength) {
   std::vector<double> work;
   for (const std::string frames : {"250", "500"}) {
@@ -183,12 +210,36 @@ TEST(PublishedFigures, HoldForClosingALoopOfAnyLength) {
   EXPECT_NEAR(work[1] / work[0], 1, 0.3) << "a loop that is twice as long";
 }
 
-TEST(PublishedFigures, HoldForLandmarksThatDoNotGrowWithTheLaps) {
+TEST(PublishedFigures, HoldForAPlacePassedAgainAndAgain) {
   const auto of_thousand = published(kRba, "([0-9,]+) are in force for the ([0-9,]+) points that the drive saw");
-  const BenchFigures found({"rba", "--scenario", "laps", "--laps", "15"});
+  constexpr int kLaps = 15;
+  const BenchFigures found({"rba", "--scenario", "laps", "--laps", std::to_string(kLaps)});
   expect_at_most(found["landmarks_in_force"] / found["points_seen"] - 1, of_thousand.at(0) / of_thousand.at(1) - 1,
                  "landmarks in force for each point seen, beyond 1");
   EXPECT_EQ(found["unsupported_edges"], 0);
+  // Of the points of the first lap, those that each of the thousand laps replaced.
+  const double replaced = of_thousand.at(1) / 1000, first = found["points_seen"] - (kLaps - 1) * replaced;
+  EXPECT_NEAR(1 - replaced / first, 0.7, 0.05) << "seven landmarks in ten are seen again";
+  // Where landmarks do not become fixed, an update takes longer with every lap. The last laps are not all disturbed.
+  const auto by_lap = found.series("update_p50_us_by_lap");
+  ASSERT_EQ(by_lap.size(), static_cast<std::size_t>(kLaps));
+  const auto times = published(kFigures,
+                               "of the second lap ([0-9,]+) / [0-9,]+, of the fifth [0-9,]+ / [0-9,]+, of the twelfth "
+                               "[0-9,]+ / [0-9,]+, of the thousandth ([0-9,]+) /");
+  expect_at_most(*std::min_element(by_lap.end() - 4, by_lap.end()) / by_lap[1], times.at(1) / times.at(0),
+                 "median update of the last laps over that of the second");
+}
+
+// A five-hundredth of the published drive, in a sixteenth of its memory. Both times are medians of the same run, but
+// seconds apart, so that a disturbance may affect only the later one; hardly in three runs.
+TEST(PublishedFigures, HoldForAnUpdateInAMapThatGrows) {
+  const double ratio = published_figure(kFigures, "so the ratios are ([0-9.]+) and [0-9.]+;");
+  double best = HUGE_VAL;
+  for (int round = 0; round < 3 && best > kFactor * ratio; ++round) {
+    const BenchFigures found({"rba", "--scenario", "exploration", "--frames", "2000", "--memory-budget-mb", "16"});
+    best = std::min(best, found["update_p50_us"] / found["first_tenth_update_p50_us"]);
+  }
+  expect_at_most(best, ratio, "median update of the last tenth over that of the first");
 }
 
 TEST(PublishedFigures, HoldForThePlaceIndex) {
@@ -199,13 +250,41 @@ TEST(PublishedFigures, HoldForThePlaceIndex) {
   EXPECT_EQ(found["restored"], 30000);
 }
 
-// A light load of the minimum length. The published figures are of a million frames.
+// A light load of the minimum length. The published figures are of a million frames. So that the budget is less than
+// the map needs, as there, it is a quarter of the published one.
 TEST(PublishedFigures, HoldForTheMapOnDisk) {
-  const BenchFigures found({"storage", "--light", "--frames", "20000", "--memory-budget-mb", "256"});
+  const BenchFigures found({"storage", "--light", "--frames", "20000", "--memory-budget-mb", "64"});
   expect_about(found["disk_bytes_per_frame"] / found["payload_zstd_bytes_per_frame"],
                published_figure(kFigures, "disk over payload after zstd \\| ([0-9.]+) \\|"), "disk over payload");
   expect_at_most(found["write_amplification"],
                  published_figure(kFigures, "bytes written over payload \\| ([0-9.]+) \\|"), "written over payload");
+  // With a budget that it does not use up this map takes 187 MB more than these 64.
+  const double budget_mb = published_figure(kFigures, "--frames 1000000 --memory-budget-mb ([0-9]+)`");
+  expect_at_most(found["rss_max_mb"] - 64,
+                 published_figure(kFigures, "peak resident memory, MB \\| ([0-9]+) \\|") - budget_mb,
+                 "peak resident memory beyond the budget, MB");
+}
+
+// Times of the same run, on one thread. A disturbance may affect only one of them, but hardly in three runs.
+TEST(PublishedFigures, HoldForUnpackingARawFrame) {
+  const auto grey = published(kFigures, "\\| grey \\| [0-9.]+ / [0-9.]+ \\| ([0-9.]+) \\| ([0-9.]+) \\|");
+  const auto colour =
+      published(kFigures, "\\| with a colour filter, to grey \\| [0-9.]+ / [0-9.]+ \\| ([0-9.]+) \\| ([0-9.]+) \\|");
+  double over_copy = HUGE_VAL, colour_over_copy = HUGE_VAL, gain = 0, colour_gain = 0;
+  for (int round = 0; round < 3; ++round) {
+    const BenchFigures found({"unpack"});
+    over_copy = std::min(over_copy, found["unpack_over_memcpy"]);
+    colour_over_copy = std::min(colour_over_copy, found["unpack_bayer_over_memcpy"]);
+    gain = std::max(gain, found["plain_over_unpack"]);
+    colour_gain = std::max(colour_gain, found["plain_over_unpack_bayer"]);
+    if (over_copy <= kFactor * grey.at(0) && colour_over_copy <= kFactor * colour.at(0) &&
+        gain >= grey.at(1) / kFactor && colour_gain >= colour.at(1) / kFactor)
+      break;
+  }
+  expect_at_most(over_copy, grey.at(0), "grey, over a copy");
+  expect_at_most(colour_over_copy, colour.at(0), "with a colour filter, over a copy");
+  EXPECT_GE(gain, grey.at(1) / kFactor) << "the plain loop over ours";
+  EXPECT_GE(colour_gain, colour.at(1) / kFactor) << "the plain loop over ours, with a colour filter";
 }
 
 TEST(PublishedFigures, HoldForRoutesByCells) {
@@ -232,18 +311,66 @@ TEST(PublishedFigures, HoldForTheFrontEndAgainstAPlainPipeline) {
                "normalised squared error of steps");
   EXPECT_EQ(found["metric_share"], 1);
   EXPECT_EQ(found["lost_pairs"], 0);
+  expect_share_at_most(found["nees_above_share"], found["keyframes"] - 1,
+                       published_figure(kFrontEnd, "of its steps [0-9.]+ \\(6 expected\\), ([0-9.]+) % above"),
+                       "steps above chi2_6(0.999)");
+  const auto inliers =
+      published(kFrontEnd, "inliers is [0-9.]+ to ([0-9.]+) px in streets with ([0-9]+) % of the expected tracks");
+  expect_about(found["reprojection_px"], inliers.at(0), "reprojection error of inliers, px");
+  EXPECT_NEAR(100 * found["inlier_share"], inliers.at(1), 5) << "% of the expected tracks";
+
+  // The third of the five streets is this one, but with half as many jumps.
+  const auto five = published(kFrontEnd,
+                              "five streets of 1 km \\([^|]*\\) \\| [0-9]+ \\| [0-9]+ \\| ([0-9.]+) \\| ([0-9.]+) \\| "
+                              "([0-9.]+) \\| ([0-9.]+) \\|");
+  expect_at_most(found["drift_percent"], five.at(0), "drift, %");
+  EXPECT_LE(found["drift_percent"] / found["reference_drift_percent"], kFactor * five.at(0) / five.at(1));
+  EXPECT_LE(found["rotation_deg_per_100m"] / found["reference_rotation_deg_per_100m"],
+            kFactor * five.at(2) / five.at(3));
+  const auto of_five = published(kFrontEnd, "over the five kilometres ([0-9.]+) and ([0-9.]+) %");
+  expect_about(found["nees_mean"], of_five.at(0), "normalised squared error of steps");
+  expect_share_at_most(found["nees_above_share"], found["keyframes"] - 1, of_five.at(1), "steps above chi2_6(0.999)");
 }
 
-// A third of the published drive, without gyro. Its drift is not compared, since there are few segments in so short a
-// drive.
+// The first 40 m of the published drive of 750 m.
+TEST(PublishedFigures, HoldForAMotorwayOfLowTexture) {
+  const BenchFigures found({"frontend", "--scene", "motorway", "--frames", "16", "--reference", "klt"}, kPatience);
+  const auto row = published(kFrontEnd,
+                             "a motorway of low texture, 300 pairs at 25 m/s \\(`--scene motorway`\\) \\| [0-9]+ \\| "
+                             "[0-9]+ \\| ([0-9.]+) \\| ([0-9.]+) \\| ([0-9.]+) \\| ([0-9.]+) \\|");
+  expect_at_most(found["drift_percent"], row.at(0), "drift, %");
+  expect_at_most(found["rotation_deg_per_100m"], row.at(2), "rotation, degrees per 100 m");
+  EXPECT_LE(found["drift_percent"] / found["reference_drift_percent"], kFactor * row.at(0) / row.at(1));
+  EXPECT_LE(found["rotation_deg_per_100m"] / found["reference_rotation_deg_per_100m"], kFactor * row.at(2) / row.at(3));
+  EXPECT_EQ(found["metric_share"], 1);
+  EXPECT_EQ(found["lost_pairs"], 0);
+}
+
+// What a drive of `frames` with every fault comes to, compared with a column of the table of published drives of 600.
+// Each fault occurs once in either, so that what it costs is spread over a shorter way here.
+void expect_every_fault_survived(const BenchFigures& found, double frames, std::size_t column) {
+  const auto row = [](const std::string& name, const std::string& figure) {
+    return published(kFrontEnd, "\\| " + name + " \\| " + figure + " \\| " + figure + " \\|");
+  };
+  EXPECT_EQ(100 * found["metric_share"], row("steps between keyframes measured by vision", "([0-9.]+) %").at(column));
+  EXPECT_EQ(100 * found["topological_share"], row("steps connected", "([0-9.]+) %").at(column));
+  expect_at_most(found["drift_percent"] * frames / 600, row("drift, %", "([0-9.]+)").at(column),
+                 "drift of a drive of 600 pairs, %");
+  const auto errors =
+      row("normalised squared error of steps, mean; share above chi2_6\\(0\\.999\\)", "([0-9.]+); ([0-9.]+) %");
+  expect_about(found["nees_mean"], errors.at(2 * column), "normalised squared error of steps");
+  expect_share_at_most(found["nees_above_share"], found["keyframes"] - 1, errors.at(2 * column + 1),
+                       "steps above chi2_6(0.999)");
+}
+
 TEST(PublishedFigures, HoldForADriveWithEveryFault) {
   const BenchFigures found({"frontend", "--faults", "all", "--seed", "4", "--frames", "220"}, kPatience);
-  EXPECT_EQ(100 * found["metric_share"],
-            published_figure(kFrontEnd, "steps between keyframes measured by vision \\| ([0-9.]+) %"));
-  EXPECT_EQ(100 * found["topological_share"], published_figure(kFrontEnd, "steps connected \\| ([0-9.]+) %"));
-  expect_about(found["nees_mean"],
-               published_figure(kFrontEnd, "mean; share above chi2_6\\(0\\.999\\) \\| ([0-9.]+); [0-9.]+ % \\|"),
-               "normalised squared error of steps");
+  expect_every_fault_survived(found, 220, 0);
+}
+
+TEST(PublishedFigures, HoldForADriveWithEveryFaultAndAGyro) {
+  const BenchFigures found({"frontend", "--faults", "all", "--seed", "4", "--frames", "170", "--imu"}, kPatience);
+  expect_every_fault_survived(found, 170, 1);
 }
 
 // One drive of the published eight, with less than half of its pairs.

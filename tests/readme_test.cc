@@ -21,6 +21,7 @@
 #include "storage/testing/temporary_folder.h"
 #include "tests/paths.h"
 #include "tests/support/process.h"
+#include "tests/support/published.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"
 
@@ -176,6 +177,35 @@ TEST(Readme, BuildsAsTheDemoDoes) {
     }
   }
   EXPECT_EQ(seen, 3);
+}
+
+TEST(Readme, TellsOfTheDriveThatTheDemoMakes) {
+  const std::string demo = read_text(RELMAP_SOURCE_DIR "/tools/demo");
+  const int pairs = static_cast<int>(published_figure("README.md", "`tools/demo` renders ([0-9]+) stereo pairs"));
+  EXPECT_NE(demo.find("\npairs=" + std::to_string(pairs) + "\n"), std::string::npos);
+  std::ostringstream laps;
+  laps << "--laps " << published_figure("README.md", "a street circuit driven ([0-9.]+) times") << "\n";
+  EXPECT_NE(demo.find(laps.str()), std::string::npos) << laps.str();
+}
+
+// What README says in short of photographs is what docs/figures.md says, with which the tests on recordings compare.
+TEST(Readme, TellsOfPhotographsWhatTheFiguresTell) {
+  const std::string figures = "docs/figures.md";
+  EXPECT_EQ(published_figure("README.md", "among ([0-9]+) other places"),
+            published_figure(figures, "among ([0-9]+) other places"));
+  const auto floors = published("README.md", "look alike: ([0-9]+) of ([0-9]+) pictures are confirmed, none of them");
+  const auto chosen = published(figures, "thresholds were chosen \\| ([0-9]+) \\| \\| ([0-9]+) \\| 0 \\|");
+  const auto judged = published(figures, "thresholds are tested \\| ([0-9]+) \\| \\| ([0-9]+) \\| 0 \\|");
+  EXPECT_EQ(floors.at(0), chosen.at(1) + judged.at(1));
+  EXPECT_EQ(floors.at(1), chosen.at(0) + judged.at(0));
+  EXPECT_EQ(published_figure("README.md", "of all ([0-9]+) pictures one is"),
+            published_figure(figures, "Of all ([0-9]+) pictures of the fourteen floors [0-9]+ are confirmed, one of"));
+  const auto single = published("README.md",
+                                "([0-9]+) of ([0-9]+) are localised in EuRoC's flight, compared with "
+                                "([0-9]+) of [0-9]+ if the camera is known");
+  EXPECT_EQ(single.at(0), published_figure(figures, "\\| unknown \\| ([0-9]+);"));
+  EXPECT_EQ(single.at(1), published_figure(figures, "\\| answered of ([0-9]+) \\|"));
+  EXPECT_EQ(single.at(2), published_figure(figures, "\\| the session's camera \\| ([0-9]+);"));
 }
 
 // Whoever has run tools/demo has every program that README names.

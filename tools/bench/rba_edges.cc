@@ -10,7 +10,7 @@ namespace {
 constexpr std::uint32_t kLap = 200, kFrames = 300;  // half of the circuit is driven twice
 // A closure becomes a loop edge if more edges than this lie between its ends. 0: every closure; the last value: only
 // where there is no path.
-constexpr std::uint32_t kSpacings[] = {0, 2, 4, 8, 16, 24, 30};
+constexpr std::uint32_t kSpacings[] = {0, 4, 8, 16, 24, 30};
 
 // The edges of the graph that need a prior, since they have too few observations.
 std::uint32_t weak_edges(testing::SimulatedDrive& drive) {
