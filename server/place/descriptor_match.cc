@@ -1,9 +1,10 @@
 #include "server/place/descriptor_match.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 #include <unordered_map>
+
+#include "proto/geometry/covariance.h"
 
 namespace relmap::place {
 namespace {
