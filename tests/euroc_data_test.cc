@@ -2,7 +2,6 @@
 // recognised, bound to the old landmarks, and never mistaken for others.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-
 #include "server/place/descriptor_match.h"
 #include "server/place/testing/synthetic_street.h"
 

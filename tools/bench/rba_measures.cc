@@ -1,6 +1,5 @@
 #include "tools/bench/rba_measures.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <unordered_set>
 
