@@ -1,6 +1,8 @@
-# relmap_library(NAME [FOLDERS ...] LINK ... PRIVATE_LINK ... SOURCES extra... TEST_LINK ... [TEST_FULL_TIMEOUT s])
+# relmap_library(NAME [FOLDERS ...] LINK ... PRIVATE_LINK ... SOURCES extra... [THREAD_TESTS ...] TEST_LINK ...
+#                [TEST_FULL_TIMEOUT s])
 #   A static library of all *.cc in the current folder, or in those of its subfolders that FOLDERS names, but *_test.cc,
-#   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, with label `ci`.
+#   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, with label `ci`; those that THREAD_TESTS names, since
+#   they have threads, become NAME_threads_test, which is also built and run under ThreadSanitizer.
 # relmap_program(NAME SOURCE LINK ...)  one program, into bin/.
 # relmap_fuzzer(NAME SOURCE LINK ...)   with RELMAP_FUZZ a libFuzzer binary; otherwise a test that replays
 #                                       tests/corpus/NAME through it.
@@ -86,12 +88,16 @@ function(relmap_precompiled_headers name)
   endif()
 endfunction()
 
-# relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s] [ALONE])
+# All tests with threads that ThreadSanitizer runs: a target that builds them, and a label of ctest.
+add_custom_target(relmap_thread_tests)
+
+# relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s] [ALONE] [THREADS])
 #   Each gtest suite is a ctest entry: to start a program, and to make what the cases of a suite share, takes longer than
 #   most cases. The timeout is for what hangs; no test may depend on it. Suites named Long* get FULL_TIMEOUT and label
-#   `full`. ALONE: nothing else runs beside them.
+#   `full`. ALONE: nothing else runs beside them. THREADS: they have the label `threads`, too, and belong to
+#   relmap_thread_tests.
 function(relmap_test name)
-  cmake_parse_arguments(arg "ALONE" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "ALONE;THREADS" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT arg_ALONE)
     set(arg_ALONE OFF)
   endif()
@@ -107,6 +113,10 @@ function(relmap_test name)
   if(NOT arg_LABELS)
     set(arg_LABELS ci)
   endif()
+  if(arg_THREADS)
+    list(APPEND arg_LABELS threads)
+    add_dependencies(relmap_thread_tests ${name})
+  endif()
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINK} relmap_flags GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${RELMAP_QUICK_OPTIONS})
@@ -117,7 +127,7 @@ function(relmap_test name)
   add_custom_command(
     TARGET ${name} POST_BUILD BYPRODUCTS ${suites}
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${name}> -DNAME=${name} -DFOLDER=${CMAKE_CURRENT_BINARY_DIR}
-            -DTIMEOUT=${arg_TIMEOUT} -DLONG_TIMEOUT=${arg_FULL_TIMEOUT} -DLABELS=${arg_LABELS} -DALONE=${arg_ALONE}
+            -DTIMEOUT=${arg_TIMEOUT} -DLONG_TIMEOUT=${arg_FULL_TIMEOUT} "-DLABELS=${arg_LABELS}" -DALONE=${arg_ALONE}
             -DOUTPUT=${suites} -P ${CMAKE_SOURCE_DIR}/cmake/discover_suites.cmake
     VERBATIM)
   # ctest must not pass over a program that has not been built.
@@ -130,7 +140,7 @@ function(relmap_test name)
 endfunction()
 
 function(relmap_library name)
-  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "FOLDERS;LINK;PRIVATE_LINK;SOURCES;TEST_LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "FOLDERS;LINK;PRIVATE_LINK;SOURCES;THREAD_TESTS;TEST_LINK" ${ARGN})
   set(patterns *.cc)
   if(arg_FOLDERS)
     list(TRANSFORM arg_FOLDERS APPEND /*.cc OUTPUT_VARIABLE patterns)
@@ -143,6 +153,12 @@ function(relmap_library name)
   add_library(${name} STATIC ${sources} ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC relmap_flags ${arg_LINK} PRIVATE ${arg_PRIVATE_LINK})
   relmap_precompiled_headers(${name})
+  if(arg_THREAD_TESTS)
+    set(thread_tests ${arg_THREAD_TESTS})
+    list(TRANSFORM thread_tests PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+    list(REMOVE_ITEM tests ${thread_tests})
+    relmap_test(${name}_threads_test SOURCES ${thread_tests} LINK ${name} ${arg_TEST_LINK} THREADS)
+  endif()
   if(tests)
     relmap_test(${name}_test SOURCES ${tests} LINK ${name} ${arg_TEST_LINK} FULL_TIMEOUT ${arg_TEST_FULL_TIMEOUT})
   endif()
