@@ -83,8 +83,8 @@ std::string BatchProgress::total(const std::vector<Task>& tasks) const {
   const Extent extent = extent_of(tasks);
   const auto time = Clock::now() - begun_;
   const double seconds = std::chrono::duration<double>(time).count();
-  std::string line =
-      std::to_string(over) + " of " + std::to_string(tasks.size()) + " recordings, " + std::to_string(extent.pairs) + unit_of(tasks);
+  std::string line = std::to_string(over) + " of " + std::to_string(tasks.size()) + " recordings, " +
+                     std::to_string(extent.pairs) + unit_of(tasks);
   if (const std::string speed = rate(extent.pairs, time); !speed.empty()) line += ", " + speed;
   if (extent.share > 0.01 && extent.share < 1 && seconds > 2)
     line += ", " + terminal::duration_text(seconds * (1 - extent.share) / extent.share) + " left";
@@ -101,8 +101,10 @@ void BatchProgress::tell_finished(const std::vector<Task>& tasks) {
       text = "in the map already";
     else if (task.stage == Stage::kDone)
       text =
-          std::to_string(task.summary.pairs) + unit_of(task) + ", " + std::to_string(task.summary.keyframes) + " keyframes" +
-          (task.summary.refused_in_all() > 0 ? ", " + std::to_string(task.summary.refused_in_all()) + " of them refused" : "") +
+          std::to_string(task.summary.pairs) + unit_of(task) + ", " + std::to_string(task.summary.keyframes) +
+          " keyframes" +
+          (task.summary.refused_in_all() > 0 ? ", " + std::to_string(task.summary.refused_in_all()) + " of them refused"
+                                             : "") +
           (task.untrusted() ? ", not to be trusted" : "");
     else if (task.stage == Stage::kFailed)
       text = task.failure.to_string();

@@ -64,8 +64,8 @@ std::string distrust_text(const ReportRow& row) {
   const Summary& summary = task.summary;
   std::string text = "NOT TO BE TRUSTED: " + task.sequence.session;
   if (summary.measured_share)
-    text += ": " + terminal::fixed(100 * *summary.measured_share, 1) + " % measured (" + std::to_string(summary.measured) +
-            " of " + std::to_string(summary.expected) + " pairs" +
+    text += ": " + terminal::fixed(100 * *summary.measured_share, 1) + " % measured (" +
+            std::to_string(summary.measured) + " of " + std::to_string(summary.expected) + " pairs" +
             (summary.missing > 0 ? ", " + std::to_string(summary.missing) + " pictures are missing)" : ")");
   for (const Status& finding : summary.findings) text += "; " + std::string(reason_name(finding.reason()));
   if (!row.doubt.empty()) text += "; WRONG_CALIBRATION: " + row.doubt;

@@ -12,7 +12,8 @@ struct VerifyAsked {
   std::vector<SessionNumber> sessions;
 };
 
-Result<client::VerifySummary> verify_by_daemon(const Context& context, client::Client& daemon, const VerifyAsked& asked) {
+Result<client::VerifySummary> verify_by_daemon(const Context& context, client::Client& daemon,
+                                               const VerifyAsked& asked) {
   return daemon.verify(
       asked.sessions,
       [&](const client::Finding& finding) {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kHalfWidth = 1.0, kLiftHeight = 2.1;                                     // metres, of cabins
 constexpr double kWagonBack = 1.5, kWagonFront = 2.5, kWagonHeight = 2.0, kHeader = 0.3;  // likewise
-constexpr double kTread = 0.4, kStepHalfWidth = 1.3, kRiser = 0.3, kPanel = 2.0;           // of the escalator
+constexpr double kTread = 0.4, kStepHalfWidth = 1.3, kRiser = 0.3, kPanel = 2.0;          // of the escalator
 constexpr int kSteps = 40;  // until their textures come again: more than there are in sight
 
 class PartBuilder {

@@ -7,7 +7,8 @@ namespace relmap::sim {
 namespace {
 
 constexpr int kMaxTaps = 33;
-constexpr int kBlurMargin = 24;  // pixels beyond the picture's border that are rendered too, since the flow carries them in
+// Pixels beyond the picture's border that are rendered too, since the flow carries them in.
+constexpr int kBlurMargin = 24;
 
 StereoCamera widened(StereoCamera camera) {
   camera.cx += kBlurMargin;

@@ -10,7 +10,7 @@ namespace {
 constexpr double kEscalatorRise = 2.5;  // metres
 constexpr double kEscalator = 9;        // metres in the plan
 constexpr double kLanding = 1;          // at either end of an escalator: metres in which its slope changes
-constexpr double kRampEnd = 2;             // likewise of a ramp
+constexpr double kRampEnd = 2;          // likewise of a ramp
 
 }  // namespace
 
