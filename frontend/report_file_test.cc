@@ -22,7 +22,7 @@ std::size_t columns(const std::string& line) {
   return 1 + static_cast<std::size_t>(std::count(line.begin(), line.end(), '\t'));
 }
 
-tracking::TrackedPair pair_of(std::int64_t time_us, int inliers) {
+tracking::TrackedPair reported_pair(std::int64_t time_us, int inliers) {
   tracking::TrackedPair pair;
   pair.time_us = time_us;
   pair.index = static_cast<std::uint64_t>(time_us - 1000);
@@ -48,7 +48,7 @@ TEST(ReportFile, HasALineForEachPairAndASummary) {
   auto report = ReportFile::open(path, false).or_throw();
   const TrackId lasting{.sequence = 0, .index = 0}, brief{.sequence = 0, .index = 1};
   for (int i = 0; i < 4; ++i) {
-    tracking::TrackedPair pair = pair_of(1000 + i, 10 * i);
+    tracking::TrackedPair pair = reported_pair(1000 + i, 10 * i);
     pair.report.repeated = i == 3;
     if (i < 3) pair.keyframe = keyframe_of(i, i == 0 ? std::vector{lasting, brief} : std::vector{lasting});
     report.add(pair);
@@ -74,7 +74,7 @@ TEST(ReportFile, IsAddedToWhenARunGoesOn) {
   std::vector<std::string> before;
   for (const int pair : {7, 8}) {
     auto report = ReportFile::open(path, true).or_throw();
-    report.add(pair_of(1000 + pair, 10));
+    report.add(reported_pair(1000 + pair, 10));
     const auto lines = lines_of(path);
     ASSERT_EQ(lines.size(), before.empty() ? 2 : before.size() + 1) << "a pair's line is there at once";
     EXPECT_TRUE(lines.back().starts_with(std::to_string(pair) + "\tleft.png\t"));

@@ -11,7 +11,7 @@
 namespace relmap::frontend {
 namespace {
 
-tracking::TrackedPair pair_of(int width, int height) {
+tracking::TrackedPair drawn_pair(int width, int height) {
   auto pair = std::make_shared<tracking::Pair>();
   pair->picture = vision::Image(width, height);
   std::fill_n(pair->picture.row(0), width * height, std::uint8_t{100});
@@ -30,7 +30,7 @@ Colour at(const ColourPicture& picture, int x, int y) {
 }
 
 TEST(TrackPicture, SmallPicturesAreEnlargedToEvenSizes) {
-  const ColourPicture small = draw_tracks(pair_of(301, 201)), large = draw_tracks(pair_of(1242, 375));
+  const ColourPicture small = draw_tracks(drawn_pair(301, 201)), large = draw_tracks(drawn_pair(1242, 375));
   EXPECT_EQ(small.width, 904);
   EXPECT_EQ(large.width, 1242);
   for (const ColourPicture* picture : {&small, &large}) {
@@ -41,7 +41,7 @@ TEST(TrackPicture, SmallPicturesAreEnlargedToEvenSizes) {
 }
 
 TEST(TrackPicture, YoungLandmarksAreBlueAndOldOnesRed) {
-  tracking::TrackedPair pair = pair_of(1000, 400);
+  tracking::TrackedPair pair = drawn_pair(1000, 400);
   pair.report.tracks = {{.u = 200, .v = 200, .age = 0, .inlier = true},
                         {.u = 400, .v = 200, .age = 16, .inlier = true}};
   const ColourPicture picture = draw_tracks(pair);
@@ -52,14 +52,14 @@ TEST(TrackPicture, YoungLandmarksAreBlueAndOldOnesRed) {
 }
 
 TEST(TrackPicture, LostPairsHaveARedFrame) {
-  tracking::TrackedPair pair = pair_of(1000, 400);
+  tracking::TrackedPair pair = drawn_pair(1000, 400);
   EXPECT_EQ(at(draw_tracks(pair), 1, 200).red, at(draw_tracks(pair), 1, 200).blue);
   pair.report.tracked = false;
   EXPECT_GT(at(draw_tracks(pair), 1, 200).red, 200);
 }
 
 TEST(TrackPicture, SaysWhichPairItIs) {
-  tracking::TrackedPair pair = pair_of(1000, 400);
+  tracking::TrackedPair pair = drawn_pair(1000, 400);
   pair.index = 1;
   const ColourPicture first = draw_tracks(pair);
   EXPECT_EQ(first.bgr, draw_tracks(pair).bgr);
@@ -80,7 +80,7 @@ class ShownTracks : public ::testing::Test {
   std::string path(const std::string& name) const { return folder_ + '/' + name; }
   static void show(const std::string& path, bool goes_on, std::uint64_t index) {
     auto shown = open_track_show(path, 10, goes_on).or_throw();
-    ASSERT_TRUE(shown->show(draw_tracks(pair_of(100, 80)), index).ok());
+    ASSERT_TRUE(shown->show(draw_tracks(drawn_pair(100, 80)), index).ok());
     ASSERT_TRUE(shown->close().ok());
   }
   static void expect_refused(const std::string& path, bool goes_on, Reason reason, const std::string& remedy) {

@@ -7,7 +7,7 @@ namespace relmap::capture {
 
 namespace {
 
-constexpr std::int64_t kFirstAbsoluteUs = 1'000'000'000'000'000, kLatestUs = 4'000'000'000'000'000;
+constexpr std::int64_t kFirstAbsoluteUs = 1'000'000'000'000'000, kLatestTimeUs = 4'000'000'000'000'000;
 
 // The whole text as one number.
 template <typename Number>
@@ -19,7 +19,7 @@ std::optional<Number> number_of(std::string_view text) {
 }
 
 std::optional<std::int64_t> placed(std::int64_t time_us) {
-  if (time_us < 0 || time_us > kLatestUs) return {};
+  if (time_us < 0 || time_us > kLatestTimeUs) return {};
   return time_us + (time_us < kFirstAbsoluteUs ? kRelativeTimeBaseUs : 0);
 }
 

@@ -14,7 +14,7 @@ using testing_files::TemporaryFolder;
 using testing_files::write_picture;
 using testing_files::write_text;
 
-std::string sensor(const std::string& x) {
+std::string camera_sensor(const std::string& x) {
   return "%YAML:1.0\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0, -1, 0, 0.0,\n 1, 0, 0, " + x +
          ",\n 0, 0, 1, 0,\n 0, 0, 0, 1]\nresolution: [160, 120]\ncamera_model: pinhole\n"
          "intrinsics: [100, 100, 79.5, 59.5]\ndistortion_model: radial-tangential\n"
@@ -33,7 +33,7 @@ void write_euroc(const fs::path& root, const std::vector<std::int64_t>& left, co
       write_picture(camera / "data" / (stamp + ".png"), noise(160, 120, CV_8UC1, is_left));
     }
     write_text(camera / "data.csv", csv);
-    write_text(camera / "sensor.yaml", sensor(is_left ? "0.0" : "0.11"));
+    write_text(camera / "sensor.yaml", camera_sensor(is_left ? "0.0" : "0.11"));
   }
 }
 
@@ -107,8 +107,8 @@ TEST(EurocSource, TakesPicturesNamedByNanoseconds) {
   // Of a simulation that begins at zero: not in the order of their names.
   for (const char* name : {"50000000.png", "100000000.png", "0.png"})
     for (const char* eye : {"cam0", "cam1"}) write_picture(folder.path() / eye / name, noise(160, 120, CV_8UC1, 1));
-  write_text(folder.path() / "cam0_sensor.yaml", sensor("0.0"));
-  write_text(folder.path() / "cam1_sensor.yaml", sensor("0.11"));
+  write_text(folder.path() / "cam0_sensor.yaml", camera_sensor("0.0"));
+  write_text(folder.path() / "cam1_sensor.yaml", camera_sensor("0.11"));
   auto source = open_euroc(folder.path().string());
   ASSERT_TRUE(source.ok()) << source.status().to_string();
   for (int i = 0; i < 3; ++i) EXPECT_EQ((*(*source)->next())->time_us, kRelativeTimeBaseUs + i * 50'000);

@@ -13,7 +13,7 @@ constexpr int kMaxLooked = 40, kMaxForMotion = 20;
 constexpr int kMinCorners = 20;             // shared by both eyes, for a pair to count
 constexpr std::int64_t kApartUs = 500'000;  // between pairs
 // The picture that shows the motion is taken within this time after a pair.
-constexpr std::int64_t kSoonestUs = 80'000, kLatestUs = 350'000;
+constexpr std::int64_t kSoonestMotionUs = 80'000, kLatestMotionUs = 350'000;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ void FirstPairs::take(StereoFrame raw) {
   auto frame = rectify(rectifier_, std::move(raw));
   if (held_) {
     const std::int64_t held_us = held_->time_us, passed_us = time_us - held_us;
-    const bool tells = frame.ok() && passed_us > 0 && passed_us <= kLatestUs;
+    const bool tells = frame.ok() && passed_us > 0 && passed_us <= kLatestMotionUs;
     look(tells ? vision::ImageView(frame->left) : vision::ImageView());
     next_us_ = held_us + kApartUs;
     if (!wants(time_us)) return;
@@ -45,7 +45,7 @@ void FirstPairs::take(StereoFrame raw) {
     next_us_ = time_us + kApartUs;
     return;
   }
-  next_us_ = time_us + kSoonestUs;
+  next_us_ = time_us + kSoonestMotionUs;
   held_ = std::move(*frame);
 }
 

@@ -10,7 +10,8 @@
 namespace relmap::capture {
 namespace {
 
-using namespace testing_files;
+using testing_files::kKittiCalibration;
+using testing_files::noise;
 
 constexpr int kWidth = 160, kHeight = 120, kDisparity = 8;
 

@@ -41,7 +41,7 @@ Result<ImuSample> parse_sample(std::string_view line) {
 }
 
 // The first of the names that exists there; empty if none does.
-fs::path first_of(const fs::path& folder, std::initializer_list<const char*> names) {
+fs::path first_existing(const fs::path& folder, std::initializer_list<const char*> names) {
   std::error_code error;
   for (const char* name : names)
     if (fs::exists(folder / name, error)) return folder / name;
@@ -53,7 +53,7 @@ Result<fs::path> find_csv(const std::string& path) {
   if (!fs::is_directory(path, error)) return fs::path(path);
   const fs::path found = find_imu(path);
   const fs::path folder = fs::is_directory(found, error) ? found : fs::path(path);
-  const fs::path csv = first_of(folder, {"data.csv", "imu.csv"});
+  const fs::path csv = first_existing(folder, {"data.csv", "imu.csv"});
   if (csv.empty()) return {Reason::NO_SUCH_FILE, path + " holds neither data.csv nor imu.csv of an inertial unit"};
   return csv;
 }
@@ -64,7 +64,7 @@ Status named(const fs::path& path, const Status& status) {
 
 Result<ImuSensor> read_sensor(const fs::path& csv) {
   const std::string own = fs::path(csv.filename()).replace_extension(".yaml").string();
-  const fs::path yaml = first_of(csv.parent_path(), {own.c_str(), "sensor.yaml"});
+  const fs::path yaml = first_existing(csv.parent_path(), {own.c_str(), "sensor.yaml"});
   if (yaml.empty())
     return {Reason::NO_SUCH_FILE, (csv.parent_path() / own).string() + " (or sensor.yaml there), with T_BS and the " +
                                       "noise of the inertial unit, is needed beside " + csv.string()};
@@ -105,6 +105,8 @@ Result<ImuRecording> read_imu(const std::string& path, const SE3& T_body_camera)
                       std::move(*samples)};
 }
 
-std::string find_imu(const std::string& folder) { return first_of(folder, {"mav0/imu0", "imu0", "imu.csv"}).string(); }
+std::string find_imu(const std::string& folder) {
+  return first_existing(folder, {"mav0/imu0", "imu0", "imu.csv"}).string();
+}
 
 }  // namespace relmap::capture

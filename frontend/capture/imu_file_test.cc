@@ -17,7 +17,7 @@ constexpr const char* kSamples =
     "1403636579763555584, -0.0991, 0.1403, 0.0293, 8.0332, -0.4086, -2.4026\r\n";
 
 // The unit's x is the body's y.
-std::string sensor(const std::string& more = "") {
+std::string imu_sensor(const std::string& more = "") {
   return "%YAML:1.0\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n"
          "gyroscope_noise_density: 2e-4\ngyroscope_random_walk: 3e-5\n" +
          more;
@@ -64,7 +64,7 @@ TEST(ImuCsv, RefusesByNameAndLine) {
 TEST(ReadImu, TurnsTheUnitIntoTheLeftCamera) {
   TemporaryFolder folder;
   write_text(folder.path() / "mav0/imu0/data.csv", kSamples);
-  write_text(folder.path() / "mav0/imu0/sensor.yaml", sensor());
+  write_text(folder.path() / "mav0/imu0/sensor.yaml", imu_sensor());
   // The camera's z is the body's x.
   SE3 T_body_camera;
   T_body_camera.R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -82,7 +82,7 @@ TEST(ReadImu, TurnsTheUnitIntoTheLeftCamera) {
 TEST(ReadImu, TakesTheYamlOfTheSameName) {
   TemporaryFolder folder;
   write_text(folder.path() / "imu.csv", kSamples);
-  write_text(folder.path() / "imu.yaml", sensor());
+  write_text(folder.path() / "imu.yaml", imu_sensor());
   EXPECT_TRUE(read_imu(folder.path().string(), {}).ok());
   EXPECT_TRUE(read_imu((folder.path() / "imu.csv").string(), {}).ok());
   EXPECT_EQ(find_imu(folder.path().string()), (folder.path() / "imu.csv").string());
@@ -91,7 +91,7 @@ TEST(ReadImu, TakesTheYamlOfTheSameName) {
 TEST(ReadImu, MovesSamplesToTheCamerasClock) {
   TemporaryFolder folder;
   write_text(folder.path() / "imu.csv", "1000000000,0,0,0,0,0,0\n");
-  write_text(folder.path() / "imu.yaml", sensor("timeshift_cam_imu: 0.25\n"));
+  write_text(folder.path() / "imu.yaml", imu_sensor("timeshift_cam_imu: 0.25\n"));
   EXPECT_EQ(read_imu(folder.path().string(), {})->samples.front().time_us, kRelativeTimeBaseUs + 750'000);
 }
 
@@ -107,7 +107,7 @@ TEST(ReadImu, RefusesByNameAndNamesTheFile) {
   refused(Reason::NO_SUCH_FILE, "imu.yaml");
   write_text(folder.path() / "imu.yaml", "T_BS: somewhere\n");
   refused(Reason::CORRUPT, "imu.yaml");
-  write_text(folder.path() / "imu.yaml", sensor());
+  write_text(folder.path() / "imu.yaml", imu_sensor());
   write_text(folder.path() / "imu.csv", "1,2,3\n");
   refused(Reason::CORRUPT, "imu.csv: line 1");
   EXPECT_EQ(read_imu((folder.path() / "none.csv").string(), {}).reason(), Reason::NO_SUCH_FILE);

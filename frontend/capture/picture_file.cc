@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Status named(const fs::path& path, const Status& status) {
+Status of_picture(const fs::path& path, const Status& status) {
   if (status.reason() == Reason::NOT_A_PICTURE)
     return {Reason::NOT_A_PICTURE, path.string() + ": neither PNG nor JPEG nor binary PGM"};
   return {status.reason(), path.string() + ": " + status.message()};
@@ -53,11 +53,11 @@ Result<vision::Image> read_picture(const fs::path& path, double max_pixels) {
   if (!file.ok()) return file.status();
   if (is_small_pgm(*file)) {
     auto image = decode_pgm(*file);
-    if (!image.ok()) return named(path, image.status());
+    if (!image.ok()) return of_picture(path, image.status());
     return vision::reduce(std::move(*image), max_pixels);
   }
   auto picture = vision::decode_picture(*file, max_pixels);
-  if (!picture.ok()) return named(path, picture.status());
+  if (!picture.ok()) return of_picture(path, picture.status());
   return std::move(picture->grey);
 }
 
@@ -70,11 +70,11 @@ Result<vision::PictureSize> read_picture_size(const fs::path& path) {
 Result<vision::PictureSize> size_in_bytes(const fs::path& path, ByteSpan file) {
   if (is_small_pgm(file)) {
     const auto header = read_pgm_header(file);
-    if (!header.ok()) return named(path, header.status());
+    if (!header.ok()) return of_picture(path, header.status());
     return vision::PictureSize{header->width, header->height};
   }
   const auto size = vision::picture_size(file);
-  if (!size.ok()) return named(path, size.status());
+  if (!size.ok()) return of_picture(path, size.status());
   return size;
 }
 

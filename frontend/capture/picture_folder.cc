@@ -23,7 +23,7 @@ namespace {
 std::optional<std::int64_t> time_from_name(const fs::path& path) { return time_from_stamp(path.stem().string()); }
 
 // The number in a name such as 000017.png.
-std::optional<std::size_t> number_of(const fs::path& path) {
+std::optional<std::size_t> number_in_name(const fs::path& path) {
   const std::string stem = path.stem().string();
   std::size_t number = 0;
   const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
@@ -64,9 +64,9 @@ bool is_even_over_gaps(const std::vector<std::size_t>& numbers, const std::vecto
 std::vector<std::size_t> lines_of(const std::vector<PicturePair>& pairs, const std::vector<std::int64_t>& times) {
   std::vector<std::size_t> in_order(pairs.size()), by_number;
   std::iota(in_order.begin(), in_order.end(), std::size_t{0});
-  const auto first = number_of(pairs.front().left);
+  const auto first = number_in_name(pairs.front().left);
   for (const PicturePair& pair : pairs) {
-    const auto number = number_of(pair.left);
+    const auto number = number_in_name(pair.left);
     if (!first || !number || *number < *first || *number - *first >= times.size()) return in_order;
     by_number.push_back(*number - *first);
   }
@@ -93,7 +93,7 @@ Result<TimesTaken> set_times_from(const fs::path& file, std::vector<PicturePair>
 }
 
 // "a, b, c and 7 more"
-std::string first_of(const std::vector<std::string>& names) {
+std::string first_names(const std::vector<std::string>& names) {
   constexpr std::size_t kNamed = 3;
   std::string text;
   for (std::size_t i = 0; i < std::min(kNamed, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
@@ -117,7 +117,7 @@ std::string folders_with_pictures(const fs::path& folder) {
   std::sort(names.begin(), names.end());
   if (names.empty()) return {};
   return (names.size() == 1 ? "; there are pictures in its folder " : "; there are pictures in its folders ") +
-         first_of(names);
+         first_names(names);
 }
 
 }  // namespace
@@ -144,11 +144,11 @@ Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
 
 std::string PassedOver::describe() const {
   std::string text;
-  if (!folders.empty()) text = counted_text(folders.size(), "folder") + " (" + first_of(folders) + ")";
+  if (!folders.empty()) text = counted_text(folders.size(), "folder") + " (" + first_names(folders) + ")";
   if (files.empty()) return text;
   return text + (text.empty() ? "" : " and ") + counted_text(files.size(), "file") +
          (files.size() == 1 ? " that is neither PNG nor JPEG nor PGM (" : " that are neither PNG nor JPEG nor PGM (") +
-         first_of(files) + ")";
+         first_names(files) + ")";
 }
 
 PassedOver passed_over(const fs::path& folder) {

@@ -10,8 +10,8 @@ namespace relmap::capture {
 
 namespace {
 
-constexpr std::string_view kMagic = "RELMAPRW";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::string_view kLogMagic = "RELMAPRW";
+constexpr std::uint32_t kLogVersion = 1;
 constexpr std::string_view kSync = "\xf5RLG";
 constexpr std::uint8_t kHasCycle = 1;  // flag of a head
 constexpr std::size_t kMaxName = 255;
@@ -22,25 +22,25 @@ std::string_view text_of(ByteSpan bytes) { return {reinterpret_cast<const char*>
 }  // namespace
 
 bool is_raw_log(const std::string& path) {
-  char begin[kMagic.size()] = {};
+  char begin[kLogMagic.size()] = {};
   std::ifstream in(path, std::ios::binary);
-  return in.read(begin, sizeof begin) && std::string_view(begin, sizeof begin) == kMagic;
+  return in.read(begin, sizeof begin) && std::string_view(begin, sizeof begin) == kLogMagic;
 }
 
 namespace raw_log {
 
 Bytes encode_begin() {
   ByteWriter out;
-  out.put_bytes(as_bytes(kMagic));
-  out.put(kVersion);
+  out.put_bytes(as_bytes(kLogMagic));
+  out.put(kLogVersion);
   return out.take();
 }
 
 Status check_begin(ByteSpan begin) {
   ByteReader in(begin);
-  if (text_of(in.get_bytes(kMagic.size())) != kMagic) return {Reason::CORRUPT, "is no raw log"};
+  if (text_of(in.get_bytes(kLogMagic.size())) != kLogMagic) return {Reason::CORRUPT, "is no raw log"};
   const auto version = in.get<std::uint32_t>();
-  if (version != kVersion) return {Reason::UNKNOWN_FORMAT_VERSION, "is of version " + std::to_string(version)};
+  if (version != kLogVersion) return {Reason::UNKNOWN_FORMAT_VERSION, "is of version " + std::to_string(version)};
   return {};
 }
 

@@ -80,6 +80,11 @@ Bytes encode_header(const RawLogHeader& header);
 // CORRUPT, BAD_SIZE.
 Result<RawLogHeader> decode_header(const Head& head, ByteSpan body);
 
+// "1 frame", "12 frames", for messages about a log.
+inline std::string plural(std::uint64_t count, const std::string& of) {
+  return std::to_string(count) + ' ' + of + (count == 1 ? "" : "s");
+}
+
 }  // namespace raw_log
 
 }  // namespace relmap::capture

@@ -15,8 +15,8 @@ using raw_log::Kind;
 
 namespace {
 
-constexpr std::string_view kMagic = "RELMAPRI";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::string_view kIndexMagic = "RELMAPRI";
+constexpr std::uint32_t kIndexVersion = 1;
 constexpr std::size_t kBlock = std::size_t{256} << 10;
 
 // The head of a record that ends before the log does.
@@ -109,8 +109,8 @@ Status scan_raw_log(const LogFile& log, std::uint64_t size, RawLogIndex& index) 
 RawLogIndex parse_raw_log_index(ByteSpan bytes) {
   ByteReader in(bytes);
   RawLogIndex index;
-  const ByteSpan magic = in.get_bytes(kMagic.size());
-  if (!std::ranges::equal(magic, as_bytes(kMagic)) || in.get<std::uint32_t>() != kVersion) return index;
+  const ByteSpan magic = in.get_bytes(kIndexMagic.size());
+  if (!std::ranges::equal(magic, as_bytes(kIndexMagic)) || in.get<std::uint32_t>() != kIndexVersion) return index;
   std::uint32_t crc = 0;
   for (;;) {
     const std::size_t begin = in.position();
@@ -146,8 +146,8 @@ RawLogIndexWriter::RawLogIndexWriter(const std::string& path) {
   std::filesystem::remove(path, ignored);
   auto file = LogFile::create(path);
   if (file.ok()) file_.emplace(std::move(*file));
-  pending_.put_bytes(as_bytes(kMagic));
-  pending_.put(kVersion);
+  pending_.put_bytes(as_bytes(kIndexMagic));
+  pending_.put(kIndexVersion);
 }
 
 void RawLogIndexWriter::add(const RawLogEntry& entry) {

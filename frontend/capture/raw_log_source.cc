@@ -12,10 +12,6 @@ namespace relmap::capture {
 
 namespace {
 
-std::string plural(std::uint64_t count, const std::string& of) {
-  return std::to_string(count) + ' ' + of + (count == 1 ? "" : "s");
-}
-
 std::string camera_text(const RawLogHeader& header) {
   std::string text;
   for (const std::string* name : {&header.vendor, &header.model, &header.serial})
@@ -35,10 +31,12 @@ std::string troubles_of(const RawLogReader& log) {
     }
   }
   std::string text;
-  if (faults > 0) text += "; " + plural(faults, "fault") + ", " + plural(lost, "frame") + " lost by them";
+  if (faults > 0)
+    text += "; " + raw_log::plural(faults, "fault") + ", " + raw_log::plural(lost, "frame") + " lost by them";
   if (damages > 0)
-    text += "; damaged in " + plural(damages, "place") + ", the first at byte " + std::to_string(first_damage);
-  if (log.torn_bytes() > 0) text += "; torn: the last " + plural(log.torn_bytes(), "byte") + " are no whole record";
+    text += "; damaged in " + raw_log::plural(damages, "place") + ", the first at byte " + std::to_string(first_damage);
+  if (log.torn_bytes() > 0)
+    text += "; torn: the last " + raw_log::plural(log.torn_bytes(), "byte") + " are no whole record";
   return text;
 }
 
@@ -83,7 +81,7 @@ class RawLogSource : public StereoSource {
   }
   std::string describe() const override {
     const StereoLayout& layout = log_.header().layout;
-    std::string text = "raw log " + log_.path() + ": " + plural(count(), "pair") + " of " +
+    std::string text = "raw log " + log_.path() + ": " + raw_log::plural(count(), "pair") + " of " +
                        std::to_string(layout.width) + " x " + std::to_string(layout.height);
     if (const std::string camera = camera_text(log_.header()); !camera.empty()) text += " by " + camera;
     if (!rectifier_.passes_through()) text += ", to be rectified";
@@ -123,7 +121,7 @@ class RawLogSource : public StereoSource {
  private:
   Status status_of(const RawLogEvent& event) const {
     std::string text = log_.path() + ": " + event.message;
-    if (event.lost > 0) text += " (" + plural(event.lost, "frame") + " lost)";
+    if (event.lost > 0) text += " (" + raw_log::plural(event.lost, "frame") + " lost)";
     return {event.reason, std::move(text)};
   }
 

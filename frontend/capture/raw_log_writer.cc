@@ -16,10 +16,6 @@ namespace {
 
 constexpr std::size_t kRoomForEvent = 512;  // bytes kept free for the event that states what was dropped
 
-std::string plural(std::uint64_t count, const std::string& of) {
-  return std::to_string(count) + ' ' + of + (count == 1 ? "" : "s");
-}
-
 }  // namespace
 
 Result<std::unique_ptr<RawLogWriter>> RawLogWriter::open(const std::string& path, RawLogHeader header,
@@ -122,8 +118,8 @@ void RawLogWriter::count_dropped(const Head& head) {
 // The event must come before anything that was added later.
 void RawLogWriter::tell_of_dropped() {
   if (dropped_frames_ + dropped_events_ == 0) return;
-  std::string message = plural(dropped_frames_, "frame") + " dropped";
-  if (dropped_events_ > 0) message += ", and word of " + plural(dropped_events_, "fault");
+  std::string message = raw_log::plural(dropped_frames_, "frame") + " dropped";
+  if (dropped_events_ > 0) message += ", and word of " + raw_log::plural(dropped_events_, "fault");
   message += ": the disk did not keep up";
   Item item;
   item.head.kind = Kind::kEvent;

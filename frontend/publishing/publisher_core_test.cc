@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include "frontend/publishing/map_for_test.h"
+
 namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
+using testing_map::map_of;
+
 constexpr std::uint32_t kPart = 1000;
 
 class PublisherCoreTest : public testing::Test {
@@ -282,13 +286,6 @@ TEST_F(PublisherCoreTest, LoadedGapsCoverLoadedKeyframes) {
   core_.acknowledge(ack(18), now_);
   EXPECT_TRUE(core_.all_settled());
   EXPECT_TRUE(core_.counts().refused.empty());
-}
-
-MapIdentity map_of(std::uint8_t name, std::uint64_t epoch = 1) {
-  MapIdentity map;
-  map.uuid.bytes.fill(name);
-  map.epoch = epoch;
-  return map;
 }
 
 TEST_F(PublisherCoreTest, ASessionIsInTheMapOfTheFirstDaemonThatAcknowledgesIt) {

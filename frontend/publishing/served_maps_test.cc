@@ -2,19 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include "frontend/publishing/map_for_test.h"
+
 namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
+using testing_map::map_of;
 
 constexpr BootId kFirst{1}, kSecond{2};
-
-MapIdentity map_of(std::uint8_t name, std::uint64_t epoch = 1) {
-  MapIdentity map;
-  map.uuid.bytes.fill(name);
-  map.epoch = epoch;
-  return map;
-}
 
 class ServedMapsTest : public testing::Test {
  protected:

@@ -9,7 +9,7 @@
 namespace relmap::recording {
 
 namespace {
-constexpr std::size_t kOverhead = 512;  // approximate memory of an assembly besides its bytes
+constexpr std::size_t kAssemblyOverhead = 512;  // approximate memory of an assembly besides its bytes
 }
 
 Result<KeyframePart> read_part(ByteSpan message) {
@@ -20,7 +20,7 @@ Result<KeyframePart> read_part(ByteSpan message) {
 }
 
 void KeyframeAssembler::drop(Assemblies::iterator it) {
-  bytes_ -= it->second.bytes().size() + kOverhead;
+  bytes_ -= it->second.bytes().size() + kAssemblyOverhead;
   assemblies_.erase(it);
 }
 
@@ -32,14 +32,14 @@ Result<std::optional<Bytes>> KeyframeAssembler::add(const KeyframePart& part) {
     it = assemblies_.end();
   }
   if (it == assemblies_.end()) {
-    while (bytes_ + part.total_bytes + kOverhead > kMaxBytes) drop(assemblies_.begin());
+    while (bytes_ + part.total_bytes + kAssemblyOverhead > kMaxBytes) drop(assemblies_.begin());
     it = assemblies_.emplace(key, part).first;
-    bytes_ += part.total_bytes + kOverhead;
+    bytes_ += part.total_bytes + kAssemblyOverhead;
   }
   if (!it->second.add(part)) return std::optional<Bytes>();
   const auto node = assemblies_.extract(it);
   Bytes payload = std::move(node.mapped().bytes());
-  bytes_ -= payload.size() + kOverhead;
+  bytes_ -= payload.size() + kAssemblyOverhead;
   if (crc32c(payload) != part.payload_crc)
     return {Reason::CORRUPT, "keyframe " + std::to_string(part.sequence) + " fails its checksum"};
   return std::optional(std::move(payload));

@@ -11,9 +11,9 @@ namespace relmap::recording {
 
 namespace {
 
-constexpr std::size_t kOverhead = 512;       // approximate memory of a waiting keyframe besides its bytes
-constexpr std::size_t kVersion = 48;         // bytes of memory for each completed payload
-constexpr std::size_t kRemembered = 65'536;  // number of keyframes whose repeats are recognised
+constexpr std::size_t kWaitingOverhead = 512;  // approximate memory of a waiting keyframe besides its bytes
+constexpr std::size_t kVersion = 48;           // bytes of memory for each completed payload
+constexpr std::size_t kRemembered = 65'536;    // number of keyframes whose repeats are recognised
 constexpr std::size_t kMaxGaps = 4096;
 
 }  // namespace
@@ -81,7 +81,7 @@ void KeyframeLog::take(const KeyframePart& part) {
   if (conflict) {
     ++left_out_[Reason::SEQUENCE_CONFLICT];
   } else if (part.sequence >= next_) {  // otherwise it was counted as lost when it was skipped
-    waiting_bytes_ += (*payload)->size() + kOverhead;
+    waiting_bytes_ += (*payload)->size() + kWaitingOverhead;
     waiting_.emplace(part.sequence, std::move(**payload));
   }
 }
@@ -102,7 +102,7 @@ std::optional<Keyframe> KeyframeLog::give_lowest() {
   const auto lowest = waiting_.extract(waiting_.begin());
   const std::uint32_t sequence = lowest.key();
   const Bytes& payload = lowest.mapped();
-  waiting_bytes_ -= payload.size() + kOverhead;
+  waiting_bytes_ -= payload.size() + kWaitingOverhead;
   skip_to(sequence);
   ++next_;
   for (; whole_.size() > kRemembered && whole_.begin()->first < next_; whole_.erase(whole_.begin()))

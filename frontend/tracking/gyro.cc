@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontend/tracking/stamps.h"
+
 namespace relmap::tracking {
 
 namespace {
@@ -11,8 +13,6 @@ constexpr std::int64_t kMaxHoleUs = 50'000;
 constexpr double kFirstBias = 0.02;   // rad/s, standard deviation of the bias when a gyro is switched on
 constexpr double kGate = 4;           // sigmas
 constexpr double kMinSeconds = 0.02;  // seconds
-
-double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 }  // namespace
 

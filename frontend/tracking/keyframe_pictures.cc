@@ -13,15 +13,15 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr float kMinDisparity = 0.5F;  // pixels
-constexpr float kPatchScale = 5.0F;    // diameter of the SIFT keypoint that corresponds to a 9 x 9 patch on level 0
+constexpr float kMinAppearanceDisparity = 0.5F;  // pixels
+constexpr float kPatchScale = 5.0F;  // diameter of the SIFT keypoint that corresponds to a 9 x 9 patch on level 0
 
 float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
   if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(feature.scale / kPatchScale))), 0, pair.left.levels() - 1);
-  const auto match =
-      vision::match_stereo(pair.left, pair.right, feature.u, feature.v, level, disparity_range(camera, kMinDisparity));
+  const auto match = vision::match_stereo(pair.left, pair.right, feature.u, feature.v, level,
+                                          disparity_range(camera, kMinAppearanceDisparity));
   if (!match || feature.u - match->disparity < 0) return std::numeric_limits<float>::quiet_NaN();
   return match->disparity;
 }

@@ -6,7 +6,7 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr double kMinDisparity = 0.2;  // pixels; below it there is no depth
+constexpr double kMinJoinedDisparity = 0.2;  // pixels; below it there is no depth
 
 }  // namespace
 
@@ -49,7 +49,7 @@ bool join_measurement(const StereoCamera& camera, const StereoPixel& pixel, doub
   estimate.pixel += step;
   estimate.covariance -= (K * estimate.covariance.topRows(rows)).eval();
   estimate.covariance = 0.5 * (estimate.covariance + estimate.covariance.transpose()).eval();
-  if (!(estimate.pixel.x() - estimate.pixel.z() > kMinDisparity)) return false;
+  if (!(estimate.pixel.x() - estimate.pixel.z() > kMinJoinedDisparity)) return false;
   from_pixels(camera, estimate, point, covariance);
   return true;
 }

@@ -16,7 +16,7 @@ constexpr float kCornerRatio = 0.85F;
 constexpr std::size_t kEnoughSightings = 48;  // for a pose from which the fine search starts
 constexpr int kMaxWindow = 10;                // pixels of the level, either way
 constexpr int kFineSearch = 2;                // pixels of the level, either way
-constexpr float kMinCorrelation = 0.8F;
+constexpr float kMinPatchCorrelation = 0.8F;
 
 struct Place {
   float x = 0, y = 0;  // pixels of the level
@@ -150,7 +150,7 @@ std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& 
     if (best.sad == std::numeric_limits<int>::max()) continue;
     ++in_view;
     const auto aligned = patch.fine.align(image, static_cast<float>(best.x), static_cast<float>(best.y));
-    if (!aligned || aligned->correlation < kMinCorrelation) continue;
+    if (!aligned || aligned->correlation < kMinPatchCorrelation) continue;
     const float u = vision::from_level(aligned->x, patch.level), v = vision::from_level(aligned->y, patch.level);
     if (camera.in_picture(u, v)) sightings.push_back({patch.landmark, {u, v, kNoRight}, aligned->error});
   }

@@ -10,10 +10,10 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr float kMinDisparity = 1.0F;  // pixels; below that the depth is too uncertain
-constexpr float kApart = 0.012F;       // distance between landmarks, as a share of the picture's width
-constexpr float kBerth = 0.03F;        // distance from points to avoid, as a share of the picture's width
-constexpr int kRounds = 3;             // of replacing corners that have no stereo match
+constexpr float kMinStartDisparity = 1.0F;  // pixels; below that the depth is too uncertain
+constexpr float kApart = 0.012F;            // distance between landmarks, as a share of the picture's width
+constexpr float kBerth = 0.03F;             // distance from points to avoid, as a share of the picture's width
+constexpr int kRounds = 3;                  // of replacing corners that have no stereo match
 
 // Share of the wanted tracks on `level` and the coarser levels above it: each level has a third of the one below it.
 // Fine levels measure better, coarse ones are found from further away.
@@ -26,11 +26,12 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
                                     int level, double sigma, double offset) {
   const auto x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
   const float u = vision::from_level(x, level), v = vision::from_level(y, level);
-  const auto match = vision::match_stereo(pair.left, pair.right, u, v, level, disparity_range(camera, kMinDisparity));
+  const auto match =
+      vision::match_stereo(pair.left, pair.right, u, v, level, disparity_range(camera, kMinStartDisparity));
   if (!match) return std::nullopt;
   NewLandmark made;
   const double disparity = match->disparity - offset;
-  if (!(disparity > 0.5 * kMinDisparity && u - disparity >= 0)) return std::nullopt;
+  if (!(disparity > 0.5 * kMinStartDisparity && u - disparity >= 0)) return std::nullopt;
   made.pixel = {u, v, u - disparity};
   const double scale = sigma * pixel_sigma(level);
   from_pixels(camera, {made.pixel, scale * scale * Matrix3::Identity()}, made.landmark.point, made.landmark.covariance);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/session_for_test.h"
 #include "frontend/tracking/stamps.h"
 #include "tools/sim/picture_world.h"
 
@@ -54,14 +55,7 @@ const std::vector<CapturedPair>& drive() {
   return pairs;
 }
 
-SessionHeader header() {
-  SessionHeader session;
-  session.uuid.bytes[0] = 1;
-  session.robot = "robot";
-  session.name = "street";
-  session.camera = world_options().camera;
-  return session;
-}
+SessionHeader short_drive_session() { return testing_session::session_of(world_options().camera); }
 
 // Of pictures that are rectified already; a baseline of 0: of one eye.
 vision::Rectifier rectifier_of(double baseline) {
@@ -108,7 +102,7 @@ struct Ran {
 
 Ran run(std::function<Result<std::optional<CapturedPair>>()> capture, const PipelineOptions& options = lean_options()) {
   Ran ran;
-  StereoTracker tracker(header());
+  StereoTracker tracker(short_drive_session());
   Pipeline pipeline(tracker, rectifier(),
                     {.capture = std::move(capture),
                      .before_tracking = {},
@@ -133,7 +127,7 @@ Ran run(std::function<Result<std::optional<CapturedPair>>()> capture, const Pipe
 
 std::vector<Bytes> one_thread(const std::vector<CapturedPair>& pairs, const PipelineOptions& options = lean_options()) {
   std::vector<Bytes> keyframes;
-  StereoTracker tracker(header());
+  StereoTracker tracker(short_drive_session());
   for (const CapturedPair& captured : pairs) {
     const auto pair = prepare_pair(captured.left, captured.right);
     auto keyframe = tracker.feed(pair, captured.time_us).or_throw();
@@ -282,7 +276,7 @@ TEST(Pipeline, ARunThatGoesOnTakesTheLastKeyframesOwnPairAndNoneBefore) {
 
 TEST(Pipeline, TheGyroIsFedBeforeEachPair) {
   std::vector<std::int64_t> fed;
-  StereoTracker tracker(header());
+  StereoTracker tracker(short_drive_session());
   Pipeline pipeline(tracker, rectifier(),
                     {.capture = giving({drive()[0], drive()[1], drive()[2]}),
                      .before_tracking = [&](StereoTracker&, std::int64_t time_us) { fed.push_back(time_us); },
@@ -295,7 +289,7 @@ TEST(Pipeline, TheGyroIsFedBeforeEachPair) {
 
 TEST(Pipeline, OneEyedCamerasAreRefused) {
   const vision::Rectifier mono = rectifier_of(0);
-  StereoTracker tracker(header());
+  StereoTracker tracker(short_drive_session());
   Pipeline pipeline(
       tracker, mono,
       {.capture = giving({}), .before_tracking = {}, .publish = [](TrackedPair&) { return Status(); }, .refused = {}});
@@ -303,7 +297,7 @@ TEST(Pipeline, OneEyedCamerasAreRefused) {
 }
 
 TEST(Pipeline, PublishingThatFailsEndsTheRun) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(short_drive_session());
   int published = 0;
   Pipeline pipeline(
       tracker, rectifier(),
@@ -323,7 +317,7 @@ TEST(Pipeline, PublishingThatFailsEndsTheRun) {
 
 TEST(Pipeline, ExceptionsOfAStageAreRethrown) {
   const auto throws = [](PipelineStages stages) {
-    StereoTracker tracker(header());
+    StereoTracker tracker(short_drive_session());
     Pipeline pipeline(tracker, rectifier(), std::move(stages), lean_options());
     EXPECT_THROW((void)pipeline.run(), std::runtime_error);
   };

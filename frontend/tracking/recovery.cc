@@ -13,9 +13,9 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr float kMinDisparity = 1.0F;  // pixels
-constexpr double kRatio = 0.8;         // distance to the best / to the second best (Lowe 2004, 7.1)
-constexpr int kHypothesis = 12;        // inliers
+constexpr float kMinRecoveryDisparity = 1.0F;  // pixels
+constexpr double kRatio = 0.8;                 // distance to the best / to the second best (Lowe 2004, 7.1)
+constexpr int kHypothesis = 12;                // inliers
 constexpr std::size_t kEnough = 30;
 constexpr int kFeatures = 400;
 constexpr double kMaxRms = 0.02;  // of the picture's width
@@ -54,7 +54,7 @@ std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pi
   const StereoCamera& camera = keyframe.session.camera;
   std::vector<DescribedPoint> points;
   for (const AppearanceFeature& feature : keyframe.appearance) {
-    if (!(feature.disparity >= kMinDisparity)) continue;
+    if (!(feature.disparity >= kMinRecoveryDisparity)) continue;
     DescribedPoint point;
     const double sigma = feature_sigma(feature.scale, pixel_sigma);
     from_pixels(camera, {{feature.u, feature.v, feature.u - feature.disparity}, sigma * sigma * Matrix3::Identity()},

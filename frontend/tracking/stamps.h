@@ -8,6 +8,8 @@
 
 namespace relmap::tracking {
 
+inline double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
+
 // A single stamp that goes back, or more than a minute ahead, is refused as faulty. If the stamps that follow agree
 // with it, the clock was set: a jump ahead is then accepted, and after a jump back an offset is added, so that times
 // continue from where they were.

@@ -10,7 +10,7 @@
 namespace relmap::tracking {
 namespace {
 
-const StereoCamera kCamera{700, 620, 187, 0.54, 1240, 376};
+const StereoCamera kCarCamera{700, 620, 187, 0.54, 1240, 376};
 constexpr double kNoise = 0.2;  // pixels: what good tracks have
 constexpr int kPoints = 100;
 
@@ -24,28 +24,29 @@ class Drive {
     std::vector<vision::Correspondence> all;
     while (all.size() < kPoints) {
       const double depth = 5 * std::pow(8.0, unit_(random_));
-      const Vector3 point{(unit_(random_) * kCamera.width - kCamera.cx) / kCamera.f * depth,
-                          (unit_(random_) * kCamera.height - kCamera.cy) / kCamera.f * depth, depth};
+      const Vector3 point{(unit_(random_) * kCarCamera.width - kCarCamera.cx) / kCarCamera.f * depth,
+                          (unit_(random_) * kCarCamera.height - kCarCamera.cy) / kCarCamera.f * depth, depth};
       const Vector3 later = T_before_after.inverse() * point;
-      if (later.z() < 1 || !kCamera.in_picture(kCamera.project(later).x(), kCamera.project(later).y())) continue;
+      if (later.z() < 1 || !kCarCamera.in_picture(kCarCamera.project(later).x(), kCarCamera.project(later).y()))
+        continue;
       vision::Correspondence c;
-      from_pixels(kCamera, {measured(point, offset), kNoise * kNoise * Matrix3::Identity()}, c.point,
+      from_pixels(kCarCamera, {measured(point, offset), kNoise * kNoise * Matrix3::Identity()}, c.point,
                   c.point_covariance);
       c.pixel = measured(later, offset);
       c.sigma = kNoise;
       all.push_back(c);
     }
-    const auto motion = vision::estimate_motion(all, kCamera, {}, &T_before_after);
+    const auto motion = vision::estimate_motion(all, kCarCamera, {}, &T_before_after);
     ASSERT_TRUE(motion.ok());
     std::vector<vision::Correspondence> agreed;
     for (const std::uint32_t i : motion->inliers) agreed.push_back(all[i]);
-    offset.learn(agreed, motion->T_reference_camera, kCamera);
+    offset.learn(agreed, motion->T_reference_camera, kCarCamera);
   }
 
  private:
   // A disparity that is too large means a u_right that is too small. The offset so far is subtracted, as tracking does.
   StereoPixel measured(const Vector3& point, const StereoOffset& offset) {
-    StereoPixel pixel = kCamera.project(point);
+    StereoPixel pixel = kCarCamera.project(point);
     for (int k = 0; k < 3; ++k) pixel[k] += kNoise * noise_(random_);
     pixel.z() += offset.pixels() - truth_;
     return pixel;
@@ -107,12 +108,12 @@ TEST(StereoOffset, SidewaysMotionDoesNoHarm) {
 
 TEST(StereoOffset, LearnsNothingFromOneEyeOrNoCorrespondences) {
   StereoOffset offset;
-  offset.learn({}, kForward, kCamera);
+  offset.learn({}, kForward, kCarCamera);
   vision::Correspondence mono;
   mono.point = {0, 0, 10};
   mono.pixel = {620, 187, kNoRight};
   const std::vector<vision::Correspondence> all(50, mono);
-  offset.learn(all, kForward, kCamera);
+  offset.learn(all, kForward, kCarCamera);
   EXPECT_EQ(offset.pixels(), 0);
 }
 

@@ -13,6 +13,7 @@
 #include "frontend/tracking/local_landmarks.h"
 #include "frontend/tracking/recovery.h"
 #include "frontend/tracking/speedometer.h"
+#include "frontend/tracking/stamps.h"
 #include "frontend/tracking/stereo_offset.h"
 #include "frontend/vision/motion.h"
 #include "frontend/vision/rotation.h"
@@ -36,9 +37,9 @@ constexpr double kRivalShare = 0.5;            // a pose with this share of the 
 constexpr double kElsewhere = 22.5;            // chi-square with 6 degrees of freedom, 99.9 %: two poses differ
 constexpr double kFewFound = 0.6;              // with a smaller share found, search again from the better pose,
 constexpr int kMaxRounds = 8;                  // as long as that finds more
-constexpr double kMinCorrelation = 0.7;        // of small pictures, for their rotation to be trusted
-constexpr double kRotationSigma = 0.008;       // radians; error of that rotation from near things
-constexpr double kRecoveryEveryS = 0.5;        // descriptors are expensive
+constexpr double kMinPictureCorrelation = 0.7;  // of small pictures, for their rotation to be trusted
+constexpr double kRotationSigma = 0.008;        // radians; error of that rotation from near things
+constexpr double kRecoveryEveryS = 0.5;         // descriptors are expensive
 
 // The M-estimator assumes independent measurements, but errors of patches and landmarks persist from pair to pair. On
 // drives with ground truth the variance of steps is larger than estimated by this factor.
@@ -49,8 +50,6 @@ constexpr double kUnsensedAfterS = 60;  // dead reckoning over a longer time is 
 
 // Forward translations, as a share of the median depth of the landmarks, that are tried if the speed is not known.
 constexpr std::array kParallaxes{0.04, 0.08, 0.13, -0.04};
-
-double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 // Adds its lifetime to a sum of milliseconds.
 class Timed {
@@ -361,7 +360,7 @@ struct StereoTracker::Impl {
           dt <= kMaxPredictionSeconds ? reckoning.expect(dt).T_from_to.R : Matrix3(Matrix3::Identity());
       if (const auto found = vision::align_rotation(previous->left, pair.left, camera, guess)) {
         report.rotation_correlation = found->correlation;
-        if (found->correlation >= kMinCorrelation)
+        if (found->correlation >= kMinPictureCorrelation)
           turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma), 0};
       }
     }

@@ -12,6 +12,7 @@
 
 #include "frontend/tracking/drift.h"
 #include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/session_for_test.h"
 #include "frontend/tracking/wall_for_test.h"
 #include "proto/geometry/covariance.h"
 #include "tools/sim/inertial.h"
@@ -78,14 +79,7 @@ class Street {
   std::map<std::size_t, std::shared_ptr<const Pair>> pairs_;
 };
 
-SessionHeader header() {
-  SessionHeader session;
-  session.uuid.bytes[0] = 1;
-  session.robot = "robot";
-  session.name = "street";
-  session.camera = Street::get().camera();
-  return session;
-}
+SessionHeader street_session() { return testing_session::session_of(Street::get().camera()); }
 
 struct Fed {
   std::vector<Keyframe> keyframes;
@@ -131,7 +125,7 @@ double rotation_error(const SE3& estimate, const SE3& truth) {
 }
 
 TEST(StereoTracker, FollowsADriveWithoutDrift) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed fed = feed(tracker, 0, Street::kPairs);
   EXPECT_EQ(fed.tracked, static_cast<int>(fed.poses.size()));
   const Drift drift = measure_drift(fed.poses, 5);
@@ -141,7 +135,7 @@ TEST(StereoTracker, FollowsADriveWithoutDrift) {
 }
 
 TEST(StereoTracker, KeyframesAreSoundAndShareTracks) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed fed = feed(tracker, 0, 30);
   ASSERT_GE(fed.keyframes.size(), 4u);
   std::set<TrackId> before;
@@ -176,7 +170,7 @@ TEST(StereoTracker, KeyframesAreSoundAndShareTracks) {
 }
 
 TEST(StereoTracker, KeyframesCanBeGivenAppearanceAndPicture) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed fed = feed(tracker, 0, 15);
   ASSERT_GE(fed.keyframes.size(), 2u);
   for (Keyframe keyframe : fed.keyframes) {
@@ -199,7 +193,7 @@ TEST(StereoTracker, KeyframesCanBeGivenAppearanceAndPicture) {
 }
 
 TEST(StereoTracker, SamePicturesSameBytes) {
-  StereoTracker a(header()), b(header());
+  StereoTracker a(street_session()), b(street_session());
   const Fed first = feed(a, 0, 15), second = feed(b, 0, 15);
   ASSERT_EQ(first.keyframes.size(), second.keyframes.size());
   for (std::size_t i = 0; i < first.keyframes.size(); ++i)
@@ -207,7 +201,7 @@ TEST(StereoTracker, SamePicturesSameBytes) {
 }
 
 TEST(StereoTracker, BridgesAShortLossOfVisionWithoutANewStart) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   feed(tracker, 0, 10);
   ASSERT_TRUE(tracker.feed(dark_pair(), Street::get().time_us(10)).ok());
   EXPECT_FALSE(tracker.report().tracked);
@@ -217,7 +211,7 @@ TEST(StereoTracker, BridgesAShortLossOfVisionWithoutANewStart) {
 }
 
 TEST(StereoTracker, BridgesFiveDroppedPairsByVision) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed before = feed(tracker, 0, 10);
   const Fed after = feed(tracker, 15, 20);
   EXPECT_EQ(after.tracked, 5);
@@ -229,7 +223,7 @@ TEST(StereoTracker, BridgesFiveDroppedPairsByVision) {
 }
 
 TEST(StereoTracker, LeavesOutAPairGivenTwiceWithoutHarmToTheNextPrediction) {
-  StereoTracker doubled(header()), whole(header());
+  StereoTracker doubled(street_session()), whole(street_session());
   feed(doubled, 0, 10);
   const SE3 before = doubled.report().T_odom_frame;
   const auto again = doubled.feed(Street::get().pair(9), Street::get().time_us(10));
@@ -252,7 +246,7 @@ TEST(StereoTracker, LeavesOutAPairGivenTwiceWithoutHarmToTheNextPrediction) {
 }
 
 TEST(StereoTracker, StartsAgainByConstantVelocityWhenItWasBlindTooLong) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed before = feed(tracker, 0, 10);
   for (std::size_t i = 10; i < 35; ++i) {
     const auto keyframe = tracker.feed(dark_pair(), Street::get().time_us(i));
@@ -277,7 +271,7 @@ TEST(StereoTracker, HoldsItsRotationByTheGyroThroughThreeSecondsOfBlack) {
   const std::vector<ImuSample> samples = sim::simulate_inertial(world, unit);
   for (const std::size_t first : {40u, 225u}) {
     const std::size_t last = first + 20;  // before it is black
-    StereoTracker tracker(header());
+    StereoTracker tracker(street_session());
     tracker.use_imu(unit.calibration, Matrix3::Identity());
     auto sample = samples.begin();
     const auto feed_gyro = [&](std::size_t frame) {
@@ -311,7 +305,7 @@ TEST(StereoTracker, HoldsItsRotationByTheGyroThroughThreeSecondsOfBlack) {
 
 TEST(StereoTracker, TheCovarianceOfABridgeCoversItsError) {
   for (const std::size_t from : {5u, 25u, 80u, 160u, 225u}) {
-    StereoTracker tracker(header());
+    StereoTracker tracker(street_session());
     const Fed before = feed(tracker, from, from + 8);
     for (std::size_t i = from + 8; i < from + 33; ++i) tracker.feed(dark_pair(), Street::get().time_us(i)).value();
     const Fed after = feed(tracker, from + 33, from + 36);
@@ -322,7 +316,7 @@ TEST(StereoTracker, TheCovarianceOfABridgeCoversItsError) {
 }
 
 TEST(StereoTracker, GoesOnWithTheLeftEyeWhenTheRightIsDark) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed before = feed(tracker, 0, 10);
   for (std::size_t i = 10; i < 22; ++i) {
     const auto keyframe = tracker.feed(prepare_pair(Street::get().left(i, 0), dark()), Street::get().time_us(i));
@@ -342,12 +336,12 @@ TEST(StereoTracker, GoesOnWithTheLeftEyeWhenTheRightIsDark) {
 TEST(StereoTracker, EveryPairBecomesAKeyframeIfAsked) {
   TrackerOptions all;
   all.every_pair = true;
-  StereoTracker tracker(header(), all);
+  StereoTracker tracker(street_session(), all);
   EXPECT_EQ(feed(tracker, 0, 12).keyframes.size(), 12u);
 }
 
 TEST(StereoTracker, LimitsTheRateOfKeyframesIfAsked) {
-  StereoTracker often(header()), rare(header());
+  StereoTracker often(street_session()), rare(street_session());
   rare.limit_keyframe_rate(0.5);
   const std::size_t many = feed(often, 0, 30).keyframes.size();
   const Fed fed = feed(rare, 0, 30);
@@ -368,7 +362,7 @@ TEST(StereoTracker, LimitsTheRateOfKeyframesIfAsked) {
 TEST(StereoTracker, KeyframesOfOneEyeSaySo) {
   TrackerOptions often;
   often.parallax = 0.025;
-  StereoTracker tracker(header(), often);
+  StereoTracker tracker(street_session(), often);
   Keyframe last = feed(tracker, 0, 10).keyframes.back();
   std::size_t keyframes = 0;
   for (std::size_t i = 10; i < 22; ++i) {
@@ -389,7 +383,7 @@ TEST(StereoTracker, KeyframesOfOneEyeSaySo) {
 }
 
 TEST(StereoTracker, GoesOnWithTheRightEyeWhenTheLeftIsDark) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed before = feed(tracker, 0, 10);
   for (std::size_t i = 10; i < 16; ++i) {
     const auto keyframe = tracker.feed(prepare_pair(dark(), Street::get().right(i, 0)), Street::get().time_us(i));
@@ -407,7 +401,7 @@ TEST(StereoTracker, GoesOnWithTheRightEyeWhenTheLeftIsDark) {
 
 TEST(StereoTracker, RefusesAPairFromAnotherPlaceAndGoesOn) {
   for (const std::size_t elsewhere : {150u, 260u, 370u}) {
-    StereoTracker tracker(header());
+    StereoTracker tracker(street_session());
     const Fed before = feed(tracker, 0, 6);
     ASSERT_TRUE(tracker.feed(Street::get().pair(elsewhere), Street::get().time_us(6)).ok());
     EXPECT_FALSE(tracker.report().tracked) << elsewhere;
@@ -423,14 +417,14 @@ TEST(StereoTracker, RefusesAMotionThatTheRobotCannotMake) {
   TrackerOptions slow;
   slow.max_speed = 2;
   for (const bool in_time : {false, true}) {
-    StereoTracker tracker(header(), slow);
+    StereoTracker tracker(street_session(), slow);
     feed(tracker, 0, 1);
     const std::int64_t later_us = in_time ? 1'000'000 : 100'000;  // 0.6 m further on
     ASSERT_TRUE(tracker.feed(Street::get().pair(3), Street::get().time_us(0) + later_us).ok());
     EXPECT_EQ(tracker.report().tracked, in_time);
   }
   // Nor does it stop or jump from one pair to the next.
-  StereoTracker driving(header());
+  StereoTracker driving(street_session());
   feed(driving, 0, 10);
   ASSERT_TRUE(driving.feed(Street::get().pair(13), Street::get().time_us(10)).ok());
   EXPECT_FALSE(driving.report().tracked);
@@ -438,11 +432,11 @@ TEST(StereoTracker, RefusesAMotionThatTheRobotCannotMake) {
 }
 
 TEST(StereoTracker, TracksLongStepsAndUsesAHint) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed fed = feed(tracker, 0, 45, 4);  // 0.8 m between pairs
   EXPECT_GE(fed.tracked, static_cast<int>(fed.poses.size()) - 2);
 
-  StereoTracker hinted(header());
+  StereoTracker hinted(street_session());
   feed(hinted, 0, 1);
   const SE3 step = Street::get().step(0, 6);
   ASSERT_TRUE(hinted.feed(Street::get().pair(6), Street::get().time_us(6), &step).ok());
@@ -454,7 +448,7 @@ TEST(StereoTracker, TracksLongStepsAndUsesAHint) {
 // is lost; it is never wrong (three metres further, this street has a facade like the one before).
 TEST(StereoTracker, RecoversByDescriptorsAfterAGap) {
   for (const std::size_t gap : {5u, 8u, 15u}) {
-    StereoTracker tracker(header());
+    StereoTracker tracker(street_session());
     const Fed before = feed(tracker, 0, 3);
     const auto keyframe = tracker.feed(Street::get().pair(2 + gap), Street::get().time_us(2) + 30'000'000);
     ASSERT_TRUE(keyframe.ok() && keyframe->has_value());
@@ -470,7 +464,7 @@ TEST(StereoTracker, RecoversByDescriptorsAfterAGap) {
 
 // Tracks a step from a view of `first` to a view of `second`, five seconds later.
 Keyframe after_a_gap(const testing_wall::Wall& first, const testing_wall::Wall& second, const SE3& T_wall_second) {
-  SessionHeader session = header();
+  SessionHeader session = street_session();
   session.camera = testing_wall::kCamera;
   TrackerOptions options;
   options.every_pair = true;
@@ -518,7 +512,7 @@ TEST(StereoTracker, TheCovarianceCoversTwoPosesThatHalfThePictureSupportsEach) {
 // Two seconds of darkness before a bend: some thirty wrong matches once gave a pose among the points themselves, where
 // each point is so near that it might appear anywhere.
 TEST(StereoTracker, RejectsPosesAmongThePointsThemselves) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const Fed before = feed(tracker, 240, 248);
   for (std::size_t i = 248; i < 268; ++i) tracker.feed(dark_pair(), Street::get().time_us(i)).value();
   const Fed after = feed(tracker, 268, 270);
@@ -529,7 +523,7 @@ TEST(StereoTracker, RejectsPosesAmongThePointsThemselves) {
 }
 
 TEST(StereoTracker, StandsStillWithoutKeyframesAndWithoutDrift) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   for (unsigned i = 0; i < 20; ++i) {
     const auto keyframe =
         tracker.feed(prepare_pair(Street::get().left(0, i), Street::get().right(0, i)), 1'000'000 + i * 100'000);
@@ -544,7 +538,7 @@ TEST(StereoTracker, StandsStillWithoutKeyframesAndWithoutDrift) {
 
 // The robot moves at 8 m/s, sees nothing for two seconds, and then stands: the old speed must not be trusted for ever.
 TEST(StereoTracker, FindsAChangedSpeedAfterDarkness) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   std::int64_t time_us = 1'000'000;
   for (std::size_t i = 0; i <= 20; i += 2, time_us += 50'000)
     ASSERT_TRUE(tracker.feed(Street::get().pair(i), time_us).ok());
@@ -563,12 +557,12 @@ TEST(StereoTracker, FindsAChangedSpeedAfterDarkness) {
 }
 
 TEST(StereoTracker, GoesOnAfterAnInterruption) {
-  StereoTracker whole(header());
+  StereoTracker whole(street_session());
   const Fed before = feed(whole, 0, 15);
   const Keyframe last = before.keyframes.back();
   const std::size_t own = frame_at(last.time_us);
 
-  StereoTracker again(header());
+  StereoTracker again(street_session());
   again.resume(last);
   const Fed after = feed(again, own, 30);
   ASSERT_GE(after.keyframes.size(), 2u);
@@ -579,7 +573,7 @@ TEST(StereoTracker, GoesOnAfterAnInterruption) {
   EXPECT_LT((Street::get().step(own, 29).t - estimate.t).norm(), 0.05);
 
   // The robot is not where it stopped; it may have been carried.
-  StereoTracker elsewhere(header());
+  StereoTracker elsewhere(street_session());
   elsewhere.resume(last);
   const Fed carried = feed(elsewhere, own + 5, own + 6);
   ASSERT_EQ(carried.keyframes.size(), 1u);
@@ -588,7 +582,7 @@ TEST(StereoTracker, GoesOnAfterAnInterruption) {
 }
 
 TEST(StereoTracker, RefusesWhatItCannotUse) {
-  StereoTracker tracker(header());
+  StereoTracker tracker(street_session());
   const auto pair = Street::get().pair(0);
   EXPECT_EQ(tracker.feed(prepare_pair(vision::Image(100, 100), pair->picture), 1000).reason(), Reason::BAD_SIZE);
   ASSERT_TRUE(tracker.feed(pair, 1000).ok());

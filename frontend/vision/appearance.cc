@@ -17,7 +17,7 @@ constexpr double kContrast = 0.02;
 constexpr double kEdge = 10;
 constexpr double kSigma = 1.6;
 constexpr double kTrackedSigma = 2.5;  // of a tracked feature's region, at level 0
-constexpr int kMinSide = 16;
+constexpr int kMinSiftSide = 16;
 
 cv::Mat as_mat(ImageView image) {
   return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.data),
@@ -56,7 +56,7 @@ bool stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 
 std::vector<cv::KeyPoint> detect_all(const Base& base) {
   std::vector<cv::KeyPoint> keypoints;
-  if (std::min(base.image.cols, base.image.rows) < kMinSide / 2) return keypoints;
+  if (std::min(base.image.cols, base.image.rows) < kMinSiftSide / 2) return keypoints;
   make_sift()->detect(base.image, keypoints);
   std::sort(keypoints.begin(), keypoints.end(), stronger);
   const auto same_place = [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.pt == b.pt && a.size == b.size; };
@@ -218,7 +218,7 @@ std::pair<Base, std::vector<cv::KeyPoint>> detect_enough(const cv::Mat& grey, in
   return {std::move(base), std::move(keypoints)};
 }
 
-bool too_small(ImageView grey) { return std::min(grey.width, grey.height) < kMinSide; }
+bool too_small(ImageView grey) { return std::min(grey.width, grey.height) < kMinSiftSide; }
 
 }  // namespace
 

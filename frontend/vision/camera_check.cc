@@ -32,10 +32,10 @@ constexpr double kMinGain = 40, kMinGainEach = 0.4, kMinGainEachOfFew = 2.5;
 
 constexpr double kMaxAgree = 0.75;  // of the correspondences; more do not agree with the named camera by chance
 constexpr double kOtherFocalLengths[] = {0.8, 1.25};
-constexpr int kTrials = 100;
+constexpr int kOtherTrials = 100;
 
 constexpr double kMaxLogBaseline = 0.12;
-constexpr double kSigmas = 5;
+constexpr double kBaselineSigmas = 5;
 constexpr std::size_t kMinDisparities = 20;
 
 // The prior's mean is the named lens; its sigmas are those of kFree times `freedom` (1 for a free parameter, kHeld for
@@ -78,7 +78,7 @@ class Fits {
     const auto agree = static_cast<double>(problem.inliers(named_).size());
     if (freedom[Lens::kLogF] < 1 || agree > kMaxAgree * static_cast<double>(left_.size())) return best;
     MotionOptions few = options_;
-    few.max_trials = kTrials;
+    few.max_trials = kOtherTrials;
     for (const double longer : kOtherFocalLengths) {
       StereoCamera other = camera_;
       other.f *= longer;
@@ -177,7 +177,7 @@ Status check_baseline(const std::vector<Disparity>& disparities) {
   const double sigma = std::sqrt(variance * information.inverse()(0, 0));
   if (!(line[0] > 0.1)) return {};  // measured and expected disparities are unrelated
   const double log_scale = std::log(line[0]);
-  if (!(std::abs(log_scale) > std::max(kMaxLogBaseline, kSigmas * sigma / line[0]))) return {};
+  if (!(std::abs(log_scale) > std::max(kMaxLogBaseline, kBaselineSigmas * sigma / line[0]))) return {};
   return {Reason::WRONG_CALIBRATION, "a baseline " + percent(line[0] - 1) + (line[0] > 1 ? " longer" : " shorter")};
 }
 

@@ -5,16 +5,18 @@
 #include <random>
 
 #include "frontend/vision/lens.h"
+#include "frontend/vision/view_for_test.h"
 
 namespace relmap::vision {
 namespace {
 
-constexpr StereoCamera kCamera{640, 319.5, 239.5, 0.2, 640, 480};
-const SE3 kPose = SE3::exp((Vector6() << 0.4, -0.1, 0.8, 0.05, -0.2, 0.03).finished());
+using testing_view::kPose;
+
+constexpr StereoCamera kCalibratedRig{640, 319.5, 239.5, 0.2, 640, 480};
 
 // What a rig at kPose really sees of a place: `lens` left of a right eye at `baseline`. One in `wrong` matches is one
 // of chance.
-struct Scene {
+struct SeenPlace {
   Lens lens{640, 319.5, 239.5, 0, 0};
   double baseline = 0;  // 0: the left eye alone
   int count = 120;
@@ -50,18 +52,18 @@ Status check(const std::vector<Correspondence>& seen, const StereoCamera& camera
   options.min_inliers = 15;
   options.max_trials = 1000;
   const auto motion = estimate_motion(seen, camera, options);
-  return motion.ok() ? check_camera(seen, camera, motion->T_reference_camera, kCamera) : motion.status();
+  return motion.ok() ? check_camera(seen, camera, motion->T_reference_camera, kCalibratedRig) : motion.status();
 }
 
 // In how many of ten scenes check_camera() contradicts the camera.
-int contradicted(const Scene& scene, const StereoCamera& camera) {
+int contradicted(const SeenPlace& scene, const StereoCamera& camera) {
   int count = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed)
     count += check(scene.make(seed), camera).reason() == Reason::WRONG_CALIBRATION;
   return count;
 }
 
-int passed(const Scene& scene, const StereoCamera& camera) {
+int passed(const SeenPlace& scene, const StereoCamera& camera) {
   int count = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) count += check(scene.make(seed), camera).ok();
   return count;
@@ -73,87 +75,87 @@ StereoCamera one_eye(StereoCamera camera) {
 }
 
 TEST(CameraCheck, StretchedPicturesAreFound) {
-  Scene scene;
+  SeenPlace scene;
   for (const double aspect : {0.85, 1.06, 1.17}) {
     scene.lens.aspect = aspect;
-    EXPECT_EQ(contradicted(scene, one_eye(kCamera)), 10) << aspect;
+    EXPECT_EQ(contradicted(scene, one_eye(kCalibratedRig)), 10) << aspect;
   }
 }
 
 TEST(CameraCheck, TheRightCameraPasses) {
   for (const double wrong : {0.0, 0.2, 0.5})
     for (const int count : {60, 120, 400}) {
-      Scene scene;
+      SeenPlace scene;
       scene.wrong = wrong;
       scene.count = count;
-      EXPECT_EQ(passed(scene, one_eye(kCamera)), 10) << wrong << ' ' << count;
-      scene.baseline = kCamera.baseline;
-      EXPECT_EQ(passed(scene, kCamera), 10) << wrong << ' ' << count;
+      EXPECT_EQ(passed(scene, one_eye(kCalibratedRig)), 10) << wrong << ' ' << count;
+      scene.baseline = kCalibratedRig.baseline;
+      EXPECT_EQ(passed(scene, kCalibratedRig), 10) << wrong << ' ' << count;
     }
 }
 
 TEST(CameraCheck, ACameraWithUsualCalibrationErrorsPasses) {
-  Scene scene;
+  SeenPlace scene;
   scene.lens.f *= 1.01;
   scene.lens.cx += 2;
   scene.lens.k1 = 0.01;
-  EXPECT_EQ(passed(scene, one_eye(kCamera)), 10);
+  EXPECT_EQ(passed(scene, one_eye(kCalibratedRig)), 10);
 }
 
 TEST(CameraCheck, AnotherFocalLengthIsFound) {
   for (const double factor : {0.7, 0.9, 1.1, 1.4}) {
-    Scene scene;
+    SeenPlace scene;
     scene.lens.f *= factor;
-    EXPECT_GE(contradicted(scene, one_eye(kCamera)), 9) << factor;
-    scene.baseline = kCamera.baseline;
-    EXPECT_GE(contradicted(scene, kCamera), 9) << factor;
+    EXPECT_GE(contradicted(scene, one_eye(kCalibratedRig)), 9) << factor;
+    scene.baseline = kCalibratedRig.baseline;
+    EXPECT_GE(contradicted(scene, kCalibratedRig), 9) << factor;
   }
-  Scene longer;
+  SeenPlace longer;
   longer.lens.f *= 1.1;
-  EXPECT_NE(check(longer.make(1), one_eye(kCamera)).message().find(" % longer"), std::string::npos);
+  EXPECT_NE(check(longer.make(1), one_eye(kCalibratedRig)).message().find(" % longer"), std::string::npos);
 }
 
 TEST(CameraCheck, ALensThatWasNotRectifiedIsFound) {
-  Scene raw;
+  SeenPlace raw;
   raw.lens = {640, 325, 236, -0.3, 0.08};
-  EXPECT_GE(contradicted(raw, one_eye(kCamera)), 9);
-  const Status found = check(raw.make(1), one_eye(kCamera));
+  EXPECT_GE(contradicted(raw, one_eye(kCalibratedRig)), 9);
+  const Status found = check(raw.make(1), one_eye(kCalibratedRig));
   EXPECT_NE(found.message().find("before it is rectified"), std::string::npos) << found.message();
 }
 
 TEST(CameraCheck, AnotherPrincipalPointIsFound) {
-  Scene scene;
-  scene.lens.cx += 0.05 * kCamera.width;
-  EXPECT_GE(contradicted(scene, one_eye(kCamera)), 9);
+  SeenPlace scene;
+  scene.lens.cx += 0.05 * kCalibratedRig.width;
+  EXPECT_GE(contradicted(scene, one_eye(kCalibratedRig)), 9);
 }
 
 TEST(CameraCheck, AnotherBaselineIsFound) {
   for (const double factor : {0.75, 1.3}) {
-    Scene scene;
-    scene.baseline = factor * kCamera.baseline;
-    EXPECT_GE(contradicted(scene, kCamera), 9) << factor;
+    SeenPlace scene;
+    scene.baseline = factor * kCalibratedRig.baseline;
+    EXPECT_GE(contradicted(scene, kCalibratedRig), 9) << factor;
   }
-  Scene longer;
-  longer.baseline = 1.5 * kCamera.baseline;
-  EXPECT_NE(check(longer.make(1), kCamera).message().find("a baseline"), std::string::npos);
+  SeenPlace longer;
+  longer.baseline = 1.5 * kCalibratedRig.baseline;
+  EXPECT_NE(check(longer.make(1), kCalibratedRig).message().find("a baseline"), std::string::npos);
 }
 
 // A rig as its front-end takes it: an eye is turned by a tenth of a degree.
 TEST(CameraCheck, AnOffsetOfAllDisparitiesIsNoBaseline) {
   for (const double offset : {-1.5, 1.5})
     for (const double far : {1.0, 3.0}) {
-      Scene scene;
-      scene.baseline = kCamera.baseline;
+      SeenPlace scene;
+      scene.baseline = kCalibratedRig.baseline;
       scene.offset = offset;
       scene.depth_from *= far;
       scene.depth_to *= far;
-      EXPECT_EQ(contradicted(scene, kCamera), 0) << offset << ' ' << far;
+      EXPECT_EQ(contradicted(scene, kCalibratedRig), 0) << offset << ' ' << far;
     }
 }
 
 // From the front a wall looks the same from near with a wide lens and from far with a long one.
 TEST(CameraCheck, ViewsThatCannotTellPass) {
-  Scene wall;
+  SeenPlace wall;
   wall.wall = true;
   for (const double slope : {0.0, 0.3})
     for (const double part : {0.5, 1.0})
@@ -162,24 +164,24 @@ TEST(CameraCheck, ViewsThatCannotTellPass) {
         wall.part = part;
         wall.count = count;
         wall.baseline = 0;
-        EXPECT_EQ(contradicted(wall, one_eye(kCamera)), 0) << slope << ' ' << part << ' ' << count;
-        wall.baseline = kCamera.baseline;
-        EXPECT_EQ(contradicted(wall, kCamera), 0) << slope << ' ' << part << ' ' << count;
+        EXPECT_EQ(contradicted(wall, one_eye(kCalibratedRig)), 0) << slope << ' ' << part << ' ' << count;
+        wall.baseline = kCalibratedRig.baseline;
+        EXPECT_EQ(contradicted(wall, kCalibratedRig), 0) << slope << ' ' << part << ' ' << count;
       }
-  Scene few;
+  SeenPlace few;
   few.count = 24;
   few.lens.f *= 1.2;
-  EXPECT_EQ(contradicted(few, one_eye(kCamera)), 0);
-  EXPECT_TRUE(check_camera({}, kCamera, {}, kCamera).ok());
+  EXPECT_EQ(contradicted(few, one_eye(kCalibratedRig)), 0);
+  EXPECT_TRUE(check_camera({}, kCalibratedRig, {}, kCalibratedRig).ok());
 }
 
 // Correspondences of chance do not contradict a camera.
 TEST(CameraCheck, CorrespondencesOfChancePass) {
-  Scene chance;
+  SeenPlace chance;
   chance.wrong = 1;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const auto seen = chance.make(seed);
-    EXPECT_TRUE(check_camera(seen, one_eye(kCamera), kPose, kCamera).ok());
+    EXPECT_TRUE(check_camera(seen, one_eye(kCalibratedRig), kPose, kCalibratedRig).ok());
   }
 }
 

@@ -15,7 +15,7 @@ namespace relmap::vision {
 namespace {
 
 constexpr std::size_t kMaxCorners = 4000;  // candidates in a picture
-constexpr float kApart = 8;                // pixels between corners to match, at least
+constexpr float kCornersApart = 8;         // pixels between corners to match, at least
 constexpr int kSamePlace = 2;              // pixels
 constexpr int kSurroundings = 12;          // pixels to each side
 constexpr double kMinAround = 0.6;  // correlation of the surroundings; slanted or partly hidden ones differ somewhat
@@ -85,7 +85,7 @@ std::vector<CornerMatch> match_corners(ImageView left_picture, ImageView right_p
   const int rows = static_cast<int>(options.rows * static_cast<float>(left_picture.height));
   std::vector<CornerMatch> matches;
   for (const std::uint32_t i :
-       choose_spread(left.corners, {}, left_picture.width, left_picture.height, options.wanted, kApart)) {
+       choose_spread(left.corners, {}, left_picture.width, left_picture.height, options.wanted, kCornersApart)) {
     const Corner& corner = left.corners[i];
     const Corner* there = find(corner, left, right, columns, rows, options.uniqueness);
     if (!there) continue;

@@ -22,7 +22,7 @@ using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
 // The left camera's motion, as it acts on rays: X' = R x + T (disparity - zero).
-struct Motion {
+struct RayMotion {
   Matrix3 R = Matrix3::Identity();
   Vector3 T = Vector3::Zero();
   double zero = 0;
@@ -33,7 +33,7 @@ class Fit {
   Fit(const std::vector<MovedCorner>& corners, const StereoCamera& camera) : corners_(corners), camera_(camera) {}
 
   // Two residuals and their derivatives by rotation, T and zero. False if the point is behind the camera.
-  bool linearise(const MovedCorner& c, const Motion& motion, Eigen::Vector2d& residual,
+  bool linearise(const MovedCorner& c, const RayMotion& motion, Eigen::Vector2d& residual,
                  Eigen::Matrix<double, 2, 7>& J) const {
     const Vector3 ray((c.u - camera_.cx) / camera_.f, (c.v - camera_.cy) / camera_.f, 1);
     const Vector3 turned = motion.R * ray;
@@ -51,7 +51,7 @@ class Fit {
   }
 
   // Geman-McClure cost. It is bounded, so that things that move by themselves count no more than mismatches.
-  double cost(const Motion& motion, double scale) const {
+  double cost(const RayMotion& motion, double scale) const {
     double sum = 0;
     Eigen::Vector2d r;
     Eigen::Matrix<double, 2, 7> J;
@@ -62,7 +62,7 @@ class Fit {
 
   // Gauss-Newton over `unknowns` parameters: 6 (zero is held) or 7. The scale of the kernel falls from `from` to `to`.
   // Returns the information matrix for residuals of one pixel.
-  Matrix7 refine(Motion& motion, int unknowns, double from, double to, int rounds) const {
+  Matrix7 refine(RayMotion& motion, int unknowns, double from, double to, int rounds) const {
     Matrix7 A = Matrix7::Zero();
     for (int round = 0; round < rounds; ++round) {
       const double scale = std::max(to, from * std::pow(0.5, round));
@@ -87,7 +87,7 @@ class Fit {
 
   // Counts the corners whose residual is at most `max_residual`; `variance` is their mean squared residual a
   // coordinate.
-  int agreeing(const Motion& motion, double max_residual, double& variance) const {
+  int agreeing(const RayMotion& motion, double max_residual, double& variance) const {
     int count = 0;
     double sum = 0;
     Eigen::Vector2d r;
@@ -112,10 +112,10 @@ std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corn
   if (corners.size() < kMinCorners) return {};
   const Fit fit(corners, camera);
   const double step = camera.f * std::tan(kMaxStartYaw * M_PI / 180) / kStarts;
-  std::optional<Motion> best;
+  std::optional<RayMotion> best;
   double min_cost = 0;
   for (int start = -kStarts; start <= kStarts; ++start) {
-    Motion motion;
+    RayMotion motion;
     motion.zero = start * step;
     fit.refine(motion, 6, kFirstTolerance, 2, 8);
     fit.refine(motion, 7, 2, 2, 4);

@@ -7,6 +7,9 @@
 
 namespace relmap::vision {
 
+// Grey levels up to kBlack and from kWhite on may have been clipped.
+inline constexpr int kBlack = 5, kWhite = 250;
+
 // Borrowed pixels, in rows `stride` bytes apart. The owner must outlive the view.
 struct ImageView {
   const std::uint8_t* data = nullptr;

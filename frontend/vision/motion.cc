@@ -139,9 +139,9 @@ class PoseModel {
   const std::vector<std::uint32_t>& active_;
 };
 
-std::optional<Refined<PoseModel>> refine(const Problem& problem, const std::vector<std::uint32_t>& active, const SE3& T,
-                                         int iterations) {
-  return vision::refine(PoseModel(problem, active), T, iterations);
+std::optional<Refined<PoseModel>> refine_pose(const Problem& problem, const std::vector<std::uint32_t>& active,
+                                              const SE3& T, int iterations) {
+  return refine(PoseModel(problem, active), T, iterations);
 }
 
 class Random {  // splitmix64
@@ -258,7 +258,7 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
   // A new best pose is refined on its own inliers at once, so that few trials suffice (Chum et al., DAGM 2003).
   const auto polish = [&] {
     for (int round = 0; round < 2 && best.score.inliers >= 6; ++round) {
-      const auto refined = refine(problem, problem.inliers(best.T), best.T, 3);
+      const auto refined = refine_pose(problem, problem.inliers(best.T), best.T, 3);
       if (!refined || !consider(refined->state)) break;
     }
   };
@@ -301,7 +301,7 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   // find again.
   std::optional<Refined<PoseModel>> refined;
   for (int round = 0; round < 4 && inliers.size() >= kSample; ++round) {
-    refined = refine(problem, inliers, best.T, 10);
+    refined = refine_pose(problem, inliers, best.T, 10);
     if (!refined) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
     best.T = refined->state;
     auto again = problem.inliers(best.T);

@@ -10,7 +10,7 @@
 namespace relmap::vision {
 namespace {
 
-const StereoCamera kCamera{400, 256, 192, 0.12, 512, 384};
+const StereoCamera kStereoCamera{400, 256, 192, 0.12, 512, 384};
 
 struct Scene {
   SE3 truth;
@@ -34,7 +34,7 @@ Scene make_scene(unsigned seed, std::size_t count, double outlier_share, double 
     const Vector3 seen{(unit(random) * 512 - 256) / 400 * depth, (unit(random) * 384 - 192) / 400 * depth, depth};
     Correspondence c;
     c.point = scene.truth * seen;
-    c.pixel = kCamera.project(seen) + noise * Vector3(gauss(random), gauss(random), gauss(random));
+    c.pixel = kStereoCamera.project(seen) + noise * Vector3(gauss(random), gauss(random), gauss(random));
     c.sigma = std::max(noise, 1e-3);
     if (scene.all.size() < scene.outliers) {
       c.pixel.x() = unit(random) * 512;
@@ -55,7 +55,7 @@ double chi2(const Scene& scene, const Motion& motion) {
 TEST(Motion, IsExactWithoutNoise) {
   for (const double mono : {0.0, 0.5, 1.0}) {
     const Scene scene = make_scene(1, 80, 0, mono, 0);
-    const auto motion = estimate_motion(scene.all, kCamera);
+    const auto motion = estimate_motion(scene.all, kStereoCamera);
     ASSERT_TRUE(motion.ok()) << motion.status().to_string();
     EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 1e-6) << "mono share " << mono;
     EXPECT_EQ(motion->inliers.size(), scene.all.size());
@@ -77,10 +77,10 @@ TEST(Motion, InliersAreCountedAfterTheRefinement) {
     }
     MotionOptions options;
     options.min_inliers = 3;
-    const auto found = estimate_motion(scene.all, kCamera, options);
+    const auto found = estimate_motion(scene.all, kStereoCamera, options);
     ASSERT_TRUE(found.ok());
     options.min_inliers = static_cast<int>(found->inliers.size());
-    const auto demanded = estimate_motion(scene.all, kCamera, options);
+    const auto demanded = estimate_motion(scene.all, kStereoCamera, options);
     EXPECT_TRUE(demanded.ok()) << "seed " << seed << ": " << demanded.status().to_string();
   }
 }
@@ -89,7 +89,7 @@ TEST(Motion, ToleratesHalfOutliers) {
   for (const double mono : {0.0, 0.5, 1.0})
     for (unsigned seed = 1; seed <= 20; ++seed) {
       const Scene scene = make_scene(seed, 150, 0.5, mono, 0.5);
-      const auto motion = estimate_motion(scene.all, kCamera);
+      const auto motion = estimate_motion(scene.all, kStereoCamera);
       ASSERT_TRUE(motion.ok()) << motion.status().to_string();
       const Vector6 error = (motion->T_reference_camera.inverse() * scene.truth).log();
       EXPECT_LT(error.head<3>().norm(), 0.05) << "seed " << seed << " mono share " << mono;
@@ -107,7 +107,7 @@ TEST(Motion, CovarianceAgreesWithTheErrors) {
   constexpr int kRuns = 60;
   for (unsigned seed = 100; seed < 100 + kRuns; ++seed) {
     const Scene scene = make_scene(seed, 120, 0.2, 0.3, 1.0);
-    const auto motion = estimate_motion(scene.all, kCamera);
+    const auto motion = estimate_motion(scene.all, kStereoCamera);
     ASSERT_TRUE(motion.ok());
     sum += chi2(scene, *motion);
   }
@@ -125,13 +125,13 @@ TEST(Motion, UncertainPointsWidenTheGateAndTheCovariance) {
     c.point += sigma * Vector3(gauss(random), gauss(random), gauss(random));
     c.point_covariance = sigma * sigma * Matrix3::Identity();
   }
-  const auto motion = estimate_motion(scene.all, kCamera);
+  const auto motion = estimate_motion(scene.all, kStereoCamera);
   ASSERT_TRUE(motion.ok());
   EXPECT_GT(motion->inliers.size(), 90u);
   EXPECT_LT(chi2(scene, *motion), 22.5);  // chi2_6(0.999)
   std::vector<Correspondence> exact = scene.all;
   for (Correspondence& c : exact) c.point_covariance.setZero();
-  const auto narrow = estimate_motion(exact, kCamera);
+  const auto narrow = estimate_motion(exact, kStereoCamera);
   ASSERT_FALSE(narrow.ok() && narrow->inliers.size() > 60);
 }
 
@@ -141,7 +141,7 @@ TEST(Motion, APointOfUnboundedUncertaintyIsNoInlier) {
   before_the_eye.point = scene.truth * Vector3(-0.002, 0.003, 0.0011);
   before_the_eye.point_covariance = 0.01 * Matrix3::Identity();
   scene.all.push_back(before_the_eye);
-  const auto motion = estimate_motion(scene.all, kCamera);
+  const auto motion = estimate_motion(scene.all, kStereoCamera);
   ASSERT_TRUE(motion.ok()) << motion.status().to_string();
   EXPECT_EQ(motion->inliers.size(), 80u);
   EXPECT_LT(motion->inliers.back(), 80u);
@@ -163,13 +163,13 @@ TEST(Motion, FewCertainPointsOutweighManyUncertainOnes) {
       Correspondence c;
       c.point = T_elsewhere * seen + 0.2 * Vector3(gauss(random), gauss(random), gauss(random));
       c.point_covariance = 0.2 * 0.2 * Matrix3::Identity();
-      c.pixel = kCamera.project(seen);
+      c.pixel = kStereoCamera.project(seen);
       c.sigma = 0.5;
       scene.all.push_back(c);
     }
     MotionOptions options;
     options.seed = seed;
-    const auto motion = estimate_motion(scene.all, kCamera, options);
+    const auto motion = estimate_motion(scene.all, kStereoCamera, options);
     ASSERT_TRUE(motion.ok()) << motion.status().to_string();
     right += (motion->T_reference_camera.t - scene.truth.t).norm() < 0.1;
   }
@@ -178,7 +178,7 @@ TEST(Motion, FewCertainPointsOutweighManyUncertainOnes) {
 
 TEST(Motion, SameSeedSameAnswer) {
   const Scene scene = make_scene(3, 150, 0.4, 0.3, 0.7);
-  const auto a = estimate_motion(scene.all, kCamera), b = estimate_motion(scene.all, kCamera);
+  const auto a = estimate_motion(scene.all, kStereoCamera), b = estimate_motion(scene.all, kStereoCamera);
   ASSERT_TRUE(a.ok() && b.ok());
   EXPECT_EQ(a->inliers, b->inliers);
   EXPECT_EQ(a->T_reference_camera.t, b->T_reference_camera.t);
@@ -189,11 +189,11 @@ TEST(Motion, AGoodGuessNeedsNoTrials) {
   const Scene scene = make_scene(4, 150, 0.3, 0.5, 0.5);
   MotionOptions none;
   none.max_trials = 0;
-  EXPECT_EQ(estimate_motion(scene.all, kCamera, none).reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(estimate_motion(scene.all, kStereoCamera, none).reason(), Reason::TOO_FEW_INLIERS);
   Vector6 off;
   off << 0.02, -0.01, 0.03, 0.004, -0.004, 0.002;
   const SE3 guess = scene.truth * SE3::exp(off);
-  const auto motion = estimate_motion(scene.all, kCamera, none, &guess);
+  const auto motion = estimate_motion(scene.all, kStereoCamera, none, &guess);
   ASSERT_TRUE(motion.ok());
   EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05);
 }
@@ -207,8 +207,8 @@ TEST(Motion, AGuessWithEnoughInliersIsTakenWithoutTrials) {
     off << 0.004, -0.002, 0.006, 0.0006, -0.0006, 0.0003;
     const SE3 guess = scene.truth * SE3::exp(off);
     // The same as without trials: none were drawn.
-    const auto taken = estimate_motion(scene.all, kCamera, {}, &guess);
-    const auto bare = estimate_motion(scene.all, kCamera, no_trials, &guess);
+    const auto taken = estimate_motion(scene.all, kStereoCamera, {}, &guess);
+    const auto bare = estimate_motion(scene.all, kStereoCamera, no_trials, &guess);
     ASSERT_TRUE(taken.ok() && bare.ok()) << seed;
     EXPECT_EQ(taken->T_reference_camera.t, bare->T_reference_camera.t) << seed;
     EXPECT_EQ(taken->inliers, bare->inliers) << seed;
@@ -222,7 +222,7 @@ TEST(Motion, AGuessWithFewInliersIsNot) {
     Vector6 off;
     off << 0.5, 0.2, -0.5, 0.05, -0.1, 0.05;
     const SE3 guess = scene.truth * SE3::exp(off);
-    const auto motion = estimate_motion(scene.all, kCamera, {}, &guess);
+    const auto motion = estimate_motion(scene.all, kStereoCamera, {}, &guess);
     ASSERT_TRUE(motion.ok()) << seed;
     EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05) << seed;
   }
@@ -244,7 +244,7 @@ TEST(Motion, OrderedCorrespondencesNeedFewTrials) {
       options.seed = seed;
       options.max_trials = trials;
       options.ordered = in_order;
-      const auto motion = estimate_motion(ordered, kCamera, options);
+      const auto motion = estimate_motion(ordered, kStereoCamera, options);
       right += motion.ok() && (motion->T_reference_camera.inverse() * scene.truth).log().norm() < 0.1;
     }
     return right;
@@ -255,12 +255,12 @@ TEST(Motion, OrderedCorrespondencesNeedFewTrials) {
 }
 
 TEST(Motion, RefusesWhatDoesNotAgree) {
-  EXPECT_EQ(estimate_motion({}, kCamera).reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(estimate_motion({}, kStereoCamera).reason(), Reason::TOO_FEW_INLIERS);
   Scene scene = make_scene(5, 60, 1.0, 0.5, 0.5);
-  EXPECT_EQ(estimate_motion(scene.all, kCamera).reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(estimate_motion(scene.all, kStereoCamera).reason(), Reason::TOO_FEW_INLIERS);
   // All points in one: any rotation about it fits.
   for (Correspondence& c : scene.all) c = scene.all.front();
-  EXPECT_EQ(estimate_motion(scene.all, kCamera).reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(estimate_motion(scene.all, kStereoCamera).reason(), Reason::TOO_FEW_INLIERS);
 }
 
 TEST(Motion, LeavesOutWhatIsNotFinite) {
@@ -268,7 +268,7 @@ TEST(Motion, LeavesOutWhatIsNotFinite) {
   scene.all[10].point.x() = std::numeric_limits<double>::quiet_NaN();
   scene.all[20].pixel.x() = std::numeric_limits<double>::infinity();
   scene.all[30].sigma = 0;
-  const auto motion = estimate_motion(scene.all, kCamera);
+  const auto motion = estimate_motion(scene.all, kStereoCamera);
   ASSERT_TRUE(motion.ok());
   EXPECT_GE(motion->inliers.size(), 50u);
   for (const auto bad : {10u, 20u, 30u}) EXPECT_EQ(std::count(motion->inliers.begin(), motion->inliers.end(), bad), 0);

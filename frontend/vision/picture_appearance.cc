@@ -9,7 +9,7 @@ namespace relmap::vision {
 namespace {
 
 constexpr int kCornersOnLevelZero = 80;  // half as many on each level above: 150 in all, a keyframe's tracks
-constexpr float kApart = 5;              // pixels of the level
+constexpr float kFeaturesApart = 5;      // pixels of the level
 constexpr int kThresholdRounds = 5;      // until the detector's thresholds have adapted to the picture
 
 }  // namespace
@@ -26,7 +26,7 @@ std::vector<AppearanceFeature> picture_appearance(ImageView grey) {
     const ImageView image = pyramid.level(level);
     const auto& candidates = corners[static_cast<std::size_t>(level)];
     for (const std::uint32_t i :
-         choose_spread(candidates, {}, image.width, image.height, kCornersOnLevelZero >> level, kApart))
+         choose_spread(candidates, {}, image.width, image.height, kCornersOnLevelZero >> level, kFeaturesApart))
       positions.push_back({from_level(candidates[i].x, level), from_level(candidates[i].y, level), level, -1});
   }
   return detect_appearance(grey, positions);

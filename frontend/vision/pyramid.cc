@@ -11,7 +11,7 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr int kMinSide = 32;
+constexpr int kMinLevelSide = 32;
 
 #if defined(__SSE4_1__)
 // Eight pixels out of sixteen of two rows.
@@ -47,7 +47,7 @@ Image halve(ImageView image) {
 Pyramid::Pyramid(Image picture, int max_levels) {
   images_.reserve(static_cast<std::size_t>(std::max(1, max_levels)));
   images_.push_back(std::move(picture));
-  while (levels() < max_levels && std::min(images_.back().width(), images_.back().height()) / 2 >= kMinSide)
+  while (levels() < max_levels && std::min(images_.back().width(), images_.back().height()) / 2 >= kMinLevelSide)
     images_.push_back(halve(images_.back()));
 }
 

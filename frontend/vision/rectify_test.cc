@@ -12,15 +12,15 @@ namespace {
 
 using testing_textures::paint;
 
-constexpr int kWidth = 640, kHeight = 480;
+constexpr int kRawWidth = 640, kRawHeight = 480;
 
 StereoCalibration rig() {
   StereoCalibration c;
   c.left = {460, 458, 320, 242, -0.28, 0.07, 0.0002, -0.0001, 0};
   c.right = {455, 456, 327, 236, -0.27, 0.06, -0.0001, 0.0002, 0};
   c.T_right_left = SE3{so3_exp({0.01, -0.015, 0.008}), {-0.11, 0.002, -0.001}};
-  c.width = kWidth;
-  c.height = kHeight;
+  c.width = kRawWidth;
+  c.height = kRawHeight;
   return c;
 }
 
@@ -32,7 +32,7 @@ Vector2 project(const RawCamera& c, const Vector3& p) {
 }
 
 Image blob(const Vector2& at) {
-  return paint(kWidth, kHeight, [&](int x, int y) {
+  return paint(kRawWidth, kRawHeight, [&](int x, int y) {
     return 20 + 200 * std::exp(-((x - at.x()) * (x - at.x()) + (y - at.y()) * (y - at.y())) / 18);
   });
 }
@@ -52,7 +52,7 @@ Vector2 centre(const Image& image) {
 
 TEST(Rectifier, PutsPointsWhereTheRectifiedCameraSeesThem) {
   const StereoCalibration calibration = rig();
-  const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
+  const auto rectifier = Rectifier::make(calibration, kRawWidth, kRawHeight);
   ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
   EXPECT_FALSE(rectifier->passes_through());
   EXPECT_NEAR(rectifier->camera().baseline, calibration.T_right_left.t.norm(), 1e-9);
@@ -73,7 +73,7 @@ TEST(Rectifier, PutsPointsWhereTheRectifiedCameraSeesThem) {
 // the left one's.
 TEST(Rectifier, TellsHowMuchThePictureOfTheOtherEyeIsTurned) {
   const StereoCalibration calibration = rig();
-  const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
+  const auto rectifier = Rectifier::make(calibration, kRawWidth, kRawHeight);
   ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
   const StereoCamera& camera = rectifier->camera();
   EXPECT_GT(rectifier->eye_turn().norm(), 0.01);
@@ -93,15 +93,15 @@ TEST(Rectifier, PassesRectifiedPicturesThrough) {
   calibration.left = calibration.right = {700, 700, 320, 240};
   calibration.T_right_left.t = {-0.5, 0, 0};
   calibration.rectified = true;  // and without a size, as KITTI's are
-  const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
+  const auto rectifier = Rectifier::make(calibration, kRawWidth, kRawHeight);
   ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
   EXPECT_TRUE(rectifier->passes_through());
   EXPECT_TRUE(rectifier->eye_turn().isZero());
-  EXPECT_EQ(rectifier->camera(), (StereoCamera{700, 320, 240, 0.5, kWidth, kHeight}));
+  EXPECT_EQ(rectifier->camera(), (StereoCamera{700, 320, 240, 0.5, kRawWidth, kRawHeight}));
   const Image picture = blob({100, 100});
   const auto same = rectifier->right(picture);
   ASSERT_TRUE(same.ok());
-  EXPECT_TRUE(std::equal(picture.row(0), picture.row(0) + kWidth * kHeight, same->row(0)));
+  EXPECT_TRUE(std::equal(picture.row(0), picture.row(0) + kRawWidth * kRawHeight, same->row(0)));
 }
 
 TEST(Rectifier, WritesIntoTheMemoryGiven) {
@@ -110,7 +110,7 @@ TEST(Rectifier, WritesIntoTheMemoryGiven) {
   parallel.T_right_left = SE3{Matrix3::Identity(), {-0.5, 0, 0}};
   parallel.rectified = true;
   for (const StereoCalibration& calibration : {rig(), parallel}) {
-    const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
+    const auto rectifier = Rectifier::make(calibration, kRawWidth, kRawHeight);
     ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
     Image out;
     for (const Vector2& at : {Vector2(100, 100), Vector2(400, 300)}) {
@@ -120,17 +120,17 @@ TEST(Rectifier, WritesIntoTheMemoryGiven) {
       ASSERT_TRUE(rectifier->left(picture, out).ok());
       EXPECT_EQ(out.row(0), memory);
       const auto apart = rectifier->left(picture);
-      EXPECT_TRUE(std::equal(out.row(0), out.row(0) + kWidth * kHeight, apart->row(0)));
+      EXPECT_TRUE(std::equal(out.row(0), out.row(0) + kRawWidth * kRawHeight, apart->row(0)));
     }
     EXPECT_EQ(rectifier->left(Image(64, 64), out).reason(), Reason::BAD_SIZE);
-    EXPECT_EQ(out.width(), kWidth);
+    EXPECT_EQ(out.width(), kRawWidth);
   }
 }
 
 TEST(Rectifier, OneCameraHasNoRightPicture) {
   StereoCalibration one = rig();
   one.right = {};
-  const auto rectifier = Rectifier::make(one, kWidth, kHeight);
+  const auto rectifier = Rectifier::make(one, kRawWidth, kRawHeight);
   ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
   EXPECT_EQ(rectifier->camera().baseline, 0);
   EXPECT_TRUE(rectifier->left(blob({100, 100})).ok());
@@ -139,12 +139,12 @@ TEST(Rectifier, OneCameraHasNoRightPicture) {
 
 TEST(Rectifier, RefusesOtherSizesAndBadCalibrations) {
   EXPECT_EQ(Rectifier::make(rig(), 320, 240).reason(), Reason::BAD_SIZE);
-  const auto rectifier = Rectifier::make(rig(), kWidth, kHeight);
+  const auto rectifier = Rectifier::make(rig(), kRawWidth, kRawHeight);
   ASSERT_TRUE(rectifier.ok());
   EXPECT_EQ(rectifier->left(paint(64, 64, [](int, int) { return 0; })).reason(), Reason::BAD_SIZE);
   StereoCalibration mad = rig();
   mad.left.fx = -3;
-  EXPECT_EQ(Rectifier::make(mad, kWidth, kHeight).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(Rectifier::make(mad, kRawWidth, kRawHeight).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
 }  // namespace

@@ -17,8 +17,7 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr int kMinSide = 64;  // pixels
-constexpr int kSaturated = 250, kBlack = 5;
+constexpr int kMinPictureSide = 64;  // pixels
 constexpr std::size_t kMinMatches = 50;
 constexpr double kMaxRowError = 1;  // pixels
 constexpr double kParallel = 1;     // pixels; the sign of a smaller disparity means nothing
@@ -29,7 +28,7 @@ constexpr double kMaxYawByRows = 0.75;         // degrees; good cameras have up 
 constexpr double kMaxYawByMotion = 0.5;        // degrees; good cameras have up to 0.2
 constexpr std::size_t kMinMotions = 3;
 constexpr double kMaxRowsOfMotion = 4;  // pixels from the median row error; beyond that it is a mismatch
-constexpr double kSigmas = 3;
+constexpr double kYawSigmas = 3;
 constexpr double kDegrees = 180 / M_PI;
 constexpr double kMaxEdge = 4.5;  // pixels; edges in focus have 2 to 3
 // An eye with wider edges than this (pixels) is out of focus if the other eye is sharper by this factor.
@@ -118,7 +117,7 @@ void measure_disparities(const std::vector<CornerMatch>& matches, RigReport& rep
 // point shifted by angle * x y / f rows. Nothing if three sigmas of the yaw exceed the largest tolerable yaw.
 std::optional<double> yaw_by_rows(const RowTrend& trend, const StereoCamera& camera) {
   const double degrees = kDegrees * camera.f / (static_cast<double>(trend.width) * trend.height);
-  if (kSigmas * trend.twist_sigma * degrees > kMaxYawByRows) return {};
+  if (kYawSigmas * trend.twist_sigma * degrees > kMaxYawByRows) return {};
   return trend.shape[3] * degrees;
 }
 
@@ -127,7 +126,7 @@ std::optional<double> yaw_by_motion(std::vector<double> zeros, const StereoCamer
   const double median = quantile(zeros, 0.5);
   for (double& zero : zeros) zero = std::abs(zero - median);
   const double sigma = 1.48 * quantile(zeros, 0.5) / std::sqrt(static_cast<double>(zeros.size()));
-  if (kSigmas * sigma > camera.f * std::tan(kMaxYawByMotion / kDegrees)) return {};
+  if (kYawSigmas * sigma > camera.f * std::tan(kMaxYawByMotion / kDegrees)) return {};
   return -kDegrees * std::atan(median / camera.f);
 }
 
@@ -192,7 +191,7 @@ void RigCheck::Eye::add(ImageView picture) {
   blind += exposures.back().blind();
   repeated += same_picture(picture, last);
   last = copy_of(picture);
-  saturated += share_of(picture, kSaturated, 255);
+  saturated += share_of(picture, kWhite, 255);
   black += share_of(picture, 0, kBlack);
   if (const auto width = edge_width(picture)) edge_widths.push_back(*width);
 }
@@ -216,7 +215,8 @@ Status RigCheck::add(ImageView left, ImageView right, ImageView later) {
     return std::to_string(picture.width) + " x " + std::to_string(picture.height);
   };
   const bool first = pairs_ == 0;
-  if (left.width != right.width || left.height != right.height || left.width < kMinSide || left.height < kMinSide ||
+  if (left.width != right.width || left.height != right.height || left.width < kMinPictureSide ||
+      left.height < kMinPictureSide ||
       (!first && (left.width != left_.last.width() || left.height != left_.last.height())))
     return {Reason::BAD_SIZE,
             "pictures of " + size(left) + " and " + size(right) +

@@ -13,8 +13,8 @@ namespace {
 using testing_textures::paint;
 using testing_textures::Waves;
 
-constexpr int kWidth = 400, kHeight = 300;
-const StereoCamera kCamera{300, 199.5, 149.5, 0.12, kWidth, kHeight};
+constexpr int kEyeWidth = 400, kEyeHeight = 300;
+const StereoCamera kCheckedRig{300, 199.5, 149.5, 0.12, kEyeWidth, kEyeHeight};
 
 // A slanted wall with disparities of 8 to 16 pixels, another piece of it each time. What the right eye sees lies
 // `rows(u, v)` further down.
@@ -23,8 +23,8 @@ std::pair<Image, Image> look(unsigned seed, const Rows& rows) {
   const Waves waves(seed, 6, 60);
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
-  Image left = paint(kWidth, kHeight, [&](int x, int y) { return waves.at(x, y) + noise(random); });
-  Image right = paint(kWidth, kHeight, [&](int x, int y) {
+  Image left = paint(kEyeWidth, kEyeHeight, [&](int x, int y) { return waves.at(x, y) + noise(random); });
+  Image right = paint(kEyeWidth, kEyeHeight, [&](int x, int y) {
     const double u = (x + 8) / 0.98;  // u_right = u - (8 + 0.02 u)
     return 10 + 0.9 * waves.at(u, y - rows(u, y)) + noise(random);
   });
@@ -105,24 +105,24 @@ TEST(RigCheck, RowsThreePixelsApartAreNotTakenForTooFewFeatures) {
 // About its vertical axis, by rows alone: all is as far away as before.
 RigReport report_of_yaw(double degrees, const std::optional<StereoCamera>& camera) {
   RigCheck check(camera);
-  const double f = kCamera.f, angle = degrees * M_PI / 180;
+  const double f = kCheckedRig.f, angle = degrees * M_PI / 180;
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const auto [left, right] =
-        look(seed, [&](double u, double v) { return angle * (u - 12 - kCamera.cx) * (v - kCamera.cy) / f; });
+        look(seed, [&](double u, double v) { return angle * (u - 12 - kCheckedRig.cx) * (v - kCheckedRig.cy) / f; });
     EXPECT_TRUE(check.add(left, right).ok());
   }
   return check.report();
 }
 
 TEST(RigCheck, AnEyeTurnedToTheSideShowsInTheRowsOfTheCorners) {
-  const RigReport sound = report_of_yaw(0, kCamera);
+  const RigReport sound = report_of_yaw(0, kCheckedRig);
   ASSERT_TRUE(sound.yaw_by_rows);
   EXPECT_NEAR(*sound.yaw_by_rows, 0, 0.1);
   EXPECT_FALSE(sound.yaw_by_motion) << "nothing was said of motion";
   EXPECT_TRUE(sound.findings.empty());
-  EXPECT_TRUE(report_of_yaw(0.5, kCamera).findings.empty()) << "other errors of a calibration look like it";
+  EXPECT_TRUE(report_of_yaw(0.5, kCheckedRig).findings.empty()) << "other errors of a calibration look like it";
   for (const double degrees : {-1.0, 1.0}) {
-    const RigReport report = report_of_yaw(degrees, kCamera);
+    const RigReport report = report_of_yaw(degrees, kCheckedRig);
     EXPECT_NEAR(*report.yaw_by_rows, degrees, 0.15);
     EXPECT_LT(report.row_error, 1);
     ASSERT_EQ(reasons(report), only(Reason::NOT_STEREO));
@@ -137,10 +137,10 @@ TEST(RigCheck, NegativeDisparitiesAreFound) {
   // 12 pixels less than there should be: less than none in one part of the picture.
   const auto shift = [](Image& eye) {
     const Image as_it_was = copy_of(eye);
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) eye.row(y)[x] = as_it_was.at(std::max(0, x - 12), y);
+    for (int y = 0; y < kEyeHeight; ++y)
+      for (int x = 0; x < kEyeWidth; ++x) eye.row(y)[x] = as_it_was.at(std::max(0, x - 12), y);
   };
-  RigCheck check(kCamera);
+  RigCheck check(kCheckedRig);
   for (unsigned seed = 1; seed <= 3; ++seed) {
     auto [left, right] = look(seed);
     shift(right);
@@ -160,13 +160,13 @@ TEST(RigCheck, EveryFindingHasAnAdvice) {
 }
 
 TEST(RigCheck, AnEyeThatRolledShowsInTheTrend) {
-  const RigReport report = report_of_rows([](double u, double) { return 0.02 * (u - kWidth / 2.0); });
+  const RigReport report = report_of_rows([](double u, double) { return 0.02 * (u - kEyeWidth / 2.0); });
   EXPECT_EQ(reasons(report), only(Reason::ROWS_APART));
   EXPECT_NEAR(report.row_offset, 0, 0.15);
-  EXPECT_NEAR(report.row_slope_x, 0.02 * kWidth, 0.3);
+  EXPECT_NEAR(report.row_slope_x, 0.02 * kEyeWidth, 0.3);
   EXPECT_NEAR(report.row_slope_y, 0, 0.3);
-  const RigReport stretched = report_of_rows([](double, double v) { return 0.02 * (v - kHeight / 2.0); });
-  EXPECT_NEAR(stretched.row_slope_y, 0.02 * kHeight, 0.3);
+  const RigReport stretched = report_of_rows([](double, double v) { return 0.02 * (v - kEyeHeight / 2.0); });
+  EXPECT_NEAR(stretched.row_slope_y, 0.02 * kEyeHeight, 0.3);
 }
 
 TEST(RigCheck, ExchangedEyes) {
@@ -179,8 +179,8 @@ TEST(RigCheck, ExchangedEyes) {
 TEST(RigCheck, TheSamePictureTwice) {
   EXPECT_EQ(reasons(report_of([](auto& pair) { pair.second = copy_of(pair.first); })), only(Reason::NOT_STEREO));
   const RigReport shifted = report_of([](auto& pair) {  // by half a pixel: not byte by byte
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x + 1 < kWidth; ++x)
+    for (int y = 0; y < kEyeHeight; ++y)
+      for (int x = 0; x + 1 < kEyeWidth; ++x)
         pair.second.row(y)[x] = static_cast<std::uint8_t>((pair.first.at(x, y) + pair.first.at(x + 1, y)) / 2);
   });
   EXPECT_EQ(reasons(shifted), only(Reason::NOT_STEREO));
@@ -215,14 +215,14 @@ TEST(RigCheck, APairThatMovedIsNotOutOfFocus) {
 
 TEST(RigCheck, ADarkEyeIsDead) {
   const RigReport report =
-      report_of([](auto& pair) { pair.second = paint(kWidth, kHeight, [](int, int) { return 3; }); });
+      report_of([](auto& pair) { pair.second = paint(kEyeWidth, kEyeHeight, [](int, int) { return 3; }); });
   EXPECT_EQ(reasons(report), only(Reason::EYE_DEAD));
   EXPECT_NE(report.findings[0].message().find("right eye"), std::string::npos);
   EXPECT_EQ(report.right.black, 1);
   EXPECT_EQ(report.right.mean, 3);
   EXPECT_LT(report.left.black, 0.1);
   const RigReport white =
-      report_of([](auto& pair) { pair.first = paint(kWidth, kHeight, [](int, int) { return 255; }); });
+      report_of([](auto& pair) { pair.first = paint(kEyeWidth, kEyeHeight, [](int, int) { return 255; }); });
   EXPECT_EQ(reasons(white), only(Reason::EYE_DEAD));
   EXPECT_EQ(white.left.saturated, 1);
 }
@@ -237,7 +237,7 @@ TEST(RigCheck, AnEyeThatRepeatsItsPictureIsDead) {
 TEST(RigCheck, AWallWithoutTextureTellsNothing) {
   const RigReport report = report_of([](auto& pair) {
     for (Image* eye : {&pair.first, &pair.second})
-      *eye = paint(kWidth, kHeight, [&](int x, int y) { return 60 + 0.2 * x + 0.1 * y + eye->at(x, y) % 3; });
+      *eye = paint(kEyeWidth, kEyeHeight, [&](int x, int y) { return 60 + 0.2 * x + 0.1 * y + eye->at(x, y) % 3; });
   });
   EXPECT_EQ(reasons(report), only(Reason::TOO_FEW_FEATURES));
 }

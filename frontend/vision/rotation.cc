@@ -14,8 +14,8 @@ namespace {
 constexpr int kAlignWidth = 96;   // pixels; the finest level used is not wider
 constexpr int kSearchWidth = 40;  // pixels; levels are added until the coarsest, on which shifts are searched, fits
 constexpr double kSearchColumns = 0.4, kSearchRows = 0.3;
-constexpr int kIterations = 12;
-constexpr double kConverged = 2e-4;  // radians
+constexpr int kAlignIterations = 12;
+constexpr double kConvergedTurn = 2e-4;  // radians
 constexpr double kMinOverlap = 0.25;
 constexpr double kSearchBelow = 0.9;  // correlation at the coarsest level, starting from the expected rotation
 
@@ -207,7 +207,7 @@ std::optional<Aligned> align_level(const Small& reference, const Small& current,
     if (!step) break;
     if (best && step->correlation < best->step.correlation - 0.02) break;  // it diverges
     best = Aligned{R, *step};
-    if (step->turn.norm() < kConverged) break;
+    if (step->turn.norm() < kConvergedTurn) break;
     const double max_step = 0.15;  // radians
     R = R * so3_exp(step->turn * std::min(1.0, max_step / step->turn.norm()));
   }
@@ -259,7 +259,7 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
   }
   if (!best) return std::nullopt;
   for (auto pair = levels.rbegin() + 1; pair != levels.rend(); ++pair) {
-    auto finer = align_level(pair->first, pair->second, best->R_current_reference, kIterations);
+    auto finer = align_level(pair->first, pair->second, best->R_current_reference, kAlignIterations);
     if (!finer) return std::nullopt;
     best = std::move(finer);
   }

@@ -14,7 +14,7 @@ namespace {
 using testing_textures::paint;
 using testing_textures::Waves;
 
-const StereoCamera kCamera{400, 255.5, 191.5, 0.12, 512, 384};
+const StereoCamera kTurningCamera{400, 255.5, 191.5, 0.12, 512, 384};
 
 // A texture at infinity, seen by a camera that has turned: its value is known at every ray. Between the
 // points of a grid it is bilinear by definition: to add up waves at every pixel of every picture takes too long.
@@ -31,8 +31,9 @@ class Panorama {
   Image seen(const Matrix3& R_world_camera, unsigned noise_seed, double gain = 1, double offset = 0) const {
     std::mt19937 random(noise_seed);
     std::normal_distribution<float> noise(0, 2);
-    return paint(kCamera.width, kCamera.height, [&](int x, int y) {
-      const Vector3 ray = R_world_camera * Vector3((x - kCamera.cx) / kCamera.f, (y - kCamera.cy) / kCamera.f, 1);
+    return paint(kTurningCamera.width, kTurningCamera.height, [&](int x, int y) {
+      const Vector3 ray = R_world_camera * Vector3((x - kTurningCamera.cx) / kTurningCamera.f,
+                                                   (y - kTurningCamera.cy) / kTurningCamera.f, 1);
       const double scale = 500 / kGrid / ray.z();
       return offset + gain * at(scale * ray.x() + kColumns / 2, scale * ray.y() + kRows / 2) + noise(random);
     });
@@ -64,7 +65,7 @@ TEST(Rotation, IsFoundToATwentiethOfADegreeUpToEightDegrees) {
     const double angle = 8.0 * (i + 1) / kPairs * M_PI / 180;
     const Matrix3 R = so3_exp(axis * angle);
     const auto found = align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 2 * i)),
-                                      Pyramid(panorama.seen(R, 2 * i + 1)), kCamera);
+                                      Pyramid(panorama.seen(R, 2 * i + 1)), kTurningCamera);
     ASSERT_TRUE(found.has_value()) << i;
     const double error = degrees(rotation_angle(R.transpose() * found->R_reference_current));
     squares += error * error / 3;  // an axis
@@ -82,7 +83,7 @@ TEST(Rotation, OfTwentyDegreesIsFoundWithoutAHint) {
     for (const double yaw : {-0.35, 0.35}) {
       const Matrix3 R = so3_exp({0, yaw, 0});
       const auto found =
-          align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 1)), Pyramid(panorama.seen(R, 2)), kCamera);
+          align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 1)), Pyramid(panorama.seen(R, 2)), kTurningCamera);
       ASSERT_TRUE(found.has_value());
       EXPECT_LT(degrees(rotation_angle(R.transpose() * found->R_reference_current)), 0.3) << seed << ' ' << yaw;
     }
@@ -92,8 +93,8 @@ TEST(Rotation, OfTwentyDegreesIsFoundWithoutAHint) {
 TEST(Rotation, DoesNotMindExposure) {
   const Panorama panorama(7);
   const Matrix3 R = so3_exp({0.02, -0.05, 0.01});
-  const auto found =
-      align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 1)), Pyramid(panorama.seen(R, 2, 0.6, 20)), kCamera);
+  const auto found = align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 1)),
+                                    Pyramid(panorama.seen(R, 2, 0.6, 20)), kTurningCamera);
   ASSERT_TRUE(found.has_value());
   EXPECT_LT(degrees(rotation_angle(R.transpose() * found->R_reference_current)), 0.1);
 }
@@ -101,13 +102,13 @@ TEST(Rotation, DoesNotMindExposure) {
 TEST(Rotation, KnowsWhenPicturesShowDifferentThings) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     const auto found = align_rotation(Pyramid(Panorama(seed).seen(Matrix3::Identity(), 1)),
-                                      Pyramid(Panorama(seed + 50).seen(Matrix3::Identity(), 2)), kCamera);
+                                      Pyramid(Panorama(seed + 50).seen(Matrix3::Identity(), 2)), kTurningCamera);
     if (found) {
       EXPECT_LT(found->correlation, 0.75) << seed;
     }
   }
-  const Image flat = paint(kCamera.width, kCamera.height, [](int, int) { return 90; });
-  EXPECT_FALSE(align_rotation(Pyramid(flat), Pyramid(flat), kCamera).has_value());
+  const Image flat = paint(kTurningCamera.width, kTurningCamera.height, [](int, int) { return 90; });
+  EXPECT_FALSE(align_rotation(Pyramid(flat), Pyramid(flat), kTurningCamera).has_value());
 }
 
 }  // namespace

@@ -12,8 +12,7 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr int kReach = 24;  // pixels from the steepest place of an edge to its end
-constexpr int kBlack = 5, kWhite = 250;
+constexpr int kReach = 24;        // pixels from the steepest place of an edge to its end
 constexpr int kMinContrast = 24;  // grey levels: well above the noise
 constexpr std::size_t kMinEdges = 50;
 

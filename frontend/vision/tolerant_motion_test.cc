@@ -5,14 +5,16 @@
 #include <random>
 
 #include "frontend/vision/lens.h"
+#include "frontend/vision/view_for_test.h"
 #include "proto/geometry/covariance.h"
 
 namespace relmap::vision {
 namespace {
 
-constexpr StereoCamera kCamera{640, 319.5, 239.5, 0, 640, 480};
+using testing_view::kMonoCamera;
+using testing_view::kPose;
+
 constexpr StereoCamera kMapCamera{640, 319.5, 239.5, 0.5, 640, 480};
-const SE3 kPose = SE3::exp((Vector6() << 0.4, -0.1, 0.8, 0.05, -0.2, 0.03).finished());
 
 std::vector<Correspondence> seen_by(const Lens& lens, std::uint64_t seed, int count = 120) {
   std::mt19937_64 random(seed);
@@ -51,16 +53,16 @@ Both errors(std::optional<double> log_f) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     std::mt19937_64 random(1000 + seed);
     std::normal_distribution<double> normal;
-    Lens lens{kCamera.f, kCamera.cx, kCamera.cy, 0, 0};
+    Lens lens{kMonoCamera.f, kMonoCamera.cx, kMonoCamera.cy, 0, 0};
     lens.f *= std::exp(log_f.value_or(0.015 * normal(random)));
     if (!log_f) {
       lens.cx += 3.2 * normal(random);
       lens.cy += 3.2 * normal(random);
     }
     const auto seen = seen_by(lens, seed);
-    const auto exact = estimate_motion(seen, kCamera);
+    const auto exact = estimate_motion(seen, kMonoCamera);
     if (!exact.ok()) continue;
-    const auto tolerant = estimate_tolerant_motion(seen, kCamera, kMapCamera, exact->T_reference_camera);
+    const auto tolerant = estimate_tolerant_motion(seen, kMonoCamera, kMapCamera, exact->T_reference_camera);
     if (!tolerant.ok()) continue;
     sum.exact.add(*exact);
     sum.tolerant.add(*tolerant);
@@ -87,10 +89,10 @@ TEST(TolerantMotion, AFocalLengthThatIsSlightlyOffIsCorrectedAndInTheCovariance)
 }
 
 TEST(TolerantMotion, IndicesAreThoseOfTheCaller) {
-  auto seen = seen_by({kCamera.f, kCamera.cx, kCamera.cy, 0, 0}, 7);
+  auto seen = seen_by({kMonoCamera.f, kMonoCamera.cx, kMonoCamera.cy, 0, 0}, 7);
   seen[3].sigma = 0;         // of no use
   seen[5].pixel.x() += 100;  // an outlier
-  const auto motion = estimate_tolerant_motion(seen, kCamera, kMapCamera, kPose);
+  const auto motion = estimate_tolerant_motion(seen, kMonoCamera, kMapCamera, kPose);
   ASSERT_TRUE(motion.ok());
   EXPECT_GT(motion->inliers.size(), 100u);
   for (const std::uint32_t i : motion->inliers) EXPECT_TRUE(i != 3 && i != 5);
@@ -98,8 +100,8 @@ TEST(TolerantMotion, IndicesAreThoseOfTheCaller) {
 }
 
 TEST(TolerantMotion, TooFewAreRefused) {
-  auto seen = seen_by({kCamera.f, kCamera.cx, kCamera.cy, 0, 0}, 7, 8);
-  EXPECT_EQ(estimate_tolerant_motion(seen, kCamera, kMapCamera, kPose).reason(), Reason::TOO_FEW_INLIERS);
+  auto seen = seen_by({kMonoCamera.f, kMonoCamera.cx, kMonoCamera.cy, 0, 0}, 7, 8);
+  EXPECT_EQ(estimate_tolerant_motion(seen, kMonoCamera, kMapCamera, kPose).reason(), Reason::TOO_FEW_INLIERS);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kMinFocal = 0.4, kMaxFocal = 4;  // longer sides
 constexpr int kTried = 14;                        // focal lengths, each a fifth longer than the one before
-constexpr int kTrials = 300;                      // samples of three points for each of them
+constexpr int kTrialsOfEach = 300;                // samples of three points for each of them
 constexpr double kMaxSigma = 0.35;                // of log f
 // How far k1 moves the picture's corners, as a share of their distance from the centre (one standard deviation): wide
 // lenses distort most, long ones hardly.
@@ -34,9 +34,9 @@ LensSigmas edited(const StereoCamera& picture, double f) {
   return sigmas;
 }
 // A picture was edited if the lens that explains it best differs from a usual one by kMaxLogAspect or kMaxOffCentre,
-// and by kSigmas, or with a gain in cost of kTelling. (For unedited pictures the gain was 5.7 once, otherwise 3.4 at
-// most; for cropped pictures that kSigmas did not detect it was 13.9 and more.)
-constexpr double kMaxLogAspect = 0.02, kMaxOffCentre = 0.06, kSigmas = 6, kTelling = 9;
+// and by kEditedSigmas, or with a gain in cost of kTelling. (For unedited pictures the gain was 5.7 once, otherwise 3.4
+// at most; for cropped pictures that kEditedSigmas did not detect it was 13.9 and more.)
+constexpr double kMaxLogAspect = 0.02, kMaxOffCentre = 0.06, kEditedSigmas = 6, kTelling = 9;
 constexpr double kTriedOffCentre[] = {0, -0.25, 0.25};
 constexpr double kTriedShares[] = {0, -1};  // of usual_share(): no distortion, and a barrel
 
@@ -91,7 +91,7 @@ Status check_unedited(const Edited& edited, double gain, const StereoCamera& pic
       edited.refined.fit.covariance().diagonal().tail<Lens::kParameters>().cwiseMax(0).cwiseSqrt();
   const auto beyond = [&](Lens::Parameter parameter, double limit) {
     const double by = std::abs(off[parameter]);
-    return by > limit && (by > kSigmas * sigma[parameter] || gain > kTelling);
+    return by > limit && (by > kEditedSigmas * sigma[parameter] || gain > kTelling);
   };
   if (beyond(Lens::kLogAspect, kMaxLogAspect))
     return {Reason::NO_CALIBRATION, "the picture seems to have been stretched in " +
@@ -136,7 +136,7 @@ Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& p
   const double log_step = std::log(kMaxFocal / kMinFocal) / (kTried - 1);
   const Vector2 centre = centre_of(picture);
   MotionOptions few = options;
-  few.max_trials = std::min(options.max_trials, kTrials);
+  few.max_trials = std::min(options.max_trials, kTrialsOfEach);
   std::optional<Start> best;
   Status refusal;
   for (const double share : kTriedShares)

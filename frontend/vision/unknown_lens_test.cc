@@ -6,19 +6,20 @@
 #include <random>
 #include <string>
 
+#include "frontend/vision/view_for_test.h"
 #include "proto/geometry/covariance.h"
 
 namespace relmap::vision {
 namespace {
 
-constexpr StereoCamera kCamera{640, 319.5, 239.5, 0, 640, 480};
-const SE3 kPose = SE3::exp((Vector6() << 0.4, -0.1, 0.8, 0.05, -0.2, 0.03).finished());
+using testing_view::kMonoCamera;
+using testing_view::kPose;
 
 // What a camera at kPose sees; `wrong` of them anywhere in the picture.
 std::vector<Correspondence> scene(std::uint64_t seed, const Lens& lens, int count, int wrong, double noise,
                                   double depth_from = 3, double depth_to = 15) {
   std::mt19937_64 random(seed);
-  const double reach_x = 0.49 * kCamera.width / lens.f, reach_y = 0.49 * kCamera.height / lens.f;
+  const double reach_x = 0.49 * kMonoCamera.width / lens.f, reach_y = 0.49 * kMonoCamera.height / lens.f;
   std::uniform_real_distribution<double> x(-1.3 * reach_x, 1.3 * reach_x), y(-1.3 * reach_y, 1.3 * reach_y);
   std::uniform_real_distribution<double> u(20, 620), v(20, 460), depth(depth_from, depth_to);
   std::normal_distribution<double> normal(0, noise);
@@ -27,7 +28,7 @@ std::vector<Correspondence> scene(std::uint64_t seed, const Lens& lens, int coun
     const double z = depth(random);
     const Vector3 in_camera(x(random) * z, y(random) * z, z);
     const Vector2 pixel = lens.project(in_camera);
-    if (!kCamera.in_picture(pixel.x(), pixel.y())) continue;
+    if (!kMonoCamera.in_picture(pixel.x(), pixel.y())) continue;
     result.push_back({kPose * in_camera, {pixel.x() + normal(random), pixel.y() + normal(random), kNoRight}, 1});
   }
   for (int i = 0; i < wrong; ++i) result[static_cast<std::size_t>(i)].pixel = {u(random), v(random), kNoRight};
@@ -49,7 +50,7 @@ MotionOptions options() {
 
 TEST(UnknownLens, IsFoundWithThePoseAmongWrongMatches) {
   for (const double f : {350.0, 640.0, 1100.0, 1900.0}) {
-    const auto found = estimate_motion_and_lens(scene(1, plain(f), 150, 60, 0.5), kCamera, options());
+    const auto found = estimate_motion_and_lens(scene(1, plain(f), 150, 60, 0.5), kMonoCamera, options());
     ASSERT_TRUE(found.ok()) << f << ": " << found.status().to_string();
     EXPECT_NEAR(found->lens.f / f, 1, 0.03);
     EXPECT_LT(std::abs(std::log(found->lens.f / f)), 4 * found->sigma_log_f + 1e-3);
@@ -62,8 +63,8 @@ TEST(UnknownLens, TheCovarianceIncludesTheUncertaintyOfTheLens) {
   double nees = 0;
   constexpr int kTrials = 30;
   for (int i = 0; i < kTrials; ++i) {
-    const auto found =
-        estimate_motion_and_lens(scene(100 + static_cast<std::uint64_t>(i), plain(700), 80, 0, 1), kCamera, options());
+    const auto found = estimate_motion_and_lens(scene(100 + static_cast<std::uint64_t>(i), plain(700), 80, 0, 1),
+                                                kMonoCamera, options());
     ASSERT_TRUE(found.ok()) << found.status().to_string();
     nees += nees_of(*found) / kTrials;
   }
@@ -80,7 +81,7 @@ TEST_P(UnknownLensOf, DistortionIsFoundOrInTheCovariance) {
   constexpr int kTrials = 15;
   for (int i = 0; i < kTrials; ++i) {
     const auto found = estimate_motion_and_lens(scene(300 + static_cast<std::uint64_t>(i), GetParam(), 120, 40, 1),
-                                                kCamera, options());
+                                                kMonoCamera, options());
     ASSERT_TRUE(found.ok()) << found.status().to_string();
     EXPECT_GE(found->motion.inliers.size(), 60U);
     nees += nees_of(*found) / kTrials;
@@ -137,7 +138,7 @@ Answers answers(const Lens& lens) {
   Answers answers;
   constexpr std::size_t kAsked = 40;  // by the server
   for (std::uint64_t seed = 500; seed < 510; ++seed) {
-    const auto found = estimate_motion_and_lens(scene(seed, lens, 120, 40, 1), kCamera, options());
+    const auto found = estimate_motion_and_lens(scene(seed, lens, 120, 40, 1), kMonoCamera, options());
     answers.given += found.ok() && found->motion.inliers.size() >= kAsked;
     if (found.reason() == Reason::NO_CALIBRATION) answers.refusals.push_back(found.status().message());
   }
@@ -174,20 +175,20 @@ TEST(UnknownLens, UneditedPicturesAreAnswered) {
 }
 
 TEST(UnknownLens, CannotBeToldFromAWallSeenFromTheFront) {
-  const auto found = estimate_motion_and_lens(scene(3, plain(700), 100, 0, 1, 8, 8.0001), kCamera, options());
+  const auto found = estimate_motion_and_lens(scene(3, plain(700), 100, 0, 1, 8, 8.0001), kMonoCamera, options());
   EXPECT_EQ(found.reason(), Reason::NO_CALIBRATION) << found.status().to_string();
 }
 
 TEST(UnknownLens, CorrespondencesOfChanceAreRefused) {
-  EXPECT_EQ(estimate_motion_and_lens(scene(4, plain(700), 120, 120, 1), kCamera, options()).reason(),
+  EXPECT_EQ(estimate_motion_and_lens(scene(4, plain(700), 120, 120, 1), kMonoCamera, options()).reason(),
             Reason::TOO_FEW_INLIERS);
-  EXPECT_EQ(estimate_motion_and_lens({}, kCamera, options()).reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(estimate_motion_and_lens({}, kMonoCamera, options()).reason(), Reason::TOO_FEW_INLIERS);
 }
 
 TEST(UnknownLens, TheSameInputGivesTheSameAnswer) {
   const auto points = scene(5, plain(800), 100, 30, 1);
-  const auto a = estimate_motion_and_lens(points, kCamera, options());
-  const auto b = estimate_motion_and_lens(points, kCamera, options());
+  const auto a = estimate_motion_and_lens(points, kMonoCamera, options());
+  const auto b = estimate_motion_and_lens(points, kMonoCamera, options());
   ASSERT_TRUE(a.ok() && b.ok());
   EXPECT_EQ(a->lens.f, b->lens.f);
   EXPECT_EQ(a->motion.T_reference_camera.t, b->motion.T_reference_camera.t);

@@ -24,8 +24,6 @@ dc1394error_t set_up_capture(dc1394camera_t* camera, std::uint32_t frames) {
   return error;
 }
 
-constexpr std::size_t kContent = 640 * 480 * 2;
-
 class Libdc1394Test : public ::testing::Test {
  protected:
   Libdc1394Test() {
@@ -69,7 +67,7 @@ TEST_F(Libdc1394Test, CapturesStereoFrames) {
                                                    DC1394_USE_RECOMMENDED, 0, 0, 640, 480));
   std::uint64_t bytes = 0;
   ASSERT_EQ(DC1394_SUCCESS, dc1394_format7_get_total_bytes(opened.get(), DC1394_VIDEO_MODE_FORMAT7_3, &bytes));
-  EXPECT_EQ(kContent, bytes);
+  EXPECT_EQ(kDefaultFrameBytes, bytes);
   constexpr std::uint32_t kFrames = 12;
   ASSERT_EQ(DC1394_SUCCESS, set_up_capture(opened.get(), kFrames));
   ASSERT_EQ(DC1394_SUCCESS, dc1394_video_set_transmission(opened.get(), DC1394_ON));
@@ -80,9 +78,9 @@ TEST_F(Libdc1394Test, CapturesStereoFrames) {
     ASSERT_TRUE(frame);
     EXPECT_EQ(640u, frame->size[0]);
     EXPECT_EQ(480u, frame->size[1]);
-    EXPECT_EQ(kContent, frame->image_bytes);
-    EXPECT_EQ(kContent + 464, frame->total_bytes);
-    EXPECT_EQ(i, default_frame_number({frame->image, kContent}));
+    EXPECT_EQ(kDefaultFrameBytes, frame->image_bytes);
+    EXPECT_EQ(kDefaultFrameBytes + 464, frame->total_bytes);
+    EXPECT_EQ(i, default_frame_number({frame->image, kDefaultFrameBytes}));
   }
   EXPECT_EQ(DC1394_SUCCESS, dc1394_video_set_transmission(opened.get(), DC1394_OFF));
   EXPECT_EQ(DC1394_SUCCESS, dc1394_capture_stop(opened.get()));

@@ -13,11 +13,10 @@ namespace {
 
 namespace reg = iidc::reg;
 
-constexpr std::uint32_t kBase = SimulatedCamera::kCommandRegisters;
 constexpr std::size_t kUsbPacket = 512;
 
 std::vector<std::uint32_t> make_rom(const SimulatedCameraOptions& options) {
-  return ConfigRom{options.guid, options.vendor, options.model, kBase}.quadlets();
+  return ConfigRom{options.guid, options.vendor, options.model, SimulatedCamera::kCommandRegisters}.quadlets();
 }
 
 }  // namespace
@@ -45,7 +44,7 @@ SimulatedCamera::Answer SimulatedCamera::read(std::uint64_t address, std::uint32
     return Answer::kDone;
   }
   const auto offset = static_cast<std::uint32_t>(address - iidc::kRegisterSpace);
-  if (address == iidc::kCycleTime || offset == kBase + iidc::pgr::kCycleTime) {
+  if (address == iidc::kCycleTime || offset == kCommandRegisters + iidc::pgr::kCycleTime) {
     quadlet = cycle_time(Clock::now());
     return Answer::kDone;
   }
@@ -77,7 +76,7 @@ SimulatedCamera::Answer SimulatedCamera::write(std::uint64_t address, std::uint3
 
 std::uint32_t SimulatedCamera::command_register(std::uint32_t offset) {
   std::uint32_t quadlet = 0;
-  if (read(iidc::kRegisterSpace + kBase + offset, quadlet) != Answer::kDone)
+  if (read(iidc::kRegisterSpace + kCommandRegisters + offset, quadlet) != Answer::kDone)
     throw std::out_of_range("no register " + std::to_string(offset));
   return quadlet;
 }
@@ -104,8 +103,8 @@ std::optional<SimulatedCamera::Frame> SimulatedCamera::take_frame(Clock::time_po
     previous_start_ = frame.start;
     frame.end = frame.start + std::min<Clock::duration>(shape.bus_time(), step);
     frame.number = next_number_++;
-    at(kBase + reg::kOneShot) = 0;
-    at(kBase + reg::kSoftwareTrigger) = 0;
+    at(kCommandRegisters + reg::kOneShot) = 0;
+    at(kCommandRegisters + reg::kSoftwareTrigger) = 0;
     edge_ = false;
     wrong = faults_;
     silent = frame.start < silent_until_;
@@ -151,15 +150,15 @@ void SimulatedCamera::make_content(std::uint64_t number, const Picture& shape, s
 // In the order of the bits, from the lowest; what this camera cannot tell is 0.
 void SimulatedCamera::embed(std::uint64_t number, Clock::time_point time, std::vector<std::uint8_t>& bytes) const {
   const std::lock_guard lock(mutex_);
-  const std::uint32_t wanted = at(kBase + iidc::pgr::kFrameInfo);
+  const std::uint32_t wanted = at(kCommandRegisters + iidc::pgr::kFrameInfo);
   std::size_t place = 0;
   for (std::uint32_t what = iidc::pgr::kStamp; what <= iidc::pgr::kRoi; what <<= 1) {
     if (!(wanted & what)) continue;
     std::uint32_t value = 0;
     if (what == iidc::pgr::kStamp) value = cycle_time(time);
     if (what == iidc::pgr::kFrameCounter) value = static_cast<std::uint32_t>(number);
-    if (what == iidc::pgr::kShutter) value = at(kBase + reg::kFeature + 4 * 7);
-    if (what == iidc::pgr::kGain) value = at(kBase + reg::kFeature + 4 * 8);
+    if (what == iidc::pgr::kShutter) value = at(kCommandRegisters + reg::kFeature + 4 * 7);
+    if (what == iidc::pgr::kGain) value = at(kCommandRegisters + reg::kFeature + 4 * 8);
     for (int shift = 24; shift >= 0; shift -= 8) bytes[place++] = static_cast<std::uint8_t>(value >> shift);
   }
 }

@@ -30,6 +30,9 @@ struct SimulatedCameraOptions {
   std::function<void(std::uint64_t number, std::span<std::uint8_t> interleaved)> content = {};
 };
 
+// Of the frames that it sends with these options, without their padding.
+inline constexpr std::size_t kDefaultFrameBytes = 640 * 480 * 2;
+
 // Faults of a camera. Counts are of frames to come, and are counted down.
 struct CameraFaults {
   int short_frames = 0;                         // only half of the frame is sent before its end

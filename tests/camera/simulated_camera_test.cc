@@ -206,7 +206,7 @@ TEST_F(SimulatedCameraTest, EmbedsStampAndCounter) {
   ASSERT_TRUE(frame);
   EXPECT_EQ(camera.cycle_time(frame->start), big_endian(*frame, 0));
   EXPECT_EQ(frame->number, big_endian(*frame, 4));
-  EXPECT_EQ(1u, default_frame_number(std::span(frame->bytes).first(640 * 480 * 2)));
+  EXPECT_EQ(1u, default_frame_number(std::span(frame->bytes).first(kDefaultFrameBytes)));
 }
 
 TEST(SimulatedCamera, ItsClockDrifts) {
@@ -224,7 +224,9 @@ TEST(SimulatedCamera, ItsClockDrifts) {
 TEST_F(SimulatedCameraTest, HasTheFaultsThatAreSet) {
   select_stereo();
   write(reg::kIsoEnable, iidc::kOn);
-  const auto content = [](const SimulatedCamera::Frame& frame) { return std::span(frame.bytes).first(640 * 480 * 2); };
+  const auto content = [](const SimulatedCamera::Frame& frame) {
+    return std::span(frame.bytes).first(kDefaultFrameBytes);
+  };
   camera.fail([](CameraFaults& faults) { faults.torn_frames = 1; });
   auto frame = next();
   ASSERT_TRUE(frame);

@@ -166,8 +166,6 @@ class Stream {
   int pending_ = 0;
 };
 
-constexpr std::size_t kContent = 640 * 480 * 2;
-
 std::shared_ptr<SimulatedCamera> make_camera(int number = 0, double rate = kRate) {
   SimulatedCameraOptions options;
   options.guid += static_cast<unsigned>(number);
@@ -223,7 +221,7 @@ class UsbTestbedTest : public ::testing::Test {
 
 TEST_F(UsbTestbedTest, EveryFrameOfAFastStreamComesWhole) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 64);  // more than a second of patience with a loaded machine
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 64);  // more than a second of patience with a loaded machine
   const double before = processor_seconds();
   const auto start = std::chrono::steady_clock::now();
   start_sending();
@@ -240,7 +238,7 @@ TEST_F(UsbTestbedTest, EveryFrameOfAFastStreamComesWhole) {
 
 TEST_F(UsbTestbedTest, WhoWaitsIsNotWokenForNothing) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 4);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 4);
   EXPECT_FALSE(stream.wait_for(1, seconds(1)));
   EXPECT_LE(stream.rounds, 60) << "of 20 ms each";
 }
@@ -274,7 +272,7 @@ TEST_F(UsbTestbedTest, RegistersAreReadAndWrittenByControlTransfers) {
 
 TEST_F(UsbTestbedTest, RegistersAnswerWhileFramesComeToAnotherThread) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 16);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 16);
   start_sending();
   std::atomic<bool> ended = false;
   std::thread reader([&] {
@@ -297,7 +295,7 @@ class SplitTransfers : public UsbTestbedTest {
 
 TEST_F(SplitTransfers, ComeTogetherAgain) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 16);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 16);
   start_sending();
   ASSERT_TRUE(stream.wait_for(20, seconds(60)));
   stop_and_account(usb, stream, camera);
@@ -306,7 +304,7 @@ TEST_F(SplitTransfers, ComeTogetherAgain) {
 
 TEST_F(SplitTransfers, EndEarlyWithAShortFrame) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 16);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 16);
   camera->fail([](CameraFaults& faults) { faults.short_frames = 1; });
   start_sending();
   ASSERT_TRUE(stream.wait_for(3, seconds(60)));
@@ -326,7 +324,7 @@ TEST_F(UsbTestbedTest, ARegisterThatDoesNotAnswerTimesOut) {
 
 TEST_F(UsbTestbedTest, AFrameForWhichNoTransferWaitsIsLostAndCounted) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 2);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 2);
   stream.again = false;
   start_sending();
   ASSERT_TRUE(stream.wait_for(2));
@@ -340,7 +338,7 @@ TEST_F(UsbTestbedTest, AFrameForWhichNoTransferWaitsIsLostAndCounted) {
 
 TEST_F(UsbTestbedTest, PendingTransfersEndWhenTheCameraIsUnpluggedInMidFrame) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 4);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 4);
   start_sending();
   ASSERT_TRUE(stream.wait_for(3));
   std::thread hand([&] { EXPECT_TRUE(testbed.unplug_in_mid_frame(camera)); });
@@ -360,7 +358,7 @@ TEST_F(UsbTestbedTest, PendingTransfersEndWhenTheCameraIsUnpluggedInMidFrame) {
   EXPECT_EQ(1u, testbed.counters(camera).cut);
   std::uint32_t quadlet = 0;
   EXPECT_EQ(LIBUSB_ERROR_NO_DEVICE, usb.read(iidc::kConfigRom, quadlet));
-  EXPECT_EQ(LIBUSB_ERROR_NO_DEVICE, Stream(usb, frame_bytes, kContent, 1).refused);
+  EXPECT_EQ(LIBUSB_ERROR_NO_DEVICE, Stream(usb, frame_bytes, kDefaultFrameBytes, 1).refused);
 }
 
 TEST_F(UsbTestbedTest, PluggingAndUnpluggingIsReported) {
@@ -402,20 +400,20 @@ TEST_F(UsbTestbedTest, PluggingAndUnpluggingIsReported) {
 
 TEST_F(UsbTestbedTest, AStalledEndpointStaysSoUntilItIsCleared) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 3);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 3);
   stream.again = false;
   camera->fail([](CameraFaults& faults) { faults.stalls = 1; });
   start_sending();
   ASSERT_TRUE(stream.wait_for(3));
   for (const Stream::Came& transfer : stream.came) EXPECT_EQ(LIBUSB_TRANSFER_STALL, transfer.status);
   {
-    Stream halted(usb, frame_bytes, kContent, 1);
+    Stream halted(usb, frame_bytes, kDefaultFrameBytes, 1);
     halted.again = false;
     ASSERT_TRUE(halted.wait_for(1));
     EXPECT_EQ(LIBUSB_TRANSFER_STALL, halted.came[0].status);
   }
   ASSERT_EQ(0, libusb_clear_halt(usb.handle(), 0x81));
-  Stream cleared(usb, frame_bytes, kContent, 2);
+  Stream cleared(usb, frame_bytes, kDefaultFrameBytes, 2);
   ASSERT_TRUE(cleared.wait_for(2));
   EXPECT_EQ(LIBUSB_TRANSFER_COMPLETED, cleared.came[1].status);
   EXPECT_TRUE(cleared.came[1].number);
@@ -423,7 +421,7 @@ TEST_F(UsbTestbedTest, AStalledEndpointStaysSoUntilItIsCleared) {
 
 TEST_F(UsbTestbedTest, FramesAreShortLongTornAndShiftedAsAsked) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 16);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 16);
   camera->fail([](CameraFaults& faults) { faults.short_frames = 1; });
   start_sending();
   ASSERT_TRUE(stream.wait_for(2));
@@ -461,7 +459,7 @@ TEST_F(UsbTestbedTest, FramesAreShortLongTornAndShiftedAsAsked) {
 
 TEST_F(UsbTestbedTest, ASilenceSkipsTheFramesOfItsTime) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 16);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 16);
   start_sending();
   ASSERT_TRUE(stream.wait_for(2));
   camera->fail([](CameraFaults& faults) { faults.silence = milliseconds(400); });
@@ -474,7 +472,7 @@ TEST_F(UsbTestbedTest, ASilenceSkipsTheFramesOfItsTime) {
 TEST_F(UsbTestbedTest, RefusesABusyInterfaceAndABusyBus) {
   open();
   camera->fail([](CameraFaults& faults) { faults.no_bandwidth = true; });
-  EXPECT_LT(Stream(usb, frame_bytes, kContent, 1).refused, 0);
+  EXPECT_LT(Stream(usb, frame_bytes, kDefaultFrameBytes, 1).refused, 0);
   camera->fail([](CameraFaults& faults) { faults.no_bandwidth = false; });
   Usb second;
   ASSERT_EQ(0, second.open());
@@ -499,7 +497,7 @@ TEST_F(UsbTestbedTest, TwoCamerasSendSideBySide) {
   ASSERT_EQ(0, libusb_claim_interface(second.handle(), 0));
   second.select_stereo();
   open();
-  Stream stream(usb, frame_bytes, kContent, 16), other_stream(second, frame_bytes, kContent, 16);
+  Stream stream(usb, frame_bytes, kDefaultFrameBytes, 16), other_stream(second, frame_bytes, kDefaultFrameBytes, 16);
   start_sending();
   second.write(kBase + reg::kIsoEnable, iidc::kOn);
   std::thread thread([&] { EXPECT_TRUE(other_stream.wait_for(12, seconds(60))); });
@@ -512,13 +510,13 @@ TEST_F(UsbTestbedTest, TwoCamerasSendSideBySide) {
 // A driver in a process of its own, that is killed while frames come.
 TEST(UsbTestbedProcesses, AKilledProcessReleasesTheCamera) {
   constexpr const char* kRole = "RELMAP_TEST_DRIVER";
-  constexpr std::size_t kFrame = kContent + 464;
+  constexpr std::size_t kFrame = kDefaultFrameBytes + 464;
   if (std::getenv(kRole)) {  // the bus is that of the process above
     Usb usb;
     ASSERT_EQ(0, usb.open());
     ASSERT_EQ(0, libusb_claim_interface(usb.handle(), 0));
     usb.select_stereo();
-    Stream stream(usb, kFrame, kContent, 4);
+    Stream stream(usb, kFrame, kDefaultFrameBytes, 4);
     usb.write(kBase + reg::kIsoEnable, iidc::kOn);
     stream.wait_for(1'000'000, seconds(60));
     return;
@@ -543,7 +541,7 @@ TEST(UsbTestbedProcesses, AKilledProcessReleasesTheCamera) {
   Usb usb;
   ASSERT_EQ(0, usb.open());
   EXPECT_EQ(0, libusb_claim_interface(usb.handle(), 0));
-  Stream stream(usb, kFrame, kContent, 4);
+  Stream stream(usb, kFrame, kDefaultFrameBytes, 4);
   EXPECT_TRUE(stream.wait_for(3));
 }
 

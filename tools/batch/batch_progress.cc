@@ -14,8 +14,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kRedraw{100}, kNextLine{10000};
 
-std::string count(std::uint64_t n) { return std::to_string(n); }
-
 std::string rate(std::uint64_t amount, std::chrono::steady_clock::duration time) {
   const double seconds = std::chrono::duration<double>(time).count();
   return seconds > 0.5 ? terminal::fixed(static_cast<double>(amount) / seconds, 1) + "/s" : "";
@@ -32,9 +30,9 @@ std::string running_line(const Task& task) {
   const Progress& p = task.progress;
   std::string line = "  " + task.sequence.session + "  ";
   if (p.of > 0) line += terminal::bar_text(std::min(p.pairs, p.of), p.of) + "  ";
-  line += count(p.pairs) + (p.of > 0 ? " of " + count(p.of) : "") + unit_of(task) + "  " +
-          rate(p.pairs, std::chrono::steady_clock::now() - task.begun) + "  " + count(p.settled) + " of " +
-          count(p.keyframes) + " keyframes in the map";
+  line += std::to_string(p.pairs) + (p.of > 0 ? " of " + std::to_string(p.of) : "") + unit_of(task) + "  " +
+          rate(p.pairs, std::chrono::steady_clock::now() - task.begun) + "  " + std::to_string(p.settled) + " of " +
+          std::to_string(p.keyframes) + " keyframes in the map";
   if (!p.trouble.empty()) line += "  " + p.trouble;
   return line;
 }
@@ -85,8 +83,8 @@ std::string BatchProgress::total(const std::vector<Task>& tasks) const {
   const Extent extent = extent_of(tasks);
   const auto time = Clock::now() - begun_;
   const double seconds = std::chrono::duration<double>(time).count();
-  std::string line =
-      count(over) + " of " + count(tasks.size()) + " recordings, " + count(extent.pairs) + unit_of(tasks);
+  std::string line = std::to_string(over) + " of " + std::to_string(tasks.size()) + " recordings, " +
+                     std::to_string(extent.pairs) + unit_of(tasks);
   if (const std::string speed = rate(extent.pairs, time); !speed.empty()) line += ", " + speed;
   if (extent.share > 0.01 && extent.share < 1 && seconds > 2)
     line += ", " + terminal::duration_text(seconds * (1 - extent.share) / extent.share) + " left";
@@ -103,8 +101,10 @@ void BatchProgress::tell_finished(const std::vector<Task>& tasks) {
       text = "in the map already";
     else if (task.stage == Stage::kDone)
       text =
-          count(task.summary.pairs) + unit_of(task) + ", " + count(task.summary.keyframes) + " keyframes" +
-          (task.summary.refused_in_all() > 0 ? ", " + count(task.summary.refused_in_all()) + " of them refused" : "") +
+          std::to_string(task.summary.pairs) + unit_of(task) + ", " + std::to_string(task.summary.keyframes) +
+          " keyframes" +
+          (task.summary.refused_in_all() > 0 ? ", " + std::to_string(task.summary.refused_in_all()) + " of them refused"
+                                             : "") +
           (task.untrusted() ? ", not to be trusted" : "");
     else if (task.stage == Stage::kFailed)
       text = task.failure.to_string();

@@ -11,8 +11,6 @@ namespace relmap::batch {
 
 namespace {
 
-std::string count(std::uint64_t n) { return std::to_string(n); }
-
 const char* state_of(const Task& task) {
   switch (task.stage) {
     case Stage::kWaiting:
@@ -31,7 +29,7 @@ const char* state_of(const Task& task) {
 
 std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
   std::string text;
-  for (const auto& [reason, n] : counts) text += (text.empty() ? "" : ", ") + count(n) + ' ' + reason;
+  for (const auto& [reason, n] : counts) text += (text.empty() ? "" : ", ") + std::to_string(n) + ' ' + reason;
   return text;
 }
 
@@ -39,7 +37,7 @@ std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
 std::string losses(const ReportRow& row) {
   const Summary& summary = row.task->summary;
   std::string text = counts_text(summary.refused);
-  if (text.empty() && row.refused > 0) text = count(row.refused);
+  if (text.empty() && row.refused > 0) text = std::to_string(row.refused);
   if (const std::string pictures = counts_text(summary.unreadable); !pictures.empty())
     text +=
         (text.empty() ? "" : "; ") + ((row.task->sequence.recorded.empty() ? "pictures: " : "the log: ") + pictures);
@@ -66,9 +64,9 @@ std::string distrust_text(const ReportRow& row) {
   const Summary& summary = task.summary;
   std::string text = "NOT TO BE TRUSTED: " + task.sequence.session;
   if (summary.measured_share)
-    text += ": " + terminal::fixed(100 * *summary.measured_share, 1) + " % measured (" + count(summary.measured) +
-            " of " + count(summary.expected) + " pairs" +
-            (summary.missing > 0 ? ", " + count(summary.missing) + " pictures are missing)" : ")");
+    text += ": " + terminal::fixed(100 * *summary.measured_share, 1) + " % measured (" +
+            std::to_string(summary.measured) + " of " + std::to_string(summary.expected) + " pairs" +
+            (summary.missing > 0 ? ", " + std::to_string(summary.missing) + " pictures are missing)" : ")");
   for (const Status& finding : summary.findings) text += "; " + std::string(reason_name(finding.reason()));
   if (!row.doubt.empty()) text += "; WRONG_CALIBRATION: " + row.doubt;
   return text;
@@ -186,10 +184,10 @@ void print_report(const std::vector<ReportRow>& rows, terminal::Console& console
   for (const ReportRow& row : rows) {
     // What a front-end measured before it failed says nothing of the whole recording.
     const Summary summary = row.task->stage == Stage::kFailed ? Summary() : row.task->summary;
-    const auto of_session = [&](std::uint64_t n) { return row.session ? count(n) : "-"; };
+    const auto of_session = [&](std::uint64_t n) { return row.session ? std::to_string(n) : "-"; };
     cells.push_back(
         {row.task->sequence.session, of_session(row.session), state_of(*row.task),
-         summary.json.empty() ? "-" : count(summary.pairs), of_session(row.keyframes),
+         summary.json.empty() ? "-" : std::to_string(summary.pairs), of_session(row.keyframes),
          summary.measured_share ? terminal::fixed(100 * *summary.measured_share, 1) + " %" : "-",
          summary.metric_share && summary.keyframes > 0 ? terminal::fixed(100 * *summary.metric_share, 1) + " %" : "-",
          of_session(row.loops), refusals(row)});

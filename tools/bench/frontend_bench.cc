@@ -25,7 +25,7 @@ namespace relmap::bench {
 namespace {
 
 constexpr double kSegments[] = {30, 50};  // metres
-constexpr int kFeatures = 120;
+constexpr int kTrackedFeatures = 120;
 constexpr double kChi2 = 22.46;  // of six degrees of freedom, 0.999
 
 struct FrontendOptions {
@@ -106,7 +106,7 @@ class Drive {
         first_(options.first),
         totals_(totals),
         tracker_(session(pictures.camera()), tracker_options()) {
-    if (options.reference == "klt") reference_.emplace(pictures.camera(), kFeatures);
+    if (options.reference == "klt") reference_.emplace(pictures.camera(), kTrackedFeatures);
     if (!options.track.empty()) track_.open(options.track);
     if (options.imu) {
       imu_.emplace(pictures.imu());
@@ -140,7 +140,7 @@ class Drive {
   }
   static tracking::TrackerOptions tracker_options() {
     tracking::TrackerOptions options;
-    options.tracks = kFeatures;
+    options.tracks = kTrackedFeatures;
     return options;
   }
 

@@ -11,7 +11,7 @@ namespace relmap::bench {
 
 namespace {
 
-const cv::Size kWindow(21, 21);
+const cv::Size kFlowWindow(21, 21);
 constexpr int kLevels = 3;
 constexpr double kQuality = 0.01, kApart = 10;  // pixels
 constexpr float kMaxRows = 2;                   // pixels between the rows of the two eyes
@@ -53,7 +53,7 @@ struct KltOdometry::Impl {
     std::vector<cv::Point2f> there = features;
     std::vector<unsigned char> found;
     std::vector<float> error;
-    cv::calcOpticalFlowPyrLK(left, right, features, there, found, error, kWindow, kLevels);
+    cv::calcOpticalFlowPyrLK(left, right, features, there, found, error, kFlowWindow, kLevels);
     std::vector<char> good(features.size(), 0);
     for (std::size_t i = 0; i < features.size(); ++i) {
       const float disparity = features[i].x - there[i].x;
@@ -79,7 +79,7 @@ struct KltOdometry::Impl {
     std::vector<cv::Point2f> there;
     std::vector<unsigned char> found;
     std::vector<float> error;
-    if (!features.empty()) cv::calcOpticalFlowPyrLK(left, next, features, there, found, error, kWindow, kLevels);
+    if (!features.empty()) cv::calcOpticalFlowPyrLK(left, next, features, there, found, error, kFlowWindow, kLevels);
     std::vector<char> good(features.size(), 0);
     for (std::size_t i = 0; i < features.size(); ++i) good[i] = found[i] && camera.in_picture(there[i].x, there[i].y);
     keep(there, good);
@@ -121,8 +121,8 @@ int KltOdometry::tracked() const { return impl_->inliers; }
 SE3 KltOdometry::feed(vision::ImageView left, vision::ImageView right) {
   Impl& self = *impl_;
   std::vector<cv::Mat> next, next_right;
-  cv::buildOpticalFlowPyramid(mat_of(left), next, kWindow, kLevels);
-  cv::buildOpticalFlowPyramid(mat_of(right), next_right, kWindow, kLevels);
+  cv::buildOpticalFlowPyramid(mat_of(left), next, kFlowWindow, kLevels);
+  cv::buildOpticalFlowPyramid(mat_of(right), next_right, kFlowWindow, kLevels);
   if (!self.left.empty()) self.move(next);
   self.left = std::move(next);
   self.refill();

@@ -12,7 +12,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr std::size_t kAhead = 64;  // pairs
+constexpr std::size_t kPairsAhead = 64;  // pairs
 
 class DriveOfRecording : public PictureDrive {
  public:
@@ -69,7 +69,7 @@ class RenderedDrive : public PictureDrive {
   }
 
   sim::PictureWorld world_;
-  tracking::BoundedQueue<TruePair> ready_{kAhead};
+  tracking::BoundedQueue<TruePair> ready_{kPairsAhead};
   std::jthread painter_;  // last: it uses all of the above
 };
 

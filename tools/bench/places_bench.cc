@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t kWords = 10000;
 constexpr std::uint32_t kMinWords = 100, kMaxWords = 300;  // words of a place
-constexpr std::uint32_t kFeatures = 300;
+constexpr std::uint32_t kQueryFeatures = 300;
 
 struct PlacesOptions {
   std::uint32_t places = 100000;
@@ -132,7 +132,7 @@ double load_us() {
 double quantise_us() {
   const auto vocabulary = place::Vocabulary::load(place::default_vocabulary_path()).or_throw();
   std::mt19937_64 random(1);
-  std::vector<AppearanceFeature> features(kFeatures);
+  std::vector<AppearanceFeature> features(kQueryFeatures);
   for (AppearanceFeature& feature : features)
     for (std::uint8_t& byte : feature.descriptor) byte = static_cast<std::uint8_t>(random() % 160);
   std::vector<double> times;

@@ -7,7 +7,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr std::uint32_t kLap = 200, kFrames = 300;  // half of the circuit is driven twice
+constexpr std::uint32_t kEdgesLap = 200, kEdgesFrames = 300;  // half of the circuit is driven twice
 // A closure becomes a loop edge if more edges than this lie between its ends. 0: every closure; the last value: only
 // where there is no path.
 constexpr std::uint32_t kSpacings[] = {0, 4, 8, 16, 24, 30};
@@ -38,12 +38,12 @@ void run_edges(const EdgesOptions& options, Report& report) {
     std::vector<double> us, loop_us, frames;
     for (int seed = 1; seed <= options.seeds; ++seed) {
       sim::PointsWorldOptions world;
-      world.frames_per_lap = kLap;
-      world.frames = kFrames;
+      world.frames_per_lap = kEdgesLap;
+      world.frames = kEdgesFrames;
       world.noise_seed = static_cast<std::uint64_t>(seed);
       testing::SimulatedDrive drive(world, with_window(options.window), {.loop_edge_spacing = spacing});
       drive.drive();
-      for (std::uint32_t i = kLap; i < kFrames; ++i) {
+      for (std::uint32_t i = kEdgesLap; i < kEdgesFrames; ++i) {
         const testing::DriveStep& step = drive.steps()[i];
         (step.loop_edge ? loop_us : us).push_back(1e6 * step.apply_seconds);
         frames.push_back(step.active_frames);
@@ -69,7 +69,7 @@ void run_edges(const EdgesOptions& options, Report& report) {
   }
   report.add("seeds", options.seeds, "");
   report.add("window", options.window, "frames that a new one activates");
-  report.add("frames", kFrames, "of a circuit of two thirds as many");
+  report.add("frames", kEdgesFrames, "of a circuit of two thirds as many");
   report.add("loop_edge_spacing", spacings,
              "more edges than this between the ends of a loop edge; 0: every closure is one, 30: one whose ends are "
              "out of reach");

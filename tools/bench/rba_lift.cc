@@ -16,13 +16,13 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr std::uint32_t kLap = 300;     // frames of 0.2 m
-constexpr std::uint32_t kBeyond = 40;   // driven on behind the closing
-constexpr std::uint32_t kInCabin = 12;  // frames
+constexpr std::uint32_t kRideLap = 300;     // frames of 0.2 m
+constexpr std::uint32_t kAfterReturn = 40;  // driven on behind the closing
+constexpr std::uint32_t kInCabin = 12;      // frames
 constexpr std::int64_t kDrivenFrameUs = 200'000;
 constexpr std::int64_t kCabinFrameUs = 2'000'000;  // the robot stands, and little changes
 constexpr double kStanding = 0.05;                 // metres a second: slower is standing (docs/method.md, 1)
-constexpr std::uint32_t kLocal = 5;                // frames: a metre
+constexpr std::uint32_t kLocalFrames = 5;          // frames: a metre
 
 // Frames [first, end) of a world.
 struct Stretch {
@@ -117,8 +117,8 @@ storage::ClosureProposalRecord measured_again(const storage::ClosureProposalReco
 // Closures of the last frames with those one lap before, where both are of `world`.
 void close_loop(RecordedDrive& drive, const Ride& ride, const sim::PointsWorld& world, std::uint32_t n) {
   const Place& now = ride.place(n);
-  if (now.world != &world || now.frame < kLap) return;
-  const std::uint32_t match = now.frame - kLap;  // the first stretch begins at frame 0
+  if (now.world != &world || now.frame < kRideLap) return;
+  const std::uint32_t match = now.frame - kRideLap;  // the first stretch begins at frame 0
   const auto proposal = testing::simulated_closure(drive.map(), world, now.frame, RecordedDrive::frame(n), match,
                                                    RecordedDrive::frame(match));
   if (proposal) drive.propose(measured_again(*proposal, ride.keyframes()[n]));
@@ -139,10 +139,11 @@ std::unique_ptr<RecordedDrive> driven(const Ride& ride, const sim::PointsWorld& 
 // Errors of position over each metre that was driven without a seam, by its first frame; NaN: there is none.
 std::vector<double> errors_by_frame(const Ride& ride, const Transform& T) {
   std::vector<double> errors(ride.keyframes().size(), NAN);
-  for (std::uint32_t n = 0; n + kLocal < errors.size(); ++n)
-    if (ride.continuous(n, n + kLocal))
+  for (std::uint32_t n = 0; n + kLocalFrames < errors.size(); ++n)
+    if (ride.continuous(n, n + kLocalFrames))
       errors[n] =
-          (T(RecordedDrive::frame(n), RecordedDrive::frame(n + kLocal))->t - ride.truth(n, n + kLocal).t).norm();
+          (T(RecordedDrive::frame(n), RecordedDrive::frame(n + kLocalFrames))->t - ride.truth(n, n + kLocalFrames).t)
+              .norm();
   return errors;
 }
 std::vector<double> local_errors(const Ride& ride, const Transform& T) {
@@ -156,8 +157,8 @@ double revisit_error(const Ride& ride, const sim::PointsWorld& world, const Tran
   double sum = 0;
   std::uint32_t count = 0;
   for (std::uint32_t n = 0; n < ride.keyframes().size(); ++n) {
-    if (ride.place(n).world != &world || ride.place(n).frame < kLap + kLocal) continue;
-    const std::uint32_t match = ride.place(n).frame - kLap;
+    if (ride.place(n).world != &world || ride.place(n).frame < kRideLap + kLocalFrames) continue;
+    const std::uint32_t match = ride.place(n).frame - kRideLap;
     const auto found = T(RecordedDrive::frame(match), RecordedDrive::frame(n));
     if (!found) continue;
     sum += (found->t - ride.truth(match, n).t).norm();
@@ -194,7 +195,7 @@ void ride_and_return(const std::string& name, const sim::PointsWorldOptions& wor
     inside.depth_max = 3;
     inside.frames = inside.frames_per_lap = kInCabin;
     const sim::PointsWorld world(outside), cabin(inside);
-    const Ride ride({{&world, 0, leaves}, {&cabin, 0, kInCabin}, {&world, arrives, kLap + kBeyond}});
+    const Ride ride({{&world, 0, leaves}, {&cabin, 0, kInCabin}, {&world, arrives, kRideLap + kAfterReturn}});
     ridden = (world.T_world_frame(arrives).t - world.T_world_frame(leaves - 1).t).norm();
 
     const auto without = driven(ride, world, options.window, false);
@@ -237,13 +238,13 @@ void run_lift(const LiftOptions& options, Report& report) {
   report.add("seeds", options.seeds, "");
   report.add("window", options.window, "frames that a new one activates");
   sim::PointsWorldOptions world;
-  world.frames_per_lap = kLap;
-  world.frames = kLap + kBeyond;
+  world.frames_per_lap = kRideLap;
+  world.frames = kRideLap + kAfterReturn;
   // A sixth of the circuit by train.
-  ride_and_return("train", world, kLap / 2, kLap / 2 + kLap / 6, options, options.picture, report);
+  ride_and_return("train", world, kRideLap / 2, kRideLap / 2 + kRideLap / 6, options, options.picture, report);
   // Round a spiral ramp, and down again by lift.
   world.climb = 4;
-  ride_and_return("lift", world, kLap, kLap, options, "", report);
+  ride_and_return("lift", world, kRideLap, kRideLap, options, "", report);
 }
 
 }  // namespace relmap::bench

@@ -14,7 +14,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr std::uint32_t kBeyond = 16;        // frames driven on behind the closing of a loop
+constexpr std::uint32_t kAfterClosing = 16;  // frames driven on behind the closing of a loop
 constexpr std::uint32_t kMaxForFull = 1000;  // the full solution of larger ones takes minutes
 
 sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frames, int seed) {
@@ -45,7 +45,7 @@ void run_loop(const ScaleOptions& options, Report& report) {
   double error = 0, full = 0, unsupported = 0, failures = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
     const rba::RbaOptions rba = with_window(options.window);
-    testing::SimulatedDrive drive(circle(options.frames, options.frames + kBeyond, seed), rba);
+    testing::SimulatedDrive drive(circle(options.frames, options.frames + kAfterClosing, seed), rba);
     drive.drive();
     by_step.clear();
     for (const testing::DriveStep& step : drive.steps()) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/relaxation.h"
+#include "frontend/tracking/stamps.h"
 #include "tests/support/drive_evaluation.h"
 #include "tools/bench/report.h"
 #include "tools/bench/transforms.h"
@@ -14,10 +15,9 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr double kLocal = 1;    // metres
-constexpr double kInSight = 6;  // metres from where the robot stands in what carries it: it sees that
+constexpr double kLocalMetres = 1;  // metres
+constexpr double kInSight = 6;      // metres from where the robot stands in what carries it: it sees that
 
-double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 double metres(const SE3& from, const SE3& to) { return (from.inverse() * to).t.norm(); }
 
 FrameId frame_of(const storage::Graph& graph, std::size_t n) {
@@ -32,11 +32,11 @@ double local_error(const storage::Graph& graph, const RideDrive& drive, const Tr
   for (std::size_t n = 0; n < drive.truth.size(); ++n) {
     double way = 0;
     std::size_t m = n;
-    while (way < kLocal && m + 1 < drive.truth.size() && !rides_to(drive, m + 1)) {
+    while (way < kLocalMetres && m + 1 < drive.truth.size() && !rides_to(drive, m + 1)) {
       way += metres(drive.truth[m], drive.truth[m + 1]);
       ++m;
     }
-    if (way < kLocal) continue;
+    if (way < kLocalMetres) continue;
     const auto found = T(frame_of(graph, n), frame_of(graph, m));
     if (found) errors.push_back(1e3 * (found->t - (drive.truth[n].inverse() * drive.truth[m]).t).norm());
   }
@@ -51,7 +51,7 @@ void judge_front_end(const RideDrive& drive, RideFigures& out) {
   for (std::size_t n = 1; n < drive.keyframes.size(); ++n) {
     const Keyframe& keyframe = drive.keyframes[n];
     out.unseen_steps += !is_vision(keyframe.source);
-    const double standing = seconds(keyframe.standing_us);
+    const double standing = tracking::seconds(keyframe.standing_us);
     if (!rides_to(drive, n)) {
       out.longest_standing_else_s = std::max(out.longest_standing_else_s, standing);
       continue;

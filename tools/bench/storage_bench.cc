@@ -30,10 +30,10 @@ namespace relmap::bench {
 namespace {
 
 constexpr SessionNumber kSession = 1;
-constexpr std::size_t kGroup = 64;  // keyframes a batch job sends before it waits for the acknowledgement
-constexpr std::size_t kAhead = 2;   // groups between two threads
+constexpr std::size_t kGroup = 64;       // keyframes a batch job sends before it waits for the acknowledgement
+constexpr std::size_t kGroupsAhead = 2;  // groups between two threads
 constexpr std::uint32_t kSmallMap = 10'048;
-constexpr std::uint32_t kWindow = 4'992;  // updates on either side of what they are reported for; whole groups
+constexpr std::uint32_t kReportedUpdates = 4'992;  // updates on either side of what they are reported for; whole groups
 constexpr std::size_t kNeighbourhood = 20;
 constexpr std::size_t kPage = 4096;
 
@@ -292,7 +292,7 @@ class JournalThreads {
   KeyframeLoad load_;
   Bytes compressed_;
   double payload_bytes_ = 0, zstd_bytes_ = 0;
-  tracking::BoundedQueue<Group> made_{kAhead}, durable_{kAhead};
+  tracking::BoundedQueue<Group> made_{kGroupsAhead}, durable_{kGroupsAhead};
   std::exception_ptr failure_;  // before durable_ is closed
   std::thread maker_, journal_;
 };
@@ -362,9 +362,10 @@ Ingest ingest(const StorageOptions& options, Store& store, ChunkReader& reader) 
     const std::uint32_t first = feed.done();
     const std::vector<double> us = feed.step();
     reader.grown_to(feed.committed());
-    if (first + kWindow >= kSmallMap && first < kSmallMap + kWindow)
+    if (first + kReportedUpdates >= kSmallMap && first < kSmallMap + kReportedUpdates)
       result.early_us.insert(result.early_us.end(), us.begin(), us.end());
-    if (first + 2 * kWindow >= options.frames) result.late_us.insert(result.late_us.end(), us.begin(), us.end());
+    if (first + 2 * kReportedUpdates >= options.frames)
+      result.late_us.insert(result.late_us.end(), us.begin(), us.end());
   }
   result.seconds = seconds_since(start);
   result.cpu_seconds = cpu_seconds() - cpu_start;
@@ -378,14 +379,15 @@ Ingest ingest(const StorageOptions& options, Store& store, ChunkReader& reader) 
 // either figure. Each has the time of the other's turn to finish its commit.
 void measure_updates(const StorageOptions& options, Store& store, const std::string& folder, Report& report) {
   Store small_store = Store::open(options, folder);
-  Feed before(options, kSmallMap - kWindow, options.seed, small_store);
-  while (before.done() < kSmallMap - kWindow) (void)before.step();
-  Feed small(options, 2 * kWindow, options.seed + 2, small_store), large(options, 2 * kWindow, options.seed + 2, store);
+  Feed before(options, kSmallMap - kReportedUpdates, options.seed, small_store);
+  while (before.done() < kSmallMap - kReportedUpdates) (void)before.step();
+  Feed small(options, 2 * kReportedUpdates, options.seed + 2, small_store),
+      large(options, 2 * kReportedUpdates, options.seed + 2, store);
   std::vector<double> small_us, large_us;
   const auto append = [](std::vector<double>& all, const std::vector<double>& more) {
     all.insert(all.end(), more.begin(), more.end());
   };
-  while (large.done() < 2 * kWindow) {
+  while (large.done() < 2 * kReportedUpdates) {
     append(small_us, small.step());
     append(large_us, large.step());
   }

@@ -21,7 +21,7 @@ struct UnpackOptions {
 };
 
 template <typename Work>
-double milliseconds(Work work) {
+double milliseconds_of(Work work) {
   const auto begin = std::chrono::steady_clock::now();
   work();
   return 1e3 * seconds_since(begin);
@@ -40,14 +40,14 @@ void run(const UnpackOptions& options, Report& report) {
   std::size_t taken = 0;
   const auto next = [&]() -> const std::vector<std::uint8_t>& { return frames[taken++ % kBuffers]; };
   const auto by = [&](auto* unpacker, const capture::StereoLayout& layout) {
-    return milliseconds([&] {
+    return milliseconds_of([&] {
       if (Status status = unpacker(layout, next(), left, right); !status.ok()) throw StatusError(status);
     });
   };
 
   std::vector<double> unpack_ms, bayer_ms, plain_ms, plain_bayer_ms, copy_ms;
   for (int i = 0; i < options.rounds; ++i) {
-    copy_ms.push_back(milliseconds([&] { std::memcpy(copy.data(), next().data(), copy.size()); }));
+    copy_ms.push_back(milliseconds_of([&] { std::memcpy(copy.data(), next().data(), copy.size()); }));
     unpack_ms.push_back(by(&capture::unpack, grey));
     bayer_ms.push_back(by(&capture::unpack, bayer));
     plain_ms.push_back(by(&capture::detail::unpack_plainly, grey));

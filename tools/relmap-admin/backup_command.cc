@@ -7,7 +7,7 @@ namespace relmap::admin {
 
 namespace {
 
-struct Asked {
+struct BackupAsked {
   std::string first, second;
 };
 
@@ -24,7 +24,7 @@ Result<client::Backup> back_up(const Context& context, storage::Engine& engine, 
   return client::Backup{folder, bytes_in(folder), durable};
 }
 
-Answer back_up_map(const Asked& asked, Context& context) {
+Answer back_up_map(const BackupAsked& asked, Context& context) {
   const bool by_server = !context.server.empty();  // then the first name is the only one
   if (by_server == !asked.second.empty())
     throw CLI::ValidationError("backup needs DIR and BACKUP, or --server HOST:PORT and BACKUP");
@@ -49,7 +49,7 @@ Answer back_up_map(const Asked& asked, Context& context) {
 
 void add_backup(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("backup", "copy a map into a new data folder; the daemon may keep running");
-  auto asked = std::make_shared<Asked>();
+  auto asked = std::make_shared<BackupAsked>();
   command->add_option("DIR", asked->first, "data folder of the map; leave it out with --server")->required();
   command->add_option("BACKUP", asked->second,
                       "folder to create; with --server an absolute path on the daemon's machine");

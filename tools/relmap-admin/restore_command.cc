@@ -11,7 +11,7 @@ namespace relmap::admin {
 
 namespace {
 
-struct Asked {
+struct RestoreAsked {
   std::string backup, directory;
   bool no_verify = false;
 };
@@ -30,7 +30,7 @@ Status check_backup(const std::string& backup, const Context& context) {
                                        "--no-verify restores it as it is");
 }
 
-Answer restore(const Asked& asked, Context& context) {
+Answer restore(const RestoreAsked& asked, Context& context) {
   if (!context.server.empty()) throw CLI::ValidationError("restore works on folders, not on a daemon");
   if (Status free = check_free(asked.backup); !free.ok()) return {free, false, {}};
   if (std::filesystem::exists(asked.directory + "/FORMAT"))
@@ -59,7 +59,7 @@ Answer restore(const Asked& asked, Context& context) {
 void add_restore(CLI::App& app, Action& action) {
   auto* command =
       app.add_subcommand("restore", "make a data folder from a backup, which is verified first and not changed");
-  auto asked = std::make_shared<Asked>();
+  auto asked = std::make_shared<RestoreAsked>();
   command->add_option("BACKUP", asked->backup, "folder made by `relmap-admin backup`")->required();
   command->add_option("DIR", asked->directory, "data folder to create; it must be empty or not exist")->required();
   command->add_flag("--no-verify", asked->no_verify, "copy the backup without verifying it");

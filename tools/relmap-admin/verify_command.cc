@@ -7,12 +7,13 @@ namespace relmap::admin {
 
 namespace {
 
-struct Asked {
+struct VerifyAsked {
   std::string directory;
   std::vector<SessionNumber> sessions;
 };
 
-Result<client::VerifySummary> verify_by_daemon(const Context& context, client::Client& daemon, const Asked& asked) {
+Result<client::VerifySummary> verify_by_daemon(const Context& context, client::Client& daemon,
+                                               const VerifyAsked& asked) {
   return daemon.verify(
       asked.sessions,
       [&](const client::Finding& finding) {
@@ -35,7 +36,7 @@ void print(const client::VerifySummary& s, const Context& context) {
                          {"findings", s.findings == 0 ? "none: the map is sound" : n(s.findings)}});
 }
 
-Answer verify_map(const Asked& asked, Context& context) {
+Answer verify_map(const VerifyAsked& asked, Context& context) {
   const auto target = open_target(context, asked.directory, Access::kRead);
   if (!target.ok()) return {target.status(), target.reason() == Reason::DATA_LOSS, {}};
   const auto summary = target->daemon ? verify_by_daemon(context, *target->daemon, asked)
@@ -64,7 +65,7 @@ Answer verify_map(const Asked& asked, Context& context) {
 
 void add_verify(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("verify", "check every checksum, reference and count of a map; changes nothing");
-  auto asked = std::make_shared<Asked>();
+  auto asked = std::make_shared<VerifyAsked>();
   command->add_option("DIR", asked->directory, "data folder");
   command->add_option("--session", asked->sessions, "check only frames of these sessions (numbers)");
   command->footer(R"(

@@ -9,6 +9,8 @@
 
 namespace relmap::cli {
 
+inline constexpr std::size_t kMaxListed = 8;  // things of a kind that a message lists
+
 // The work of a command, called with a connected client.
 using Action = std::function<Status(client::Client&, terminal::Console&)>;
 

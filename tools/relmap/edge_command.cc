@@ -29,7 +29,7 @@ std::string standing(const std::optional<client::EdgeState>& state, Reason reaso
   return state ? std::string(name_of(*state)) + ", " + std::string(reason_name(reason)) : "not there";
 }
 
-const char* in_graph(const client::ClosureChange& change) {
+const char* edge_change_text(const client::ClosureChange& change) {
   if (change.edge_before == change.edge_after) return change.edge_after ? "stays an edge" : "no edge";
   return change.edge_after ? "edge comes" : "edge goes";
 }
@@ -62,7 +62,7 @@ void print_effect(const client::EdgeEdit& edit, std::size_t max_closures, termin
     if (max_closures > 0 && rows.size() == max_closures) break;
     rows.push_back({change.id.to_string(), change.a.to_string(), change.b.to_string(),
                     standing(change.before, change.reason_before), standing(change.after, change.reason_after),
-                    in_graph(change), std::to_string(change.bound), std::to_string(change.bound_frames)});
+                    edge_change_text(change), std::to_string(change.bound), std::to_string(change.bound_frames)});
   }
   if (!rows.empty())
     console.table({"closure", "from", "to", edit.done ? "was" : "is", edit.done ? "is" : "would be", "in the graph",

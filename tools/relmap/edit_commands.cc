@@ -2,22 +2,19 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <ostream>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "tools/relmap/commands.h"
+#include "tools/relmap/degrees.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
 
 namespace {
-
-constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
-constexpr std::size_t kMaxListed = 8;
 
 void print(const std::vector<client::Edge>& edges, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;

@@ -5,18 +5,17 @@
 #include <cstdarg>
 #include <cstdio>
 #include <iterator>
-#include <numbers>
 #include <ostream>
 #include <set>
 
 #include "proto/base/json.h"
 #include "proto/base/number_text.h"
+#include "tools/relmap/degrees.h"
 
 namespace relmap::cli {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kEarthRadius = 6'378'137, kFlattening = 1 / 298.257223563;  // WGS 84
 
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {

@@ -63,23 +63,23 @@ RelaxedMap relaxed(double off, std::optional<FrameId> root = {}) {
 }
 
 template <typename Write>
-std::string text_of(const Write& write) {
+std::string written(const Write& write) {
   std::ostringstream out;
   write(out);
   return out.str();
 }
 std::string g2o(const RelaxedMap& map, std::size_t part) {
-  return text_of([&](std::ostream& out) { write_g2o(map, part, out); });
+  return written([&](std::ostream& out) { write_g2o(map, part, out); });
 }
 std::string ply(const RelaxedMap& map, std::size_t part, const std::string& landmarks = "", std::uint64_t count = 0) {
-  return text_of([&](std::ostream& out) {
+  return written([&](std::ostream& out) {
     write_ply_head(map, part, count, out);
     out << landmarks;
     write_ply_tail(map, part, out);
   });
 }
 std::string geojson(const RelaxedMap& map, std::size_t part, const std::optional<Geodetic>& place = {}) {
-  return text_of([&](std::ostream& out) { write_geojson(map, part, place, out); });
+  return written([&](std::ostream& out) { write_geojson(map, part, place, out); });
 }
 FrameTimes all_times(const RelaxedMap& map) {
   FrameTimes times;
@@ -87,7 +87,7 @@ FrameTimes all_times(const RelaxedMap& map) {
   return times;
 }
 std::string tum(const RelaxedMap& map, std::size_t part) {
-  return text_of([&](std::ostream& out) { write_tum(map, part, all_times(map), out); });
+  return written([&](std::ostream& out) { write_tum(map, part, all_times(map), out); });
 }
 
 std::vector<std::vector<double>> rows_of(const std::string& text) {
@@ -131,7 +131,7 @@ TEST(GraphFiles, TumIsTheRelaxedGraphInTheFrameOfItsRoot) {
 
 TEST(GraphFiles, KittiHasTheSamePosesAndNoComments) {
   const RelaxedMap map = relaxed(0);
-  const std::string text = text_of([&](std::ostream& out) { write_kitti(map.parts[0], out); });
+  const std::string text = written([&](std::ostream& out) { write_kitti(map.parts[0], out); });
   EXPECT_THAT(text, Not(HasSubstr("#")));
   const auto rows = rows_of(text);
   ASSERT_EQ(rows.size(), 6u);

@@ -18,7 +18,6 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr std::size_t kMaxListed = 8;
 constexpr double kMaxStepUs = 3.6e9;
 constexpr std::int64_t kBeginUs = 946'684'800'000'000;  // 2000-01-01, since the file has no times
 

@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <unordered_map>
 
 #include "proto/geometry/covariance.h"
 #include "proto/keyframe/motion_source_name.h"
+#include "tools/relmap/degrees.h"
 
 namespace relmap::cli {
 
 namespace {
-
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 // The covariance of a step along which a lift or a train carried the robot: so large that the step does not matter
 // beside what closures measured, but finite, so that the solution is unique.

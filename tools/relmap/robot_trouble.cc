@@ -48,6 +48,13 @@ RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<Session
   return {};
 }
 
+std::string counts_text(const client::ReasonCounts& counts, const std::string& none) {
+  std::string text;
+  for (const auto& [reason, count] : counts)
+    text += (text.empty() ? "" : ", ") + count_text(count) + ' ' + std::string(reason_name(reason));
+  return text.empty() ? none : text;
+}
+
 std::string robots_text(const std::vector<client::RobotStatus>& robots) {
   const auto silent = static_cast<std::size_t>(
       std::count_if(robots.begin(), robots.end(), [](const client::RobotStatus& robot) { return robot.silent; }));

@@ -21,6 +21,9 @@ struct RobotTrouble {
 // The most urgent trouble of a robot. `frozen`: the frozen sessions.
 RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<SessionNumber>& frozen);
 
+// "3 CORRUPT, 1 BAD_SIZE"; `none` if there are none.
+std::string counts_text(const client::ReasonCounts& counts, const std::string& none);
+
 // "4 heard of in the last minute, 1 silent since"
 std::string robots_text(const std::vector<client::RobotStatus>& robots);
 

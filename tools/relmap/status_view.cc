@@ -15,13 +15,6 @@ using Facts = std::vector<std::pair<std::string, std::string>>;
 constexpr std::size_t kMaxRobots = 4;      // robots named one by one
 constexpr std::uint64_t kNearlyFull = 95;  // per cent of a memory share
 
-std::string counts_text(const client::ReasonCounts& counts) {
-  std::string text;
-  for (const auto& [reason, count] : counts)
-    text += (text.empty() ? "" : ", ") + count_text(count) + ' ' + std::string(reason_name(reason));
-  return text.empty() ? "none" : text;
-}
-
 std::string milliseconds(double us) { return fixed(us / 1000, 2) + " ms"; }
 
 // The memory shares which hold somebody back when they are full, and what is then noticed.
@@ -136,9 +129,9 @@ void print_status(const StatusMoment& now, bool all, terminal::Console& console)
       {"robots", robots_text(now.robots)},
       {"received", counted_text(s.ingest_keyframes, "keyframe") + ", " + counted_text(s.ingest_repeats, "repeat") +
                        ", " + counted_text(s.ingest_parts_corrupt, "corrupt part")},
-      {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason) : "none"},
+      {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason, "none") : "none"},
       {"given up", s.gaps ? counted_text(s.gaps, "keyframe") : "none"},
-      {"not taken", counts_text(s.not_taken)},
+      {"not taken", counts_text(s.not_taken, "none")},
       {"waiting", counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") + ", " +
                       counted_text(s.pending_frames, "relaxation")},
       {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +

@@ -18,13 +18,6 @@ std::string seconds_text(double seconds) {
   return seconds < 10 ? fixed(seconds, 2) + " s" : terminal::duration_text(seconds);
 }
 
-std::string counts_text(const client::ReasonCounts& counts) {
-  std::string all;
-  for (const auto& [reason, count] : counts)
-    all += (all.empty() ? "" : ", ") + count_text(count) + ' ' + std::string(reason_name(reason));
-  return all.empty() ? "-" : all;
-}
-
 std::string rate(std::uint64_t now, std::uint64_t before, double seconds) {
   return seconds > 0 && now >= before ? fixed(static_cast<double>(now - before) / seconds, 1) : "-";
 }
@@ -76,7 +69,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
                     fixed(r.keyframes_per_s, 1), terminal::bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
                     r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), count_text(r.next_sequence),
                     count_text(r.missing + r.incomplete), count_text(r.pending + r.queued_messages),
-                    counts_text(r.refused), trouble_of(r, frozen).name});
+                    counts_text(r.refused, "-"), trouble_of(r, frozen).name});
   }
   console.out() << '\n';
   console.table({"robot", "session", ">kf/s", ">received", ">lag", ">silent", ">acknowledged", ">missing", ">queue",

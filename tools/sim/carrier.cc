@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kHalfWidth = 1.0, kLiftHeight = 2.1;                                     // metres, of cabins
 constexpr double kWagonBack = 1.5, kWagonFront = 2.5, kWagonHeight = 2.0, kHeader = 0.3;  // likewise
-constexpr double kStep = 0.4, kStepHalfWidth = 1.3, kRiser = 0.3, kPanel = 2.0;           // of the escalator
+constexpr double kTread = 0.4, kStepHalfWidth = 1.3, kRiser = 0.3, kPanel = 2.0;          // of the escalator
 constexpr int kSteps = 40;  // until their textures come again: more than there are in sight
 
 class PartBuilder {
@@ -95,9 +95,9 @@ void Carrier::build_wagon(Scene& scene, Random& random) {
 void Carrier::build_steps(Scene& scene, Random& random) {
   for (int k = 0; k < kSteps; ++k) {
     PartBuilder step(scene);
-    const Vector3 left(-kStepHalfWidth, 0, 0), across(2 * kStepHalfWidth, 0, 0), along(0, 0, kStep);
+    const Vector3 left(-kStepHalfWidth, 0, 0), across(2 * kStepHalfWidth, 0, 0), along(0, 0, kTread);
     step.panel(left, across, {0, kRiser, 0}, paint_crates(across.norm(), kRiser, random));
-    step.panel(left, across, along, paint_crates(across.norm(), kStep, random));
+    step.panel(left, across, along, paint_crates(across.norm(), kTread, random));
     for (const Vector3& side : {left, Vector3(-left)})
       step.posters(side - Vector3(0, kPanel, 0), along, {0, kPanel + kRiser, 0}, random);
     parts_.push_back(step.take());
@@ -112,10 +112,10 @@ std::vector<Surface> Carrier::placed(double seconds, double later) const {
   };
   if (kind_ == RideKind::kEscalator) {
     const double board = itinerary_.rides().front().board, belt = now.carrier_way - board;
-    const auto first = static_cast<int>(std::ceil((belt_.from - kBeltBack - belt) / kStep));
-    const auto last = static_cast<int>(std::floor((belt_.to + kBeltFront - kStep - belt) / kStep));
+    const auto first = static_cast<int>(std::ceil((belt_.from - kBeltBack - belt) / kTread));
+    const auto last = static_cast<int>(std::floor((belt_.to + kBeltFront - kTread - belt) / kTread));
     for (int k = first; k <= last; ++k)
-      place(parts_[static_cast<std::size_t>(k % kSteps)], road_.T_world_road(k * kStep + state.carrier_way - board));
+      place(parts_[static_cast<std::size_t>(k % kSteps)], road_.T_world_road(k * kTread + state.carrier_way - board));
     return out;
   }
   SE3 T_world_cabin = road_.T_world_road(state.carrier_way);

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
-#include "tools/sim/picture_world.h"
+#include "tools/sim/grey_levels_for_test.h"
 
 namespace relmap::sim {
 namespace {
@@ -25,11 +24,6 @@ PictureWorldOptions drive(std::uint64_t drive_seed, Daylight light) {
   return options;
 }
 
-double mean(const GreyPicture& picture) {
-  return std::accumulate(picture.pixels.begin(), picture.pixels.end(), 0.0) /
-         static_cast<double>(picture.pixels.size());
-}
-
 TEST(Daylight, NamesAreReadAsTheyAreWritten) {
   for (const Daylight light : kAll) EXPECT_EQ(daylight_of(daylight_name(light)), light);
   EXPECT_EQ(daylight_of("noon"), std::nullopt);
@@ -44,7 +38,7 @@ TEST(Daylight, TheSamePlaceLooksDifferentAndStaysWhereItWas) {
     EXPECT_EQ(world.render_depth(20), clear.render_depth(20));
     const StereoPictures pair = world.render(20);
     // Not by one factor: what is brighter than by the mean, and what is darker.
-    const double factor = mean(pair.left) / mean(as_painted.left);
+    const double factor = mean_grey(pair.left) / mean_grey(as_painted.left);
     EXPECT_LT(factor, 0.95) << daylight_name(light);
     EXPECT_GT(factor, 0.2) << daylight_name(light);
     std::size_t brighter = 0, darker = 0;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "tools/sim/picture_world.h"
+#include "tools/sim/grey_levels_for_test.h"
 
 namespace relmap::sim {
 namespace {
@@ -18,12 +18,6 @@ PictureWorldOptions options_with(const std::string& faults, int frames = 140) {
   EXPECT_TRUE(options.set_faults(faults).ok());
   EXPECT_TRUE(options.check().ok());
   return options;
-}
-
-double mean(const GreyPicture& picture) {
-  double sum = 0;
-  for (const std::uint8_t value : picture.pixels) sum += value;
-  return sum / static_cast<double>(picture.pixels.size());
 }
 
 TEST(Faults, AllHasOneOfEachKindAndDropsPairsAtAnyRate) {
@@ -89,7 +83,7 @@ TEST(Faults, BlackPicturesAreBlackInTheGivenEyes) {
   const PictureWorld world(options_with("black:20,one_eye:40,one_eye:70"));
   const auto brightness = [&](int i) {
     const StereoPictures pair = world.render(i);
-    return std::pair(mean(pair.left), mean(pair.right));
+    return std::pair(mean_grey(pair.left), mean_grey(pair.right));
   };
   for (const int i : {20, 29}) {
     EXPECT_LT(brightness(i).first, 3);

@@ -7,13 +7,14 @@ namespace relmap::sim {
 namespace {
 
 constexpr int kMaxTaps = 33;
-constexpr int kMargin = 24;  // pixels beyond the picture's border that are rendered too, since the flow carries them in
+// Pixels beyond the picture's border that are rendered too, since the flow carries them in.
+constexpr int kBlurMargin = 24;
 
 StereoCamera widened(StereoCamera camera) {
-  camera.cx += kMargin;
-  camera.cy += kMargin;
-  camera.width += 2 * kMargin;
-  camera.height += 2 * kMargin;
+  camera.cx += kBlurMargin;
+  camera.cy += kBlurMargin;
+  camera.width += 2 * kBlurMargin;
+  camera.height += 2 * kBlurMargin;
   return camera;
 }
 
@@ -57,7 +58,7 @@ std::vector<float> shade_blurred(const Snapshot& snapshot, const StereoCamera& c
   std::vector<float> picture(static_cast<std::size_t>(camera.width) * camera.height);
   for (int row = 0; row < camera.height; ++row)
     for (int column = 0; column < camera.width; ++column) {
-      const int u = column + kMargin, r = row + kMargin;
+      const int u = column + kBlurMargin, r = row + kBlurMargin;
       const Eigen::Vector3f ray(static_cast<float>(column - camera.cx) / f, static_cast<float>(row - camera.cy) / f, 1);
       const std::size_t sample = nearest_sample(visible, u, r);
       const Eigen::Vector3f v = velocity_seen(visible.surface[sample]);

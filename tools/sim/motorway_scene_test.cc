@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tools/sim/grey_levels_for_test.h"
 #include "tools/sim/picture_world.h"
-#include "tools/sim/textured_share_for_test.h"
 #include "tools/sim/traffic.h"
 
 namespace relmap::sim {

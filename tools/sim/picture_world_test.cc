@@ -7,7 +7,7 @@
 
 #include "proto/base/crc32c.h"
 #include "tools/sim/carried_points_for_test.h"
-#include "tools/sim/textured_share_for_test.h"
+#include "tools/sim/grey_levels_for_test.h"
 
 namespace relmap::sim {
 namespace {

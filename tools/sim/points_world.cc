@@ -14,11 +14,11 @@ namespace {
 
 constexpr std::uint32_t kMaxLife = 30;  // frames: a track stays within D edges of its base
 constexpr std::uint32_t kOdometryStride = 64;
-constexpr double kMargin = 5;  // sigmas kept from the picture's border, so that noise carries nothing outside
+constexpr double kBorderMargin = 5;  // sigmas kept from the picture's border, so that noise carries nothing outside
 constexpr int kMaxDraws = 30;
 constexpr double kMinDepth = 0.3;         // metres
 constexpr double kPointSize = 0.15;       // metres: the described region
-constexpr double kPixelNoiseLimit = 4.9;  // sigmas; below kMargin
+constexpr double kPixelNoiseLimit = 4.9;  // sigmas; below kBorderMargin
 
 // The purposes of the streams of random numbers.
 enum Purpose : std::uint64_t { kLife, kPlace, kSeenAgain, kPixel, kStep, kDescriptor, kDescriptorNoise };
@@ -120,7 +120,7 @@ PointsWorld::Point PointsWorld::make_point(PointId id) const {
   Point point;
   point.life = life(id);
   point.mono = random.uniform() < options_.mono_share;
-  const double margin = kMargin * options_.pixel_noise;
+  const double margin = kBorderMargin * options_.pixel_noise;
   const auto birth = static_cast<std::int64_t>(lap_of(id) * options_.frames_per_lap + phase_of(id));
   const SE3 T_world_birth = pose(birth);
   const SE3 T_next_world = pose(birth + 1).inverse();
@@ -143,7 +143,7 @@ bool PointsWorld::visible(const Point& point, const SE3& T_frame_world) const {
   if (p.z() < kMinDepth) return false;
   const StereoCamera& camera = options_.camera;
   const StereoPixel z = camera.project(p);
-  const double margin = kMargin * options_.pixel_noise;
+  const double margin = kBorderMargin * options_.pixel_noise;
   const double left = point.mono ? z.x() : z.z();
   return left >= margin - 1e-6 && z.x() <= camera.width - 1 - margin + 1e-6 && z.y() >= margin - 1e-6 &&
          z.y() <= camera.height - 1 - margin + 1e-6;

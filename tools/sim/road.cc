@@ -10,7 +10,7 @@ namespace {
 constexpr double kEscalatorRise = 2.5;  // metres
 constexpr double kEscalator = 9;        // metres in the plan
 constexpr double kLanding = 1;          // at either end of an escalator: metres in which its slope changes
-constexpr double kRamp = 2;             // likewise of a ramp
+constexpr double kRampEnd = 2;          // likewise of a ramp
 
 }  // namespace
 
@@ -29,11 +29,11 @@ double Road::height(double way) const {
   const double round = length(), laps = std::floor(way / round), s = way - laps * round;
   switch (options_.ride) {
     case RideKind::kLiftRamp:
-      return kStorey * (laps + eased(s - 12, round - 18, kRamp));
+      return kStorey * (laps + eased(s - 12, round - 18, kRampEnd));
     case RideKind::kEscalator: {
       const Slope escalator = escalator_place(options_);
       return kEscalatorRise * (eased(s - escalator.from - 0.5, kEscalator - 1, kLanding) -
-                               eased(s - escalator.to - 4, round - escalator.to - 5, kRamp));
+                               eased(s - escalator.to - 4, round - escalator.to - 5, kRampEnd));
     }
     default:
       return 0;

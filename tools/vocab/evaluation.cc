@@ -19,7 +19,7 @@ constexpr double kConfident = 0.5;
 constexpr double kMinProbability = 1e-4;  // lower ones count as this, so that one answer cannot dominate
 
 // Describes a picture as the server does for a query.
-Result<DescribedPicture> describe(const std::string& file, const place::Vocabulary& vocabulary) {
+Result<DescribedPicture> describe_query(const std::string& file, const place::Vocabulary& vocabulary) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return Status(Reason::NO_SUCH_FILE, file + ": " + std::generic_category().message(errno));
   const Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -137,7 +137,7 @@ Result<Evaluation> evaluate(const std::shared_ptr<const place::Vocabulary>& voca
   Judge ours, tfidf;
   for (std::size_t i = 0; i < set.pictures.size(); ++i) {
     const RecognitionSet::Picture& asked = set.pictures[i];
-    const auto picture = describe(asked.file, *vocabulary);
+    const auto picture = describe_query(asked.file, *vocabulary);
     if (!picture.ok()) return picture.status();
     if (asked.asks) {
       ++result.queries;

@@ -15,7 +15,7 @@ using Descriptors = std::vector<place::Descriptor>;
 
 constexpr std::size_t kMinFeatures = 50;  // a picture with fewer of its some 300 features shows no place
 
-Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t views) {
+Result<std::vector<Descriptors>> describe_file(const std::string& file, std::size_t views) {
   const auto pictures = training_views(file, views);
   if (!pictures.ok()) return pictures.status();
   std::vector<Descriptors> result;
@@ -31,7 +31,7 @@ Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t v
 // OpenCV refuses some pictures by throwing, which would end the program on a thread.
 Result<std::vector<Descriptors>> describe_safely(const std::string& file, std::size_t views) {
   try {
-    return describe(file, views);
+    return describe_file(file, views);
   } catch (const std::exception& error) {
     return Status(Reason::NOT_A_PICTURE, file + ": " + error.what());
   }

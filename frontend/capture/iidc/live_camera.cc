@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kLook{100};                       // between checks of `stop`
+constexpr std::chrono::milliseconds kStopLook{100};                   // between checks of `stop`
 constexpr std::chrono::milliseconds kRetry{500}, kMaxRetry{10'000};   // between attempts to open it again
 constexpr std::chrono::milliseconds kAppears{50};                     // wait after it was plugged in
 constexpr std::chrono::milliseconds kObstacle{1000};                  // obstacles that last less are not reported
@@ -267,7 +267,7 @@ std::optional<Status> LiveCamera::come_back() {
   while (!stop_) {
     const auto now = Clock::now();
     if (now < next_try_) {
-      const auto wait = std::min(kLook, std::chrono::ceil<std::chrono::milliseconds>(next_try_ - now));
+      const auto wait = std::min(kStopLook, std::chrono::ceil<std::chrono::milliseconds>(next_try_ - now));
       // The device's file appears, and becomes accessible, a little after the device.
       if (camera_.bus->wait_for_change(wait)) next_try_ = std::min(next_try_, Clock::now() + kAppears);
       continue;
@@ -307,7 +307,7 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
       continue;
     }
     read_clock();
-    auto raw = link_->next(kLook);
+    auto raw = link_->next(kStopLook);
     if (raw.ok()) {
       Status gap;
       auto frame = made(std::move(*raw), gap);
@@ -323,7 +323,7 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
     Status status = raw.status();
     if (status.reason() == Reason::CAMERA_GONE) {
       close();
-      next_try_ = Clock::now() + kLook;
+      next_try_ = Clock::now() + kStopLook;
       return fault({Reason::CAMERA_GONE, status.message() + "; waiting for it"});
     }
     const bool silent = status.reason() == Reason::CAMERA_SILENT;

@@ -8,7 +8,7 @@ namespace relmap::iidc {
 
 namespace {
 
-std::string hex(std::uint32_t value) {
+std::string register_text(std::uint32_t value) {
   char text[16];
   std::snprintf(text, sizeof text, "%03Xh", value);
   return text;
@@ -32,15 +32,16 @@ Status RegisterFile::write_kept(std::uint32_t offset, std::uint32_t value, std::
   const auto kept = read(offset);
   if (!kept.ok()) return kept.status();
   if (((*kept ^ value) & mask) == 0) return {};
-  return {Reason::REGISTER_REFUSED, name + " (register " + hex(offset) + ") holds " + hex(*kept & mask) + " after " +
-                                        hex(value & mask) + " was written"};
+  return {Reason::REGISTER_REFUSED, name + " (register " + register_text(offset) + ") holds " +
+                                        register_text(*kept & mask) + " after " + register_text(value & mask) +
+                                        " was written"};
 }
 
 Result<RegisterFile> RegisterFile::at(std::uint32_t pointer) const {
   const auto quadlets = read(pointer);
   if (!quadlets.ok()) return quadlets.status();
   if (*quadlets == 0 || *quadlets == 0xffff'ffff)
-    return {Reason::UNSUPPORTED, "register " + hex(pointer) + " points nowhere"};
+    return {Reason::UNSUPPORTED, "register " + register_text(pointer) + " points nowhere"};
   return RegisterFile(*link_, kRegisterSpace + 4 * std::uint64_t{*quadlets});
 }
 

@@ -5,6 +5,8 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
+#include <string>
 
 namespace relmap::iidc {
 
@@ -13,6 +15,13 @@ inline constexpr std::uint64_t kCycleTime = kRegisterSpace + 0x200;  // IEEE 139
 inline constexpr std::uint64_t kConfigRom = kRegisterSpace + 0x400;  // IEEE 1212
 inline constexpr std::uint32_t kIidcSpecifier = 0x00a02d;            // unit_spec_ID, "Configuration ROM"
 inline constexpr std::uint32_t kIidcVersionFirst = 0x000100;  // unit_sw_version of 1.04; 0x101: 1.20, 0x102: 1.30
+
+// An address as messages name it: "FFFFF0F00830h".
+inline std::string address_text(std::uint64_t address) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%012llXh", static_cast<unsigned long long>(address));
+  return text;
+}
 
 // Offsets from the base of the command registers, which is in the ROM [1.4 to 1.8].
 namespace reg {

@@ -209,12 +209,13 @@ class UsbLink : public CameraLink {
 
   Status control(std::uint8_t type, std::uint64_t address, std::uint8_t* bytes, std::size_t size) {
     if (address >> 32 != kRegisterSpace >> 32)
-      return {Reason::IO_ERROR, "an address that no register of USB cameras has: " + hex(address)};
+      return {Reason::IO_ERROR, "an address that no register of USB cameras has: " + address_text(address)};
     const int got = libusb_control_transfer(handle_, type, kRegisterRequest, static_cast<std::uint16_t>(address),
                                             static_cast<std::uint16_t>(address >> 16), bytes,
                                             static_cast<std::uint16_t>(size), kAnswerMs);
     if (got == static_cast<int>(size)) return {};
-    const std::string what = std::string(type == kReadRegister ? "reading" : "writing") + " register " + hex(address);
+    const std::string what =
+        std::string(type == kReadRegister ? "reading" : "writing") + " register " + address_text(address);
     switch (got) {
       case LIBUSB_ERROR_NO_DEVICE:
         return {Reason::CAMERA_GONE, "the camera was unplugged"};
@@ -226,12 +227,6 @@ class UsbLink : public CameraLink {
         return {Reason::IO_ERROR,
                 what + ": " + (got < 0 ? libusb_error_name(got) : std::to_string(got) + " bytes were answered")};
     }
-  }
-
-  static std::string hex(std::uint64_t address) {
-    char text[24];
-    std::snprintf(text, sizeof text, "%012llXh", static_cast<unsigned long long>(address));
-    return text;
   }
 
   const std::shared_ptr<Context> context_;

@@ -56,7 +56,7 @@ constexpr std::array<double, 8> kRates = {1.875, 3.75, 7.5, 15, 30, 60, 120, 240
 constexpr int kMaxSide = 8192;
 constexpr double kPacketsPerSecond = 8000;  // IEEE 1394: one a cycle
 constexpr auto kPowerUp = std::chrono::milliseconds(1000), kSettle = std::chrono::milliseconds(500),
-               kLook = std::chrono::milliseconds(2);
+               kPoll = std::chrono::milliseconds(2);
 
 // The codings that carry two eyes: 16-bit words.
 std::optional<Coding> stereo_coding(const ModeInfo& info) {
@@ -137,7 +137,7 @@ Status take_settings(const RegisterFile& csr, const VideoMode& mode) {
     }
     if (std::chrono::steady_clock::now() > until)
       return {Reason::REGISTER_REFUSED, mode.name() + ": VALUE_SETTING (register 07Ch) does not come to an end"};
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kPoll);
   }
 }
 
@@ -298,7 +298,7 @@ Status power_on(const RegisterFile& registers) {
     if (power.reason() == Reason::CAMERA_GONE) return power.status();
     if (std::chrono::steady_clock::now() > until)
       return {Reason::REGISTER_REFUSED, "CAMERA_POWER (register 610h) stays off"};
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kPoll);
   }
 }
 

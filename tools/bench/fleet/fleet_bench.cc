@@ -52,7 +52,7 @@ struct FleetOptions {
   std::string folder;
 };
 
-double cpu_seconds(pid_t pid) {
+double cpu_seconds_of(pid_t pid) {
   std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
   std::string text;
   std::getline(stat, text);
@@ -79,7 +79,7 @@ class FleetDaemon {
   // kill -9, and up again. When the new process was started.
   std::int64_t restart() {
     note();
-    cpu_before_ += cpu_seconds(running_->process().pid());
+    cpu_before_ += cpu_seconds_of(running_->process().pid());
     running_->process().kill();
     const std::int64_t at = monotonic_ns();
     start();
@@ -89,7 +89,7 @@ class FleetDaemon {
     note();
     if (running_->stop() != 0) std::cerr << "relmapd did not stop as it should: " << running_->log() << '\n';
   }
-  double cpu() const { return cpu_before_ + cpu_seconds(running_->process().pid()); }
+  double cpu() const { return cpu_before_ + cpu_seconds_of(running_->process().pid()); }
   double peak_resident_mb() {
     note();
     return static_cast<double>(peak_resident_) / (1 << 20);
@@ -122,7 +122,7 @@ class FleetProcesses {
   }
 
   std::int64_t restart(std::uint32_t robot) {
-    cpu_before_ += cpu_seconds(processes_[robot]->pid());
+    cpu_before_ += cpu_seconds_of(processes_[robot]->pid());
     processes_[robot]->kill();
     const std::int64_t at = monotonic_ns();
     processes_[robot] = start(robot, 1);
@@ -131,7 +131,7 @@ class FleetProcesses {
 
   double cpu() const {
     double cpu = cpu_before_;
-    for (const auto& process : processes_) cpu += cpu_seconds(process->pid());
+    for (const auto& process : processes_) cpu += cpu_seconds_of(process->pid());
     return cpu;
   }
   void check() const {

@@ -14,7 +14,7 @@ namespace relmap::bench {
 namespace {
 
 constexpr std::chrono::milliseconds kBreath{2};
-constexpr std::uint32_t kWindow = 64;      // keyframes that the daemon takes ahead of what it has settled
+constexpr std::uint32_t kTakenAhead = 64;  // keyframes that the daemon takes ahead of what it has settled
 constexpr std::size_t kDataLengthAt = 68;  // in an encoded keyframe_part_t
 constexpr std::size_t kMaxBytes = 1400;
 
@@ -60,7 +60,7 @@ void Flooder::run() {
   at_rate(keyframes_per_s_, stopping_, [&] {
     const auto next = static_cast<std::uint32_t>(next_);
     ready.erase(ready.begin(), ready.lower_bound(next));
-    while (made < next + kWindow) {
+    while (made < next + kTakenAhead) {
       const Keyframe keyframe = lap_.keyframe(robot_, made, T_odom);
       T_odom = keyframe.T_odom_frame;
       Bytes payload = encode_keyframe(keyframe);

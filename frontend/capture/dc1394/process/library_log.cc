@@ -8,11 +8,11 @@ namespace relmap::iidc::dc1394 {
 
 namespace {
 
-thread_local std::string words;
+thread_local std::string last_words;
 
 void keep(dc1394log_t, const char* message, void*) {
-  words = message;
-  while (!words.empty() && words.back() == '\n') words.pop_back();
+  last_words = message;
+  while (!last_words.empty() && last_words.back() == '\n') last_words.pop_back();
 }
 
 void forget(dc1394log_t, const char*, void*) {}
@@ -25,7 +25,7 @@ void keep_library_log() {
   dc1394_log_register_handler(DC1394_LOG_DEBUG, &forget, nullptr);
 }
 
-std::string library_words() { return std::exchange(words, {}); }
+std::string library_words() { return std::exchange(last_words, {}); }
 
 Status library_error(Reason reason, const std::string& what) {
   const std::string said = library_words();

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstring>
 #include <string_view>
 #include <utility>
@@ -39,12 +38,6 @@ Status of_setup(dc1394error_t error) {
                           (words.empty() ? std::string(dc1394_error_get_string(error)) : words)};
     }
   }
-}
-
-std::string hex(std::uint64_t address) {
-  char text[24];
-  std::snprintf(text, sizeof text, "%012llXh", static_cast<unsigned long long>(address));
-  return text;
 }
 
 }  // namespace
@@ -101,7 +94,8 @@ Status ServedCamera::failed(const std::string& what, std::uint64_t address) {
   const std::string words = library_words();
   std::uint32_t quadlet = 0;
   if (!gone_ && dc1394_get_register(camera_, kConfigRom - kRegisterSpace, &quadlet) == DC1394_SUCCESS)
-    return {Reason::IO_ERROR, what + " register " + hex(address) + ": the camera refuses it, or did not answer" +
+    return {Reason::IO_ERROR, what + " register " + address_text(address) +
+                                  ": the camera refuses it, or did not answer" +
                                   (words.empty() ? "" : " (" + words + ")")};
   return {Reason::CAMERA_GONE, "the camera was unplugged, or answers no more"};
 }

@@ -1,11 +1,17 @@
-// How much of a picture has texture, for the tests of the worlds.
+// Statistics of a picture's grey levels, for the tests of the worlds.
 #pragma once
 
 #include <cmath>
+#include <numeric>
 
 #include "tools/sim/picture_world.h"
 
 namespace relmap::sim {
+
+inline double mean_grey(const GreyPicture& picture) {
+  return std::accumulate(picture.pixels.begin(), picture.pixels.end(), 0.0) /
+         static_cast<double>(picture.pixels.size());
+}
 
 // The share of the blocks of 16 x 16 pixels in rows [top, bottom) whose values differ clearly.
 inline double textured_share(const GreyPicture& picture, int top, int bottom) {
