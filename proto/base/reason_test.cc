@@ -21,6 +21,17 @@ TEST(Status, SaysItsReasonFirst) {
             "TIME_BACKWARDS: 1200 us after 1300 us");
 }
 
+TEST(Status, IsThrownUnlessItIsOk) {
+  EXPECT_NO_THROW(throw_if(Status()));
+  try {
+    throw_if(Status(Reason::DISK_FULL, "no room"));
+    FAIL();
+  } catch (const StatusError& e) {
+    EXPECT_EQ(e.status().reason(), Reason::DISK_FULL);
+    EXPECT_EQ(e.status().message(), "no room");
+  }
+}
+
 TEST(Result, OrThrowCarriesTheStatus) {
   EXPECT_EQ(Result<int>(3).or_throw(), 3);
   try {
