@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/base/refuse.h"
 #include "proto/base/status.h"
 
 namespace relmap {
@@ -30,6 +31,10 @@ TEST(Status, IsThrownUnlessItIsOk) {
     EXPECT_EQ(e.status().reason(), Reason::DISK_FULL);
     EXPECT_EQ(e.status().message(), "no room");
   }
+}
+
+TEST(Status, ARefusalStreamsItsParts) {
+  EXPECT_EQ(refuse(Reason::BAD_SIZE, 3, " parts of ", 2.5, " bytes").to_string(), "BAD_SIZE: 3 parts of 2.5 bytes");
 }
 
 TEST(Result, OrThrowCarriesTheStatus) {
