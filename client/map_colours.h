@@ -20,4 +20,8 @@ inline constexpr Colour kRouteColour{246, 190, 40};
 inline constexpr Colour kQueryColour{228, 12, 107};
 inline constexpr Colour kInkColour{38, 42, 48};  // texts, labels
 
+// These are no marks, and need not be told apart from those above.
+inline constexpr Colour kWhiteColour{255, 255, 255};  // panels, and what lies between marks
+inline constexpr Colour kFaintColour{112, 118, 126};  // small texts
+
 }  // namespace relmap::client

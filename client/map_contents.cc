@@ -7,12 +7,6 @@
 
 namespace relmap::client {
 
-namespace {
-
-constexpr Colour kWhite{255, 255, 255};
-
-}  // namespace
-
 MapContents::MapContents(const MapPicture& picture) : picture_(picture) {
   for (std::size_t part = 0; part < picture.parts.size(); ++part)
     for (const MapPicture::Frame& frame : picture.parts[part].frames) {
@@ -54,7 +48,7 @@ Colour MapContents::shade(FrameId frame) const {
   const std::vector<FrameId>& frames = sessions_.at(frame.session);
   if (sessions_.size() > 1 || frames.size() < 2) return full;
   const auto place = std::distance(frames.begin(), std::lower_bound(frames.begin(), frames.end(), frame));
-  return mix(mix(full, kWhite, 0.5), full, static_cast<double>(place) / static_cast<double>(frames.size() - 1));
+  return mix(mix(full, kWhiteColour, 0.5), full, static_cast<double>(place) / static_cast<double>(frames.size() - 1));
 }
 
 const MapPicture::Edge* MapContents::step(FrameId frame) const {

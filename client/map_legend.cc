@@ -11,14 +11,11 @@ namespace relmap::client {
 
 namespace {
 
-using EdgeKind = MapPicture::EdgeKind;
-
-constexpr Colour kFaint{112, 118, 126}, kWhite{255, 255, 255};
 constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18, kEntryGap = 9;
 constexpr std::size_t kMaxSessions = 40;  // further sessions are only counted
 constexpr std::size_t kTerseFrom = 8;     // from this number of sessions on, each has one line
 
-const TextStyle kPlain{.size = 15, .colour = kInkColour}, kSmall{.size = 13, .colour = kFaint};
+const TextStyle kPlain{.size = 15, .colour = kInkColour}, kSmall{.size = 13, .colour = kFaintColour};
 
 void no_sample(Drawing&, const Vector2&, const Vector2&) {}
 
@@ -73,7 +70,7 @@ void MapLegend::add_sessions() {
     const auto line = [full, first](Drawing& out, const Vector2& a, const Vector2& b) {
       for (int k = 0; k < 10; ++k)
         out.line(a + (b - a) * (k / 10.0), a + (b - a) * ((k + 1) / 10.0),
-                 motion_stroke(EdgeKind::kMotion, mix(first, full, k / 9.0)));
+                 motion_stroke(MapPicture::EdgeKind::kMotion, mix(first, full, k / 9.0)));
     };
     if (sessions.size() >= kTerseFrom)
       add(contents_.name(session) + " (" + count_text(frames.size()) + ")", "", line);
@@ -94,18 +91,18 @@ void MapLegend::add_motion() {
   const Colour first =
       contents_.sessions().empty() ? kInkColour : contents_.colour(contents_.sessions().begin()->first);
   const struct {
-    EdgeKind kind;
+    MapPicture::EdgeKind kind;
     const char *name, *meaning;
-  } kinds[] = {{EdgeKind::kUnmeasuredMotion, "unmeasured step", "dashes: nothing measured this motion"},
-               {EdgeKind::kCarriedMotion, "carried step", "dots: closures say that the robot was carried"}};
+  } kinds[] = {{MapPicture::EdgeKind::kUnmeasuredMotion, "unmeasured step", "dashes: nothing measured this motion"},
+               {MapPicture::EdgeKind::kCarriedMotion, "carried step", "dots: closures say that the robot was carried"}};
   for (const auto& [kind, name, meaning] : kinds)
     if (const std::size_t count = contents_.count(kind); count > 0)
       add(counted_text(count, name), meaning, [kind = kind, first](Drawing& out, const Vector2& a, const Vector2& b) {
         out.line(a, b, motion_stroke(kind, first));
-        out.disc(a, 2.6, first, 0, kWhite);
-        out.disc(b, 2.6, first, 0, kWhite);
+        out.disc(a, 2.6, first, 0, kWhiteColour);
+        out.disc(b, 2.6, first, 0, kWhiteColour);
       });
-  if (const std::size_t count = contents_.count_between_parts(EdgeKind::kUnmeasuredMotion); count > 0)
+  if (const std::size_t count = contents_.count_between_parts(MapPicture::EdgeKind::kUnmeasuredMotion); count > 0)
     add(counted_text(count, "step") + " from part to part", "not drawn: nothing measured the motion", no_sample);
 }
 

@@ -12,9 +12,7 @@ namespace relmap::client {
 
 namespace {
 
-using EdgeKind = MapPicture::EdgeKind;
-
-constexpr Colour kGrid{233, 233, 228}, kBorder{214, 214, 208}, kFaint{112, 118, 126}, kWhite{255, 255, 255};
+constexpr Colour kGrid{233, 233, 228}, kBorder{214, 214, 208};
 constexpr double kNarrow = 420;             // points; narrower panels have smaller margins and letters
 constexpr std::size_t kNamedSessions = 12;  // if there are more, they are labelled with their numbers
 
@@ -51,11 +49,11 @@ std::string length_name(double metres) {
 
 }  // namespace
 
-Stroke motion_stroke(EdgeKind kind, Colour colour) {
+Stroke motion_stroke(MapPicture::EdgeKind kind, Colour colour) {
   switch (kind) {
-    case EdgeKind::kUnmeasuredMotion:
+    case MapPicture::EdgeKind::kUnmeasuredMotion:
       return {colour, 2, 1, 6};
-    case EdgeKind::kCarriedMotion:
+    case MapPicture::EdgeKind::kCarriedMotion:
       return {colour, 3, 1, 2.5};
     default:
       return {colour, 3, 1, 0};
@@ -64,14 +62,22 @@ Stroke motion_stroke(EdgeKind kind, Colour colour) {
 
 const std::vector<ClosureStyle>& closure_styles() {
   static const std::vector<ClosureStyle> styles{
-      {EdgeKind::kLoopRemoved, "removed closure", "taken out by an operator", {kNotInForceColour, 1.4, 1, 2}, true},
-      {EdgeKind::kLoopQuarantined, "quarantined closure", "outvoted: not in force", {kQueryColour, 1.4, 1, 3.5}, true},
-      {EdgeKind::kLoopCandidate,
+      {MapPicture::EdgeKind::kLoopRemoved,
+       "removed closure",
+       "taken out by an operator",
+       {kNotInForceColour, 1.4, 1, 2},
+       true},
+      {MapPicture::EdgeKind::kLoopQuarantined,
+       "quarantined closure",
+       "outvoted: not in force",
+       {kQueryColour, 1.4, 1, 3.5},
+       true},
+      {MapPicture::EdgeKind::kLoopCandidate,
        "candidate closure",
        "not in force: nothing agrees, or motion contradicts",
        {kNotInForceColour, 1.6, 1, 7},
        false},
-      {EdgeKind::kLoopAccepted, "loop closure", "", {kLoopColour, 2.4, 1, 0}, false}};
+      {MapPicture::EdgeKind::kLoopAccepted, "loop closure", "", {kLoopColour, 2.4, 1, 0}, false}};
   return styles;
 }
 
@@ -79,31 +85,31 @@ void draw_closure(Drawing& out, const ClosureStyle& style, const Vector2& from, 
   out.line(from, to, style.stroke);
   for (const Vector2& end : {from, to}) {
     if (style.hollow)
-      out.disc(end, 2.8, kWhite, 1.4, style.stroke.colour);
+      out.disc(end, 2.8, kWhiteColour, 1.4, style.stroke.colour);
     else
-      out.disc(end, 3.2, style.stroke.colour, 0, kWhite);
+      out.disc(end, 3.2, style.stroke.colour, 0, kWhiteColour);
   }
 }
 
-void draw_start(Drawing& out, const Vector2& at, Colour colour) { out.disc(at, 6.5, kWhite, 3, colour); }
-void draw_end(Drawing& out, const Vector2& at, Colour colour) { out.disc(at, 7.5, colour, 2, kWhite); }
+void draw_start(Drawing& out, const Vector2& at, Colour colour) { out.disc(at, 6.5, kWhiteColour, 3, colour); }
+void draw_end(Drawing& out, const Vector2& at, Colour colour) { out.disc(at, 7.5, colour, 2, kWhiteColour); }
 
 void draw_arrow(Drawing& out, const Vector2& at, const Vector2& direction, Colour colour) {
   const Vector2 along = direction.normalized() * 6.5, side(-along.y() * 0.75, along.x() * 0.75);
   out.polygon({at + along, at - along + side, at - 0.5 * along, at - along - side}, mix(colour, kInkColour, 0.25), 1);
 }
 
-void draw_label_point(Drawing& out, const Vector2& at) { out.disc(at, 5, kInkColour, 2, kWhite); }
+void draw_label_point(Drawing& out, const Vector2& at) { out.disc(at, 5, kInkColour, 2, kWhiteColour); }
 
 void draw_route_piece(Drawing& out, const std::vector<Vector2>& way) { out.polyline(way, {kRouteColour, 13, 0.75, 0}); }
 
-void draw_route_begin(Drawing& out, const Vector2& at) { out.disc(at, 10, kWhite, 4, kRouteColour); }
+void draw_route_begin(Drawing& out, const Vector2& at) { out.disc(at, 10, kWhiteColour, 4, kRouteColour); }
 void draw_route_end(Drawing& out, const Vector2& at) { out.disc(at, 10, kRouteColour, 0, kRouteColour); }
 
 void draw_query(Drawing& out, const Vector2& at, const Vector2& view) {
   const Vector2 side(-view.y(), view.x());
   out.polygon({at, at + view + 0.45 * side, at + view - 0.45 * side}, kQueryColour, 0.3);
-  out.disc(at, 8, kQueryColour, 3, kWhite);
+  out.disc(at, 8, kQueryColour, 3, kWhiteColour);
 }
 
 // Draws a panel into an area.
@@ -157,7 +163,7 @@ class MapPanel::Pen {
   }
 
   void grid() {
-    out_.rectangle(area_.low, area_.size(), kWhite, 1);
+    out_.rectangle(area_.low, area_.size(), kWhiteColour, 1);
     const double max_length = std::min(170.0, 0.45 * area_.size().x());
     const double bar = round_length(max_length / panel_.plan_.points_per_metre());
     const double step = bar * panel_.plan_.points_per_metre();
@@ -173,7 +179,7 @@ class MapPanel::Pen {
     const double y = area_.high.y() + 20, x = area_.low.x() + 2;
     out_.polyline({{x, y - 5}, {x, y}, {x + step, y}, {x + step, y - 5}}, {kInkColour, 2, 1, 0});
     const TextStyle plain{.size = 15, .colour = kInkColour},
-        small{.size = 13, .colour = kFaint, .anchor = Anchor::kRight};
+        small{.size = 13, .colour = kFaintColour, .anchor = Anchor::kRight};
     out_.text({x + step + 10, y + 3}, length_name(bar), plain);
     const std::string note = "seen from above, grid " + length_name(bar);
     if (x + step + 20 + out_.text_width(length_name(bar), plain) + out_.text_width(note, small) < area_.high.x())
@@ -203,12 +209,12 @@ class MapPanel::Pen {
   // Draws each run of frames that measured motion joins, and the other motion between the runs.
   void trajectory(const std::vector<FrameId>& frames) {
     std::vector<std::vector<FrameId>> runs;
-    std::vector<std::pair<FrameId, EdgeKind>> bridges;  // to this frame from the one before it
+    std::vector<std::pair<FrameId, MapPicture::EdgeKind>> bridges;  // to this frame from the one before it
     for (std::size_t k = 0; k < frames.size(); ++k) {
       const MapPicture::Edge* step = contents_.step(frames[k]);
       if (step && (k == 0 || std::min(step->a, step->b) != frames[k - 1])) step = nullptr;
-      if (step && step->kind != EdgeKind::kMotion) bridges.emplace_back(frames[k], step->kind);
-      if (!step || step->kind != EdgeKind::kMotion) runs.emplace_back();
+      if (step && step->kind != MapPicture::EdgeKind::kMotion) bridges.emplace_back(frames[k], step->kind);
+      if (!step || step->kind != MapPicture::EdgeKind::kMotion) runs.emplace_back();
       runs.back().push_back(frames[k]);
       if (!step) {
         placement_.avoid(at(frames[k]));
@@ -230,17 +236,17 @@ class MapPanel::Pen {
     std::vector<Vector2> points;
     for (const FrameId frame : run) points.push_back(at(frame));
     if (run.size() == 1) {
-      out_.disc(points[0], 2.6, contents_.shade(run[0]), 0, kWhite);
+      out_.disc(points[0], 2.6, contents_.shade(run[0]), 0, kWhiteColour);
       return;
     }
     constexpr std::size_t kShades = 48;  // number of pieces of different shade, which show time
     const std::size_t piece = std::max<std::size_t>(1, of / kShades);
-    out_.polyline(points, {kWhite, 4.8, 0.85, 0});
+    out_.polyline(points, {kWhiteColour, 4.8, 0.85, 0});
     for (std::size_t k = 0; k + 1 < run.size(); k += piece) {
       const std::size_t end = std::min(k + piece, run.size() - 1);
       out_.polyline(
           {points.begin() + static_cast<std::ptrdiff_t>(k), points.begin() + static_cast<std::ptrdiff_t>(end) + 1},
-          motion_stroke(EdgeKind::kMotion, contents_.shade(run[k])));
+          motion_stroke(MapPicture::EdgeKind::kMotion, contents_.shade(run[k])));
     }
     double travelled = 60;
     for (std::size_t k = 1; k < run.size(); ++k) {

@@ -15,14 +15,14 @@
 namespace relmap::client {
 namespace {
 
-constexpr Colour kPaper{252, 252, 250}, kFaint{112, 118, 126};
+constexpr Colour kPaper{252, 252, 250};
 constexpr double kMargin = 36, kLegendWidth = 236, kGap = 28, kPanelGap = 22, kCaptionLine = 19;
 constexpr double kMaxHeightAlone = 640, kMaxHeightFirst = 420, kMinHeight = 110;  // of plans
 constexpr std::size_t kMaxPanels = 24;
 
-const TextStyle kTitle{.size = 26, .colour = kInkColour, .bold = true}, kSubtitle{.size = 16, .colour = kFaint},
+const TextStyle kTitle{.size = 26, .colour = kInkColour, .bold = true}, kSubtitle{.size = 16, .colour = kFaintColour},
     kNote{.size = 16, .colour = kInkColour}, kPartTitle{.size = 15, .colour = kInkColour, .bold = true},
-    kCaption{.size = 13, .colour = kFaint};
+    kCaption{.size = 13, .colour = kFaintColour};
 
 // The number of panels in each row of the page: the first part has a row to itself.
 std::vector<std::size_t> columns_of_rows(std::size_t shown) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "proto/base/refuse.h"
 #include "proto/base/status.h"
 
 namespace relmap {
@@ -19,6 +20,21 @@ TEST(Status, SaysItsReasonFirst) {
   EXPECT_EQ(Status().to_string(), "OK");
   EXPECT_EQ(Status(Reason::TIME_BACKWARDS, "1200 us after 1300 us").to_string(),
             "TIME_BACKWARDS: 1200 us after 1300 us");
+}
+
+TEST(Status, IsThrownUnlessItIsOk) {
+  EXPECT_NO_THROW(throw_if(Status()));
+  try {
+    throw_if(Status(Reason::DISK_FULL, "no room"));
+    FAIL();
+  } catch (const StatusError& e) {
+    EXPECT_EQ(e.status().reason(), Reason::DISK_FULL);
+    EXPECT_EQ(e.status().message(), "no room");
+  }
+}
+
+TEST(Status, ARefusalStreamsItsParts) {
+  EXPECT_EQ(refuse(Reason::BAD_SIZE, 3, " parts of ", 2.5, " bytes").to_string(), "BAD_SIZE: 3 parts of 2.5 bytes");
 }
 
 TEST(Result, OrThrowCarriesTheStatus) {

@@ -40,6 +40,10 @@ class StatusError : public std::runtime_error {
   Status status_;
 };
 
+inline void throw_if(const Status& status) {
+  if (!status.ok()) throw StatusError(status);
+}
+
 // A value, or the status that says why there is none.
 template <typename T>
 class [[nodiscard]] Result {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proto/calibration/calibration_text.h"
+#include "proto/base/refuse.h"
 #include "proto/geometry/canonical_rotation.h"
 
 namespace relmap {
@@ -15,7 +15,7 @@ constexpr double kMaxTurn = 20 * 3.14159265358979323846 / 180;  // between the e
 
 template <typename... Parts>
 Status implausible(const Parts&... parts) {
-  return refuse_calibration(Reason::IMPLAUSIBLE_CALIBRATION, parts...);
+  return refuse(Reason::IMPLAUSIBLE_CALIBRATION, parts...);
 }
 
 // True if the distortion is not monotonic out to the edge of the picture, so that two rays are seen in one pixel.

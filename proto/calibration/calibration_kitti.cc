@@ -2,6 +2,7 @@
 #include <optional>
 #include <vector>
 
+#include "proto/base/refuse.h"
 #include "proto/calibration/calibration.h"
 #include "proto/calibration/calibration_text.h"
 
@@ -40,10 +41,10 @@ std::optional<std::vector<double>> numbers_of(std::string_view text, std::string
 
 // CORRUPT unless `p` is a 3x4 projection matrix of a rectified camera, [f 0 cx tx; 0 f cy 0; 0 0 1 0].
 Status check_projection(const std::vector<double>& p, std::string_view key) {
-  if (p.size() != 12) return refuse_calibration(Reason::CORRUPT, key, " is not 12 numbers");
+  if (p.size() != 12) return refuse(Reason::CORRUPT, key, " is not 12 numbers");
   for (const std::size_t zero : {1u, 4u, 8u, 9u})
-    if (p[zero] != 0) return refuse_calibration(Reason::CORRUPT, key, " is no rectified projection");
-  if (p[10] != 1) return refuse_calibration(Reason::CORRUPT, key, " is no rectified projection");
+    if (p[zero] != 0) return refuse(Reason::CORRUPT, key, " is no rectified projection");
+  if (p[10] != 1) return refuse(Reason::CORRUPT, key, " is no rectified projection");
   return {};
 }
 

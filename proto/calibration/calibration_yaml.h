@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/base/refuse.h"
 #include "proto/calibration/calibration.h"
 #include "proto/calibration/calibration_text.h"
 
@@ -22,7 +23,7 @@ struct Unreadable {
 
 template <typename... Parts>
 [[noreturn]] void fail(Reason reason, const Parts&... parts) {
-  throw Unreadable{refuse_calibration(reason, parts...)};
+  throw Unreadable{refuse(reason, parts...)};
 }
 
 // Parses `text`, whose root must be a map of names.

@@ -1,22 +1,11 @@
 #include "proto/keyframe/ingest_messages.h"
 
 #include <algorithm>
-#include <sstream>
 
 #include "proto/base/crc32c.h"
+#include "proto/base/refuse.h"
 
 namespace relmap {
-
-namespace {
-
-template <typename... Pieces>
-Status refuse(Reason reason, const Pieces&... pieces) {
-  std::ostringstream text;
-  (text << ... << pieces);
-  return {reason, text.str()};
-}
-
-}  // namespace
 
 std::uint32_t part_checksum(const KeyframePart& part) {
   ByteWriter header;

@@ -1,10 +1,10 @@
 // check_keyframe(): what can be judged from a keyframe alone.
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <vector>
 
 #include "proto/base/names.h"
+#include "proto/base/refuse.h"
 #include "proto/geometry/canonical_rotation.h"
 #include "proto/geometry/covariance.h"
 #include "proto/keyframe/extension_codec.h"
@@ -15,13 +15,6 @@ namespace relmap {
 namespace {
 
 constexpr double kMaxTranslation = 1e7;  // metres, from the odometry's origin
-
-template <typename... Parts>
-Status refuse(Reason reason, const Parts&... parts) {
-  std::ostringstream text;
-  (text << ... << parts);
-  return {reason, text.str()};
-}
 
 Status check_session(const SessionHeader& session) {
   if (session.uuid.is_nil()) return refuse(Reason::BAD_NAME, "session uuid is nil");

@@ -11,8 +11,6 @@
 namespace relmap {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 struct BadKeyframe {
   const char* name;
   Reason reason;

@@ -11,6 +11,8 @@
 
 namespace relmap {
 
+inline constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
 class KeyframeSampler {
  public:
   explicit KeyframeSampler(std::uint64_t seed) : random_(seed) {}
@@ -73,7 +75,7 @@ class KeyframeSampler {
     t.track = {static_cast<std::uint32_t>(integer(0, static_cast<int>(k.sequence))), index};
     t.u_left = static_cast<float>(uniform(60, 511));
     t.v = static_cast<float>(uniform(0, 383));
-    t.u_right = integer(0, 3) ? t.u_left - static_cast<float>(uniform(0, 50)) : std::numeric_limits<float>::quiet_NaN();
+    t.u_right = integer(0, 3) ? t.u_left - static_cast<float>(uniform(0, 50)) : kNaN;
     t.level = static_cast<std::uint8_t>(integer(0, 3));
     return t;
   }
@@ -82,7 +84,7 @@ class KeyframeSampler {
     AppearanceFeature f;
     f.u = static_cast<float>(uniform(0, 511));
     f.v = static_cast<float>(uniform(0, 383));
-    f.disparity = integer(0, 1) ? static_cast<float>(uniform(0, 40)) : std::numeric_limits<float>::quiet_NaN();
+    f.disparity = integer(0, 1) ? static_cast<float>(uniform(0, 40)) : kNaN;
     f.scale = static_cast<float>(uniform(2, 60));
     f.angle = static_cast<float>(uniform(-3, 3));
     f.track = static_cast<std::int16_t>(integer(-1, tracks - 1));

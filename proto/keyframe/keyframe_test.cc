@@ -12,8 +12,6 @@
 namespace relmap {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 TEST(KeyframeBytes, DecodeGivesBackEveryField) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     const Keyframe k = KeyframeSampler(seed).keyframe();

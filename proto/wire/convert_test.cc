@@ -13,8 +13,6 @@
 namespace relmap {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 TEST(WireReasons, UnknownNumbersReadAsInternal) {
   EXPECT_EQ(reason_from_wire(to_wire(Reason::NEW_PLACE)), Reason::NEW_PLACE);
   EXPECT_EQ(reason_from_wire(39), Reason::INTERNAL);

@@ -9,8 +9,6 @@
 namespace relmap::map {
 namespace {
 
-constexpr std::uint32_t kLap = RiddenDrive::kLap;
-
 // The closure of a frame that crosses an old path: strong, and unique. The robot never stood, so it was not carried.
 storage::ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t i) {
   storage::ClosureProposalRecord proposal = drive.as_driven(i);
@@ -25,7 +23,7 @@ storage::ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t 
 
 TEST(BeyondDoubt, ALoneClosureWithStrongGeometryIsAccepted) {
   RiddenDrive drive(5, 0);
-  const storage::Edge closure = drive.propose(crossing(drive, kLap + 2));
+  const storage::Edge closure = drive.propose(crossing(drive, kCircuit + 2));
   EXPECT_EQ(closure.state, storage::EdgeState::kAccepted);
   EXPECT_EQ(closure.reason, Reason::BEYOND_DOUBT);
 }
@@ -44,7 +42,7 @@ TEST(BeyondDoubt, MissingAnyConditionItStaysALoneCandidate) {
   };
   for (const auto& [what, change] : wanting) {
     RiddenDrive drive(5, 0);
-    storage::ClosureProposalRecord proposal = crossing(drive, kLap + 2);
+    storage::ClosureProposalRecord proposal = crossing(drive, kCircuit + 2);
     change(proposal);
     const storage::Edge closure = drive.propose(proposal);
     EXPECT_EQ(closure.state, storage::EdgeState::kCandidate) << what;
@@ -54,8 +52,8 @@ TEST(BeyondDoubt, MissingAnyConditionItStaysALoneCandidate) {
 
 TEST(BeyondDoubt, StrongGeometryDoesNotOverruleTheOdometry) {
   RiddenDrive drive(8, 0);
-  storage::ClosureProposalRecord off = drive.closure(kLap + 2);
-  const storage::ClosureProposalRecord strong = crossing(drive, kLap + 2);
+  storage::ClosureProposalRecord off = drive.closure(kCircuit + 2);
+  const storage::ClosureProposalRecord strong = crossing(drive, kCircuit + 2);
   off.inliers = strong.inliers;
   off.uniqueness = strong.uniqueness;
   EXPECT_EQ(drive.propose(off).reason, Reason::CONTRADICTS_MOTION) << "the robot was carried there, unseen";

@@ -18,8 +18,6 @@ namespace {
 
 using ::testing::IsEmpty;
 
-constexpr std::uint32_t kLap = RiddenDrive::kLap, kBeyond = 36;
-
 std::vector<EdgeId> carriers(RiddenDrive& drive) {
   return storage::find_edge(drive.map(), RiddenDrive::ride())->carried_by;
 }
@@ -27,24 +25,24 @@ std::vector<EdgeId> carriers(RiddenDrive& drive) {
 // The first closures of the second lap, every one a frame further, until they come into force: how many it took.
 std::uint32_t until_believed(RiddenDrive& drive,
                              const std::function<void(storage::ClosureProposalRecord&)>& change = {}) {
-  for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i) {
+  for (std::uint32_t i = kCircuit + 1; i < kCircuit + kBeyond; ++i) {
     storage::ClosureProposalRecord proposal = drive.closure(i);
     if (change) change(proposal);
-    if (drive.propose(proposal).state == storage::EdgeState::kAccepted) return i - kLap;
+    if (drive.propose(proposal).state == storage::EdgeState::kAccepted) return i - kCircuit;
   }
   return 0;
 }
 
 TEST(Carrying, AgreeingClosuresOverSomeMetresMeanThatTheRobotWasCarriedWhereItStood) {
   RiddenDrive drive(kBeyond);
-  const std::uint32_t first = kLap + 1;
+  const std::uint32_t first = kCircuit + 1;
   EXPECT_EQ(drive.propose(drive.closure(first)).reason, Reason::CONTRADICTS_MOTION)
       << "one place may look like another";
   EXPECT_EQ(drive.propose(drive.closure(first + 1)).reason, Reason::CONTRADICTS_MOTION) << "and two";
   EXPECT_THAT(carriers(drive), IsEmpty());
   std::uint32_t i = first + 2;
-  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != storage::EdgeState::kAccepted) ++i;
-  ASSERT_LT(i, kLap + kBeyond);
+  while (i < kCircuit + kBeyond && drive.propose(drive.closure(i)).state != storage::EdgeState::kAccepted) ++i;
+  ASSERT_LT(i, kCircuit + kBeyond);
   EXPECT_GE(0.2 * (i - first), 2) << "metres that they go on at least";
   for (std::uint32_t k = first; k <= i; ++k) {
     EXPECT_EQ(drive.closure_of(k).state, storage::EdgeState::kAccepted)
@@ -96,8 +94,8 @@ TEST(Carrying, PlacesThatAreNotUniqueOrLookDifferentAreNoEvidence) {
 
 TEST(Carrying, LaterClosuresAreTestedAgainstTheMeasuredRide) {
   RiddenDrive drive(kBeyond);
-  const std::uint32_t believed = kLap + until_believed(drive);
-  ASSERT_GT(believed, kLap);
+  const std::uint32_t believed = kCircuit + until_believed(drive);
+  ASSERT_GT(believed, kCircuit);
   const storage::Edge right = drive.propose(drive.closure(believed + 1));
   EXPECT_EQ(right.state, storage::EdgeState::kAccepted);
   EXPECT_EQ(right.reason, Reason::CARRIED) << "it vouches for the ride, too";
@@ -121,8 +119,8 @@ void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAcce
 
 TEST(Carrying, RemovingAndRestoringAClosureRemovesAndRestoresTheRide) {
   RiddenDrive drive(kBeyond), without(kBeyond);
-  const std::uint32_t believed = kLap + until_believed(drive);
-  ASSERT_GT(believed, kLap);
+  const std::uint32_t believed = kCircuit + until_believed(drive);
+  ASSERT_GT(believed, kCircuit);
   const auto before = carriers(drive);
   const EdgeId any = drive.closure_of(believed).id;
   drive.drive().apply(storage::SetEdgeStateRecord{any, storage::EdgeState::kRemoved, "test"});
@@ -148,12 +146,12 @@ TEST(Carrying, RemovingAndRestoringAClosureRemovesAndRestoresTheRide) {
 
 TEST(Carrying, MoreClosuresThatAgreeWithTheOdometryOverturnARide) {
   RiddenDrive drive(kBeyond);
-  const std::uint32_t believed = kLap + until_believed(drive);
-  ASSERT_GT(believed, kLap);
-  ASSERT_LE(believed + 3, kLap + kBeyond);
+  const std::uint32_t believed = kCircuit + until_believed(drive);
+  ASSERT_GT(believed, kCircuit);
+  ASSERT_LE(believed + 3, kCircuit + kBeyond);
   // Most of the frames behind are seen where the odometry has them.
   std::uint32_t needed = 0;
-  for (std::uint32_t i = kLap + 1; i < kLap + kBeyond && !carriers(drive).empty(); ++i, ++needed) {
+  for (std::uint32_t i = kCircuit + 1; i < kCircuit + kBeyond && !carriers(drive).empty(); ++i, ++needed) {
     storage::ClosureProposalRecord driven = drive.as_driven(i);
     driven.match.index += 1;  // frames are recognised once each with each place
     const auto match = drive.map().hot(driven.match), query = drive.map().hot(driven.query);
@@ -162,7 +160,7 @@ TEST(Carrying, MoreClosuresThatAgreeWithTheOdometryOverturnARide) {
   }
   EXPECT_THAT(carriers(drive), IsEmpty()) << needed;
   EXPECT_GT(needed, 3u) << "not by a few";
-  for (std::uint32_t k = kLap + 1; k <= believed; ++k)
+  for (std::uint32_t k = kCircuit + 1; k <= believed; ++k)
     for (const storage::Edge& edge : drive.map().hot(RiddenDrive::frame(k))->edges)
       if (edge.carried.session != 0) {
         EXPECT_EQ(edge.state, storage::EdgeState::kQuarantined) << k;
@@ -173,9 +171,9 @@ TEST(Carrying, MoreClosuresThatAgreeWithTheOdometryOverturnARide) {
 TEST(Carrying, ClosuresAcrossTheRideThatAgreeWithTheOdometrySpeakAgainstIt) {
   RiddenDrive drive(kBeyond);
   // Recognised from behind the ride in the same places as the odometry has it: it cannot have been carried.
-  for (const std::uint32_t i : {kLap + 1, kLap + 3}) drive.propose(drive.as_driven(i));
-  ASSERT_EQ(drive.closure_of(kLap + 3).state, storage::EdgeState::kAccepted);
-  for (std::uint32_t i = kLap + 4; i < kLap + kBeyond; ++i)
+  for (const std::uint32_t i : {kCircuit + 1, kCircuit + 3}) drive.propose(drive.as_driven(i));
+  ASSERT_EQ(drive.closure_of(kCircuit + 3).state, storage::EdgeState::kAccepted);
+  for (std::uint32_t i = kCircuit + 4; i < kCircuit + kBeyond; ++i)
     EXPECT_EQ(drive.propose(drive.closure(i)).state, storage::EdgeState::kCandidate) << i;
   EXPECT_THAT(carriers(drive), IsEmpty());
 }
@@ -205,25 +203,25 @@ TEST(Carrying, ClosuresWhoseMotionIsUntestedDoNotSpeakAgainstARide) {
   constexpr std::uint32_t kBlindStep = 6;
   drive.map().edit_hot(RiddenDrive::frame(kBlindStep)).edges.front().source = MotionSource::kUnsensed;
   // They lead across the ride and over motion that nothing sensed, and came into force because they agree.
-  for (const std::uint32_t i : {1u, 3u}) drive.propose(drive.as_driven(kLap + i));
-  for (const std::uint32_t i : {16u, 18u}) drive.propose(driven_from(drive, kLap + i, i - 14));
+  for (const std::uint32_t i : {1u, 3u}) drive.propose(drive.as_driven(kCircuit + i));
+  for (const std::uint32_t i : {16u, 18u}) drive.propose(driven_from(drive, kCircuit + i, i - 14));
   for (const std::uint32_t i : {1u, 3u, 16u, 18u}) {
-    const storage::Edge closure = drive.closure_of(kLap + i);
+    const storage::Edge closure = drive.closure_of(kCircuit + i);
     ASSERT_EQ(closure.state, storage::EdgeState::kAccepted) << i;
     EXPECT_EQ(test_motion(drive.map(), closure).verdict, MotionVerdict::kUntested);
   }
-  std::uint32_t i = kLap + kBlindStep + 2;
-  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != storage::EdgeState::kAccepted) ++i;
-  EXPECT_LT(i, kLap + kBeyond);
+  std::uint32_t i = kCircuit + kBlindStep + 2;
+  while (i < kCircuit + kBeyond && drive.propose(drive.closure(i)).state != storage::EdgeState::kAccepted) ++i;
+  EXPECT_LT(i, kCircuit + kBeyond);
   EXPECT_FALSE(carriers(drive).empty());
 }
 
 TEST(Carrying, ClosuresAcceptedByAnOperatorSpeakAgainstARideToo) {
   RiddenDrive drive(kBeyond);
-  const storage::Edge driven = drive.propose(drive.as_driven(kLap + 20));
+  const storage::Edge driven = drive.propose(drive.as_driven(kCircuit + 20));
   ASSERT_EQ(driven.reason, Reason::LONE);
   decide(drive, driven.id);
-  const auto ride = candidates(drive, kLap + 1, 15);
+  const auto ride = candidates(drive, kCircuit + 1, 15);
   const CarryingEvidence evidence = weigh_carrying(drive.map(), ride);
   EXPECT_GT(evidence.metres, 2);
   EXPECT_EQ(evidence.stretch.session, 0u) << "it covers the ride, and agrees with the odometry";
@@ -235,9 +233,9 @@ TEST(Carrying, OfManyClosuresOverTheSameStepsFewAreTested) {
   RiddenDrive drive(kBeyond);
   std::size_t reads[2] = {};
   for (const std::uint32_t many : {2u, 20u}) {
-    for (std::uint32_t i = 1; i <= many; ++i) drive.propose(drive.as_driven(kLap + i));
-    ASSERT_EQ(drive.closure_of(kLap + many).state, storage::EdgeState::kAccepted);
-    const auto ride = candidates(drive, kLap + many + 1, 4);
+    for (std::uint32_t i = 1; i <= many; ++i) drive.propose(drive.as_driven(kCircuit + i));
+    ASSERT_EQ(drive.closure_of(kCircuit + many).state, storage::EdgeState::kAccepted);
+    const auto ride = candidates(drive, kCircuit + many + 1, 4);
     const CountingGraph counting(drive.map());
     EXPECT_EQ(weigh_carrying(counting, ride).stretch.session, 0u);
     reads[many > 2] = counting.hot_reads();
@@ -247,7 +245,7 @@ TEST(Carrying, OfManyClosuresOverTheSameStepsFewAreTested) {
 
 TEST(Carrying, AnOperatorsAcceptanceImpliesARideWithoutAStop) {
   RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
-  const std::uint32_t named = kLap + 10;
+  const std::uint32_t named = kCircuit + 10;
   const storage::Edge closure = drive.propose(drive.closure(named));
   without.propose(without.closure(named));
   ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
@@ -281,7 +279,7 @@ TEST(Carrying, AnOperatorsAcceptanceImpliesARideWithoutAStop) {
 
 TEST(Carrying, ClosuresThatDependOnAnAcceptanceGoWithIt) {
   RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
-  const std::uint32_t named = kLap + 10;
+  const std::uint32_t named = kCircuit + 10;
   const EdgeId word = drive.propose(drive.closure(named)).id;
   without.propose(without.closure(named));
   decide(drive, word);
@@ -303,25 +301,25 @@ TEST(Carrying, ClosuresThatDependOnAnAcceptanceGoWithIt) {
 
 TEST(Carrying, ClosuresThatProveARideByThemselvesOutliveTheAcceptance) {
   RiddenDrive drive(kBeyond);
-  const EdgeId word = drive.propose(drive.closure(kLap + 1)).id;
+  const EdgeId word = drive.propose(drive.closure(kCircuit + 1)).id;
   decide(drive, word);
-  for (std::uint32_t i = kLap + 2; i < kLap + kBeyond; ++i)
+  for (std::uint32_t i = kCircuit + 2; i < kCircuit + kBeyond; ++i)
     ASSERT_EQ(drive.propose(drive.closure(i)).reason, Reason::CARRIED) << i;
   decide(drive, word, EdgeAction::kWithdraw);
-  EXPECT_EQ(drive.closure_of(kLap + 20).state, storage::EdgeState::kAccepted)
+  EXPECT_EQ(drive.closure_of(kCircuit + 20).state, storage::EdgeState::kAccepted)
       << "the robot stood there, and was seen to be away";
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
 TEST(Carrying, AWithdrawnAcceptanceLeavesNoRideBehind) {
   RiddenDrive drive(kBeyond, 0);
-  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
+  const storage::Edge closure = drive.propose(drive.closure(kCircuit + 10));
   decide(drive, closure.id);
   decide(drive, closure.id, EdgeAction::kWithdraw);
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, closure.carried);
+  EXPECT_EQ(drive.closure_of(kCircuit + 10).carried, closure.carried);
   const std::uint64_t before = storage::hash_map(drive.map()).structure;
   decide(drive, closure.id);
-  EXPECT_NE(drive.closure_of(kLap + 10).carried, closure.carried) << "and can be given again";
+  EXPECT_NE(drive.closure_of(kCircuit + 10).carried, closure.carried) << "and can be given again";
   decide(drive, closure.id, EdgeAction::kWithdraw);
   EXPECT_EQ(storage::hash_map(drive.map()).structure, before);
 }
@@ -330,35 +328,35 @@ TEST(Carrying, AWithdrawnAcceptanceLeavesNoRideBehind) {
 TEST(Carrying, AnAcceptedRideLiesWhereNoClosureAgreesWithTheOdometry) {
   RiddenDrive drive(kBeyond, 0);
   constexpr std::uint32_t kSeen = RiddenDrive::kAlights + 9;
-  for (const std::uint32_t i : {1u, 4u, 12u}) drive.propose(driven_from(drive, kLap + i, kSeen + i));
+  for (const std::uint32_t i : {1u, 4u, 12u}) drive.propose(driven_from(drive, kCircuit + i, kSeen + i));
   for (const std::uint32_t i : {4u, 12u})
-    ASSERT_EQ(drive.closure_of(kLap + i).state, storage::EdgeState::kAccepted) << i;
-  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
+    ASSERT_EQ(drive.closure_of(kCircuit + i).state, storage::EdgeState::kAccepted) << i;
+  const storage::Edge closure = drive.propose(drive.closure(kCircuit + 10));
   ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
   decide(drive, closure.id);
   const std::uint32_t seen = RiddenDrive::frame(kSeen + 1).index;
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, seen - 1, seen}));
+  EXPECT_EQ(drive.closure_of(kCircuit + 10).carried, (storage::FrameRange{kDriveSession, seen - 1, seen}));
   for (const std::uint32_t i : {1u, 4u, 12u})
-    EXPECT_EQ(drive.closure_of(kLap + i).state, storage::EdgeState::kAccepted) << i << ": it lies behind the ride";
-  EXPECT_EQ(drive.propose(drive.closure(kLap + 13)).reason, Reason::CARRIED);
+    EXPECT_EQ(drive.closure_of(kCircuit + i).state, storage::EdgeState::kAccepted) << i << ": it lies behind the ride";
+  EXPECT_EQ(drive.propose(drive.closure(kCircuit + 13)).reason, Reason::CARRIED);
 }
 
 TEST(Carrying, AnAcceptedRideIsPlacedAtTheRobotsStop) {
   RiddenDrive drive(kBeyond, 1);  // too short to say anything by itself
-  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
+  const storage::Edge closure = drive.propose(drive.closure(kCircuit + 10));
   decide(drive, closure.id);
   const std::uint32_t alights = RiddenDrive::frame(RiddenDrive::kAlights).index;
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, alights - 1, alights}));
+  EXPECT_EQ(drive.closure_of(kCircuit + 10).carried, (storage::FrameRange{kDriveSession, alights - 1, alights}));
 }
 
 TEST(Carrying, CandidatesOfTheSameRideNarrowDownWhereItWas) {
   RiddenDrive drive(kBeyond, 0);
-  candidates(drive, kLap + 5, 2);
-  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
+  candidates(drive, kCircuit + 5, 2);
+  const storage::Edge closure = drive.propose(drive.closure(kCircuit + 10));
   decide(drive, closure.id);
-  const std::uint32_t first = RiddenDrive::frame(kLap + 5).index;
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, first - 1, first}));
-  EXPECT_EQ(drive.closure_of(kLap + 6).state, storage::EdgeState::kCandidate) << "the word is about one closure";
+  const std::uint32_t first = RiddenDrive::frame(kCircuit + 5).index;
+  EXPECT_EQ(drive.closure_of(kCircuit + 10).carried, (storage::FrameRange{kDriveSession, first - 1, first}));
+  EXPECT_EQ(drive.closure_of(kCircuit + 6).state, storage::EdgeState::kCandidate) << "the word is about one closure";
 }
 
 }  // namespace

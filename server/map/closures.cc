@@ -37,10 +37,6 @@ bool can_be_bound(const storage::Graph& graph, LandmarkId id) {
   return hot && id.slot < hot->landmarks.size() && !is_going(graph, id.base);
 }
 
-bool taken_in_before(const storage::Graph& graph, FrameId a, FrameId b) {
-  return storage::taken_in(*graph.hot(a)) < storage::taken_in(*graph.hot(b));
-}
-
 // Stores the claim that the landmark of observation `index` of `frame` is `target`, or, if `target` is invalid, that it
 // is not needed. False if there was nothing to store.
 bool store_claim(storage::EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
@@ -399,6 +395,10 @@ void carry_where_needed(storage::EditableGraph& map, const std::set<EdgeId>& clo
     seeds->push_back(edge.a);
     seeds->push_back(edge.b);
   }
+}
+
+bool taken_in_before(const storage::Graph& graph, FrameId a, FrameId b) {
+  return storage::taken_in(*graph.hot(a)) < storage::taken_in(*graph.hot(b));
 }
 
 bool is_going(const storage::Graph& graph, FrameId frame) {

@@ -64,6 +64,9 @@ std::uint64_t& closure_counter(storage::MapState& state, storage::EdgeState of);
 // Whether no path of at most `spacing` edges joins the two frames, so that a closure between them becomes an edge.
 bool far_apart(const storage::Graph& graph, FrameId a, FrameId b, std::uint32_t spacing);
 
+// Whether the map took in frame `a` before frame `b`. It has both.
+bool taken_in_before(const storage::Graph& graph, FrameId a, FrameId b);
+
 // Whether the frame's session is being deleted. Such a frame takes part in nothing new.
 bool is_going(const storage::Graph& graph, FrameId frame);
 

@@ -12,13 +12,13 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr std::uint32_t kFrames = 40;
-
 SE3 ahead(double metres) { return {Matrix3::Identity(), {0, 0, metres}}; }
 
 // Two sessions along the same street, a frame a metre, the second exactly where the first was.
 class Consistency : public ::testing::Test {
  protected:
+  static constexpr std::uint32_t kFrames = 40;
+
   void SetUp() override {
     for (SessionNumber session : {1, 2}) {
       graph_.add_session(session, {300, 160, 120, 0.1, 320, 240});

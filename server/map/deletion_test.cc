@@ -21,22 +21,23 @@
 namespace relmap::map {
 namespace {
 
-constexpr std::uint32_t kLap = 136;  // keyframes: two chunks and a part of a third
 constexpr SessionNumber kRobots = 3;
-
-sim::PointsWorldOptions circuit(SessionNumber robots) {
-  sim::PointsWorldOptions options;
-  options.frames = robots * kLap;
-  options.frames_per_lap = kLap;
-  options.births = 18;
-  options.pixel_noise = 0.5;
-  return options;
-}
 
 // Robots drive round the same circuit, a lap each: robot r is session r. What one sees again is told by closures.
 class Robots : public ::testing::Test {
  protected:
+  static constexpr std::uint32_t kLap = 136;  // keyframes: two chunks and a part of a third
+
   explicit Robots(SessionNumber robots) : world_(circuit(robots)) {}
+
+  static sim::PointsWorldOptions circuit(SessionNumber robots) {
+    sim::PointsWorldOptions options;
+    options.frames = robots * kLap;
+    options.frames_per_lap = kLap;
+    options.births = 18;
+    options.pixel_noise = 0.5;
+    return options;
+  }
 
   storage::Map& map() { return drive_->map(); }
   std::uint32_t in_world(FrameId frame) const { return (frame.session - 1) * kLap + frame.index; }

@@ -8,8 +8,6 @@
 namespace relmap::map {
 namespace {
 
-constexpr std::uint32_t kFrames = 90, kLap = 40;
-
 Extensions told(std::uint8_t what) { return {{1000, {what}}, {2000, {1, 2, 3}}}; }
 
 // Each record as it stands in the journal.
@@ -19,6 +17,8 @@ storage::JournalRecord written(const storage::JournalRecord& record) {
 
 class LaterExtensions : public ::testing::Test {
  protected:
+  static constexpr std::uint32_t kFrames = 90, kLap = 40;
+
   LaterExtensions() {
     sim::PointsWorldOptions options;
     options.frames = kFrames;

@@ -9,8 +9,6 @@
 namespace relmap::map {
 namespace {
 
-constexpr StereoCamera kStereo{400, 256, 192, 0.12, 512, 384}, kMono{400, 256, 192, 0, 512, 384};
-
 // Frames 0 .. count - 1 of session 1, a second apart.
 place::HandMadeGraph session_of(const StereoCamera& camera, std::uint32_t count, std::int64_t apart_us = 1'000'000) {
   place::HandMadeGraph graph;
@@ -25,24 +23,24 @@ place::HandMadeGraph session_of(const StereoCamera& camera, std::uint32_t count,
 }
 
 TEST(FirstRecent, IsTwentyFramesBackInAMonoSessionToo) {
-  EXPECT_EQ(first_recent(session_of(kStereo, 100), {1, 70}), 50u);
-  EXPECT_EQ(first_recent(session_of(kMono, 100), {1, 70}), 50u);
-  EXPECT_EQ(first_recent(session_of(kMono, 100), {1, 7}), 0u);
+  EXPECT_EQ(first_recent(session_of(place::kStereoCamera, 100), {1, 70}), 50u);
+  EXPECT_EQ(first_recent(session_of(place::kMonoCamera, 100), {1, 70}), 50u);
+  EXPECT_EQ(first_recent(session_of(place::kMonoCamera, 100), {1, 7}), 0u);
 }
 
 TEST(FirstRecent, IsTenSecondsBackWherePicturesComeFast) {
-  EXPECT_EQ(first_recent(session_of(kStereo, 100, 200'000), {1, 70}), 20u);
-  EXPECT_EQ(first_recent(session_of(kMono, 100, 200'000), {1, 70}), 20u);
+  EXPECT_EQ(first_recent(session_of(place::kStereoCamera, 100, 200'000), {1, 70}), 20u);
+  EXPECT_EQ(first_recent(session_of(place::kMonoCamera, 100, 200'000), {1, 70}), 20u);
 }
 
 TEST(FirstRecent, IsAThousandFramesBackAtMost) {
-  EXPECT_EQ(first_recent(session_of(kStereo, 1300, 1), {1, 1250}), 250u);
-  EXPECT_EQ(first_recent(session_of(kMono, 1300, 1), {1, 1250}), 250u);
+  EXPECT_EQ(first_recent(session_of(place::kStereoCamera, 1300, 1), {1, 1250}), 250u);
+  EXPECT_EQ(first_recent(session_of(place::kMonoCamera, 1300, 1), {1, 1250}), 250u);
 }
 
 TEST(FirstRecent, EndsWhereAMonoSessionIsBroken) {
   place::HandMadeGraph graph;
-  graph.add_session(1, kMono);
+  graph.add_session(1, place::kMonoCamera);
   for (std::uint32_t i = 0; i < 40; ++i)
     if (i != 20 && (i < 30 || i > 33)) graph.add_frame({1, i});
   EXPECT_EQ(first_recent(graph, {1, 36}), 34u) << "four are missing";

@@ -77,10 +77,6 @@ place::VerifiedPlace turned_round(place::VerifiedPlace found, FrameId match) {
   return found;
 }
 
-bool taken_in_before(const storage::Graph& view, FrameId a, FrameId b) {
-  return view.hot(a)->journal_sequence < view.hot(b)->journal_sequence;
-}
-
 class Proposer {
  public:
   Proposer(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures)

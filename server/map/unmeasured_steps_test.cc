@@ -78,46 +78,46 @@ class BlindDrive {
   PointsDrive drive_;
 };
 
-constexpr std::uint32_t kBlind = 18;
+constexpr std::uint32_t kGuessed = 18;  // the step to this frame is a guess
 
 class UnmeasuredStep : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(UnmeasuredStep, IsMeasuredByTheClosuresAcrossIt) {
-  BlindDrive drive(kShortLap, {kBlind}, mistake(GetParam()));
-  ASSERT_TRUE(storage::is_unmeasured(drive.step(kBlind)));
-  EXPECT_GT(drive.metres_off(kBlind), 1);
-  for (std::uint32_t query = kBlind + 2; query < kBlind + 10; query += 2) drive.propose(query);
+  BlindDrive drive(kShortLap, {kGuessed}, mistake(GetParam()));
+  ASSERT_TRUE(storage::is_unmeasured(drive.step(kGuessed)));
+  EXPECT_GT(drive.metres_off(kGuessed), 1);
+  for (std::uint32_t query = kGuessed + 2; query < kGuessed + 10; query += 2) drive.propose(query);
   ASSERT_EQ(drive.map().state().closures_accepted, 4u);
-  EXPECT_FALSE(storage::is_unmeasured(drive.step(kBlind)));
-  EXPECT_LT(drive.metres_off(kBlind), 0.05);
+  EXPECT_FALSE(storage::is_unmeasured(drive.step(kGuessed)));
+  EXPECT_LT(drive.metres_off(kGuessed), 0.05);
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
 TEST_P(UnmeasuredStep, IsTheGuessAgainWhenTheyAreRemoved) {
-  BlindDrive drive(kShortLap, {kBlind}, mistake(GetParam()));
-  const storage::Edge before = drive.step(kBlind);
-  for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
-  ASSERT_LT(drive.metres_off(kBlind), 0.1);
+  BlindDrive drive(kShortLap, {kGuessed}, mistake(GetParam()));
+  const storage::Edge before = drive.step(kGuessed);
+  for (const std::uint32_t query : {kGuessed + 2, kGuessed + 4}) drive.propose(query);
+  ASSERT_LT(drive.metres_off(kGuessed), 0.1);
   drive.drive().apply(
-      storage::SetEdgeStateRecord{drive.closure(kBlind + 2), storage::EdgeState::kRemoved, "that is another room"});
+      storage::SetEdgeStateRecord{drive.closure(kGuessed + 2), storage::EdgeState::kRemoved, "that is another room"});
   ASSERT_EQ(drive.map().state().closures_accepted, 0u);
-  const storage::Edge after = drive.step(kBlind);
+  const storage::Edge after = drive.step(kGuessed);
   EXPECT_TRUE(storage::is_unmeasured(after));
   EXPECT_LT((before.T_ab.inverse() * after.T_ab).log().norm(), 1e-9);
   EXPECT_EQ(after.covariance, after.prior_covariance) << "as badly known";
   EXPECT_EQ(after.correlation_with_previous, storage::Edge().correlation_with_previous);
-  EXPECT_EQ(drive.step(kBlind + 1).correlation_with_previous, storage::Edge().correlation_with_previous);
+  EXPECT_EQ(drive.step(kGuessed + 1).correlation_with_previous, storage::Edge().correlation_with_previous);
 }
 
 INSTANTIATE_TEST_SUITE_P(Guesses, UnmeasuredStep, ::testing::Range(std::uint64_t{0}, std::uint64_t{12}));
 
 TEST(UnmeasuredSteps, AreEachMeasuredByAnotherClosure) {
-  constexpr std::uint32_t kAgain = kBlind + 5;
-  BlindDrive drive(kShortLap, {kBlind, kAgain}, mistake(3));
+  constexpr std::uint32_t kAgain = kGuessed + 5;
+  BlindDrive drive(kShortLap, {kGuessed, kAgain}, mistake(3));
   // The first two come into force together: one leads across the first step, the other across both.
-  for (const std::uint32_t query : {kBlind + 2, kAgain + 2, kBlind + 4, kAgain + 4}) drive.propose(query);
+  for (const std::uint32_t query : {kGuessed + 2, kAgain + 2, kGuessed + 4, kAgain + 4}) drive.propose(query);
   ASSERT_EQ(drive.map().state().closures_accepted, 4u);
-  EXPECT_LT(drive.metres_off(kBlind), 0.1);
+  EXPECT_LT(drive.metres_off(kGuessed), 0.1);
   EXPECT_LT(drive.metres_off(kAgain), 0.1);
 }
 
@@ -132,20 +132,20 @@ TEST(UnmeasuredSteps, AreNotSetByClosuresThatAreEdges) {
 
 TEST(UnmeasuredSteps, AreNotSetAgainstAnAccurateGuess) {
   // The closures are a metre off, and the guess is known to centimetres: they are not believed of it.
-  BlindDrive drive(kShortLap, {kBlind}, mistake(5), 0.05);
-  const storage::Edge before = drive.step(kBlind);
-  for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
+  BlindDrive drive(kShortLap, {kGuessed}, mistake(5), 0.05);
+  const storage::Edge before = drive.step(kGuessed);
+  for (const std::uint32_t query : {kGuessed + 2, kGuessed + 4}) drive.propose(query);
   EXPECT_EQ(drive.map().state().closures_accepted, 0u) << "they contradict the motion";
-  EXPECT_LT((before.T_ab.inverse() * drive.step(kBlind).T_ab).log().norm(), 1e-9);
+  EXPECT_LT((before.T_ab.inverse() * drive.step(kGuessed).T_ab).log().norm(), 1e-9);
 }
 
 TEST(UnmeasuredSteps, OfFrozenSessionsAreNotSet) {
-  BlindDrive drive(kShortLap, {kBlind}, mistake(7));
-  const storage::Edge before = drive.step(kBlind);
+  BlindDrive drive(kShortLap, {kGuessed}, mistake(7));
+  const storage::Edge before = drive.step(kGuessed);
   drive.drive().apply(storage::SetSessionStateRecord{kDriveSession, storage::SessionState::kFrozen});
-  for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
+  for (const std::uint32_t query : {kGuessed + 2, kGuessed + 4}) drive.propose(query);
   ASSERT_EQ(drive.map().state().closures_accepted, 2u);
-  EXPECT_LT((before.T_ab.inverse() * drive.step(kBlind).T_ab).log().norm(), 1e-9);
+  EXPECT_LT((before.T_ab.inverse() * drive.step(kGuessed).T_ab).log().norm(), 1e-9);
 }
 
 }  // namespace

@@ -19,8 +19,6 @@ constexpr double kNoneByChance = 0.01;  // probability that nothing is found in 
 
 // Of features.
 constexpr int kMinPerCell = 3;
-constexpr double kNearRadius = 0.02;     // of the picture's width
-constexpr double kMaxNearer = 1.5;       // ratio of viewing distances beyond which a feature looks different
 constexpr double kOnePointPixels = 1.5;  // points of a cell that are closer together than this count once
 
 // The cell of a pixel of the left picture. A pixel outside the picture is counted in the nearest cell.

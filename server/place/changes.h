@@ -17,6 +17,9 @@ namespace relmap::place {
 inline constexpr int kPictureColumns = 8, kPictureRows = 6;
 inline constexpr std::size_t kPictureCells = kPictureColumns * kPictureRows;
 
+// The ratio of viewing distances beyond which a point may look different.
+inline constexpr double kMaxNearer = 1.5;
+
 // An old landmark that should be in the picture at about the distance from which it was seen before.
 struct SoughtLandmark {
   Vector2 expected;    // pixels

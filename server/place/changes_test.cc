@@ -8,7 +8,7 @@
 namespace relmap::place {
 namespace {
 
-constexpr StereoCamera kCamera{400, 319.5, 239.5, 0.12, 640, 480};
+constexpr StereoCamera kVgaRig{400, 319.5, 239.5, 0.12, 640, 480};
 
 // `per_cell` landmarks in each cell, of which `share` are found; none in the first `changed` cells.
 std::vector<SoughtLandmark> look(int per_cell, double share, std::size_t changed, std::size_t cells = kPictureCells) {
@@ -24,28 +24,28 @@ std::vector<SoughtLandmark> look(int per_cell, double share, std::size_t changed
 }
 
 TEST(Changes, CellsInWhichNothingIsFoundWhileElsewhereMostIsHaveChanged) {
-  EXPECT_EQ(changes(look(6, 0.85, 0), kCamera), (Changes{48, 0}));
-  EXPECT_EQ(changes(look(6, 0.85, 7), kCamera), (Changes{48, 7}));
+  EXPECT_EQ(changes(look(6, 0.85, 0), kVgaRig), (Changes{48, 0}));
+  EXPECT_EQ(changes(look(6, 0.85, 7), kVgaRig), (Changes{48, 7}));
 }
 
 TEST(Changes, CellsAreNotComparedWhereLittleIsFoundAnywhere) {
-  EXPECT_EQ(changes(look(6, 0.3, 7), kCamera), Changes()) << "0.7^6 is a tenth";
-  const Changes dim = changes(look(20, 0.3, 7), kCamera);
+  EXPECT_EQ(changes(look(6, 0.3, 7), kVgaRig), Changes()) << "0.7^6 is a tenth";
+  const Changes dim = changes(look(20, 0.3, 7), kVgaRig);
   EXPECT_EQ(dim, (Changes{48, 7})) << "0.7^20 is a thousandth";
 }
 
 TEST(Changes, TooFewCellsAreNotCompared) {
-  EXPECT_EQ(changes({}, kCamera), Changes());
-  EXPECT_EQ(changes(look(6, 0.9, 2, 7), kCamera), Changes());
-  EXPECT_EQ(changes(look(6, 0.9, 2, 8), kCamera), (Changes{8, 2}));
-  EXPECT_EQ(changes(look(6, 0, 0), kCamera), Changes()) << "nothing is found at all";
-  EXPECT_EQ(changes(look(1, 1, 0), kCamera), Changes()) << "one landmark is no part of a picture";
+  EXPECT_EQ(changes({}, kVgaRig), Changes());
+  EXPECT_EQ(changes(look(6, 0.9, 2, 7), kVgaRig), Changes());
+  EXPECT_EQ(changes(look(6, 0.9, 2, 8), kVgaRig), (Changes{8, 2}));
+  EXPECT_EQ(changes(look(6, 0, 0), kVgaRig), Changes()) << "nothing is found at all";
+  EXPECT_EQ(changes(look(1, 1, 0), kVgaRig), Changes()) << "one landmark is no part of a picture";
 }
 
 TEST(Changes, PointsOutsideThePictureCountInTheCellAtItsEdge) {
   std::vector<SoughtLandmark> sought = look(6, 1, 0);
   for (int n = 0; n < 6; ++n) sought.push_back({{700, -5}, false});
-  EXPECT_EQ(changes(sought, kCamera), (Changes{48, 0}));
+  EXPECT_EQ(changes(sought, kVgaRig), (Changes{48, 0}));
 }
 
 TEST(Changes, ARivalIsToldApartByManyMoreChanges) {

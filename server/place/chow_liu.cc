@@ -1,6 +1,5 @@
 #include "server/place/chow_liu.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -34,7 +33,7 @@ class Presence {
   std::vector<std::size_t> counts_;
 };
 
-float clip(double p) { return static_cast<float>(std::clamp(p, kProbabilityFloor, 1 - kProbabilityFloor)); }
+float clip(double p) { return static_cast<float>(clip_probability(p)); }
 
 }  // namespace
 

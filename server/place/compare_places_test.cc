@@ -14,13 +14,12 @@
 namespace relmap::place {
 namespace {
 
-constexpr StereoCamera kMono{400, 256, 192, 0, 512, 384};
-constexpr std::uint32_t kPlaces = 60, kFar = 20;  // kFar frames apart, so that no place is another's neighbour
-
 class ComparePlaces : public ::testing::Test {
  protected:
+  static constexpr std::uint32_t kPlaces = 60, kFar = 20;  // kFar frames apart, so that no place is another's neighbour
+
   ComparePlaces() {
-    graph_.add_session(1, kMono);
+    graph_.add_session(1, kMonoCamera);
     for (std::uint32_t i = 0; i < kPlaces; ++i) pictures_.push_back(picture(i));
   }
   // All places show nearly the same words but with different descriptors.

@@ -22,6 +22,10 @@ struct DescriptorMatch {
 inline constexpr double kDescriptorRatio = 0.8;
 inline constexpr std::uint32_t kMaxDescriptorDistance = 270 * 270;  // squared; a descriptor's norm is 512
 
+// A feature that shows a point is at most this far from where a good pose projects the point, as a share of the
+// picture's width.
+inline constexpr double kNearRadius = 0.02;
+
 // Returns mutual nearest neighbours that pass the ratio test, ascending by feature. `same(p, q)` says that points p and
 // q are one point of the world, so that they do not compete in the ratio test. `possible(f, p)` says that feature f may
 // be point p; if empty, every pair is possible.

@@ -15,11 +15,11 @@ namespace {
 
 constexpr double kGatePixels = 2;
 constexpr double kConfidence = 0.999;
-constexpr double kOnePlane = 0.9;     // share of a fundamental matrix's inliers from which a homography is preferred
-constexpr std::size_t kToBegin = 12;  // minimum number of inliers with which features are matched again near by
-constexpr double kNear = 0.04;        // search radius, as a share of the width over which the query's features lie
-constexpr std::size_t kAround = 3;    // nearest inliers that predict the position of a feature
-constexpr double kTogether = 5;       // pixels: inliers closer than this have about the same weight
+constexpr double kOnePlane = 0.9;       // share of a fundamental matrix's inliers from which a homography is preferred
+constexpr std::size_t kToBegin = 12;    // minimum number of inliers with which features are matched again near by
+constexpr double kSearchRadius = 0.04;  // a share of the width over which the query's features lie
+constexpr std::size_t kAround = 3;      // nearest inliers that predict the position of a feature
+constexpr double kTogether = 5;         // pixels: inliers closer than this have about the same weight
 
 struct Geometry {
   std::vector<DescriptorMatch> inliers;
@@ -71,11 +71,11 @@ class Views {
     return best;
   }
 
-  // Matches within kNear of the position that the nearest inliers predict for a feature of the map.
+  // Matches within kSearchRadius of the position that the nearest inliers predict for a feature of the map.
   std::vector<DescriptorMatch> match_near(const std::vector<DescriptorMatch>& inliers) const {
     const auto [left_most, right_most] =
         std::minmax_element(query_.begin(), query_.end(), [](const auto& l, const auto& r) { return l.u < r.u; });
-    const double radius = kNear * (right_most->u - left_most->u);
+    const double radius = kSearchRadius * (right_most->u - left_most->u);
     const auto from = [&](const DescriptorMatch& match) { return at(map_[match.point]); };
     Eigen::MatrixXd A(inliers.size(), 3), B(inliers.size(), 2);  // a rough affine map, and below its residuals
     for (std::size_t i = 0; i < inliers.size(); ++i) {

@@ -10,7 +10,7 @@
 namespace relmap::place {
 namespace {
 
-constexpr StereoCamera kCamera{500, 320, 240, 0, 640, 480};
+constexpr StereoCamera kVgaEye{500, 320, 240, 0, 640, 480};
 
 struct TwoViews {
   std::vector<AppearanceFeature> a, b;
@@ -29,8 +29,8 @@ TwoViews views_of(const std::vector<Vector3>& points, std::size_t wrong) {
       feature.v = static_cast<float>(z.y());
       return feature;
     };
-    views.a.push_back(put(kCamera.project(points[i])));
-    StereoPixel z = kCamera.project(T_ba * points[i]);
+    views.a.push_back(put(kVgaEye.project(points[i])));
+    StereoPixel z = kVgaEye.project(T_ba * points[i]);
     if (i < wrong) z = {static_cast<double>(random() % 640), static_cast<double>(random() % 480), kNoRight};
     views.b.push_back(put(z));
   }

@@ -1,6 +1,5 @@
 #include "server/place/fabmap_model.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "server/place/vocabulary_format.h"
@@ -8,9 +7,7 @@
 namespace relmap::place {
 namespace {
 
-double clip(double p) { return std::clamp(p, kProbabilityFloor, 1 - kProbabilityFloor); }
-
-LogLikelihood fixed(double nats) { return std::llround(nats * kNat); }
+LogLikelihood fixed_point(double nats) { return std::llround(nats * kNat); }
 
 }  // namespace
 
@@ -27,7 +24,7 @@ double word_likelihood(const DetectorModel& detector, double marginal, double gi
     const double beta = (1 - marginal) * p_seen[e] * given_parent;
     seen += beta / (alpha + beta) * (e ? present : 1 - present);
   }
-  seen = clip(seen);
+  seen = clip_probability(seen);
   return z ? seen : 1 - seen;
 }
 
@@ -37,24 +34,25 @@ FabMapModel::FabMapModel(const Vocabulary& vocabulary, const DetectorModel& dete
   parent_.assign(vocabulary.parent().begin(), vocabulary.parent().end());
   child_begin_.assign(n + 1, 0);
   for (std::uint32_t w = 0; w < n; ++w) {
-    const double marginal = clip(vocabulary.marginal()[w]);
-    const double given[2] = {clip(vocabulary.given_parent_absent()[w]), clip(vocabulary.given_parent_present()[w])};
+    const double marginal = clip_probability(vocabulary.marginal()[w]);
+    const double given[2] = {clip_probability(vocabulary.given_parent_absent()[w]),
+                             clip_probability(vocabulary.given_parent_present()[w])};
     const auto log_f = [&](bool z, bool zp, bool s) {
       return std::log(word_likelihood(detector, marginal, given[zp], z, s));
     };
     Terms& t = terms_[w];
     const double absent = log_f(false, false, false);
     const double place = log_f(false, false, true) - absent;
-    t.place = fixed(place);
+    t.place = fixed_point(place);
     const auto set = [&](WordCase seen, bool z, bool zp) {
       const double base = log_f(z, zp, false);
-      t.query[static_cast<std::size_t>(seen)] = fixed(base - absent);
-      t.increment[static_cast<std::size_t>(seen)] = fixed(log_f(z, zp, true) - base - place);
+      t.query[static_cast<std::size_t>(seen)] = fixed_point(base - absent);
+      t.increment[static_cast<std::size_t>(seen)] = fixed_point(log_f(z, zp, true) - base - place);
     };
     set(WordCase::kOnlyParent, false, true);
     set(WordCase::kOnlyWord, true, false);
     set(WordCase::kBoth, true, true);
-    all_absent_ += fixed(absent);
+    all_absent_ += fixed_point(absent);
     if (parent_[w] != w) ++child_begin_[parent_[w] + 1];
   }
   for (std::uint32_t w = 0; w < n; ++w) child_begin_[w + 1] += child_begin_[w];

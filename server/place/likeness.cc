@@ -14,10 +14,10 @@ constexpr double kSigma = 170;  // of the distance between two descriptors of on
 // log_likelihood_ratio(): its value at likeness 0, and its slope over the square root of the likeness.
 constexpr double kUnlike = -0.4, kPerRoot = 2.6;
 
-using Order = std::vector<std::uint32_t>;
+using WordOrder = std::vector<std::uint32_t>;
 
-Order by_word(const DescribedWords& picture) {
-  Order order(picture.words.size());
+WordOrder by_word(const DescribedWords& picture) {
+  WordOrder order(picture.words.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](std::uint32_t x, std::uint32_t y) {
     return std::pair(picture.words[x], x) < std::pair(picture.words[y], y);
@@ -33,8 +33,9 @@ struct Pair {
 };
 
 // Pairs each feature of the query with the place's nearest feature of the same word.
-std::vector<Pair> nearest_of_word(const DescribedWords& query, const Order& query_order, const DescribedWords& place) {
-  const Order order = by_word(place);
+std::vector<Pair> nearest_of_word(const DescribedWords& query, const WordOrder& query_order,
+                                  const DescribedWords& place) {
+  const WordOrder order = by_word(place);
   std::vector<Pair> pairs;
   auto begin = order.begin();
   for (const std::uint32_t feature : query_order) {
@@ -51,7 +52,7 @@ std::vector<Pair> nearest_of_word(const DescribedWords& query, const Order& quer
 }
 
 // How well the place agrees with each feature of the query, 0 .. 1.
-std::vector<double> agreement(const DescribedWords& query, const Order& query_order, const DescribedWords& place) {
+std::vector<double> agreement(const DescribedWords& query, const WordOrder& query_order, const DescribedWords& place) {
   std::vector<double> agrees(query.words.size());
   std::vector<bool> taken(place.words.size());
   std::vector<Pair> pairs = nearest_of_word(query, query_order, place);
@@ -80,7 +81,7 @@ std::vector<double> above_other_groups(std::vector<double> sums, std::span<const
 
 std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
                              std::span<const std::uint32_t> groups) {
-  const Order query_order = by_word(query);
+  const WordOrder query_order = by_word(query);
   std::vector<std::vector<double>> agrees;
   for (const DescribedWords& place : places) agrees.push_back(agreement(query, query_order, place));
 

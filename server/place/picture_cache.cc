@@ -10,7 +10,7 @@ namespace relmap::place {
 
 namespace {
 
-constexpr std::size_t kMaxBytes = 16 << 20;
+constexpr std::size_t kMaxCachedBytes = 16 << 20;
 constexpr std::size_t kMaxEntries = 128;  // including frames without a picture
 
 std::size_t bytes_of(const FramePicture* picture) {
@@ -48,7 +48,7 @@ std::shared_ptr<const FramePicture> PictureCache::find(const storage::Graph& gra
   } else {
     entries_.push_front({frame, decode(graph, frame)});
     bytes_ += bytes_of(entries_.front().picture.get());
-    while (entries_.size() > 1 && (bytes_ > kMaxBytes || entries_.size() > kMaxEntries)) {
+    while (entries_.size() > 1 && (bytes_ > kMaxCachedBytes || entries_.size() > kMaxEntries)) {
       bytes_ -= bytes_of(entries_.back().picture.get());
       entries_.pop_back();
     }

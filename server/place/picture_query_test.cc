@@ -14,21 +14,6 @@
 namespace relmap::place {
 namespace {
 
-constexpr int kWidth = 320, kHeight = 240, kShift = 12;
-const StereoCamera kCamera{300, 160, 120, 0.1, kWidth, kHeight};
-
-// A picture of blobs of all sizes, wide enough to cut a left and a right picture out of it.
-cv::Mat texture() {
-  std::mt19937 random(3);
-  cv::Mat picture(kHeight, kWidth + kShift, CV_8U, cv::Scalar(128));
-  for (int i = 0; i < 600; ++i) {
-    const cv::Point at(static_cast<int>(random() % (kWidth + kShift)), static_cast<int>(random() % kHeight));
-    cv::circle(picture, at, 2 + static_cast<int>(random() % 9), cv::Scalar(random() % 256), cv::FILLED, cv::LINE_AA);
-  }
-  cv::GaussianBlur(picture, picture, cv::Size(5, 5), 1);
-  return picture;
-}
-
 Bytes png(const cv::Mat& picture) {
   Bytes file;
   cv::imencode(".png", picture, file);
@@ -37,6 +22,21 @@ Bytes png(const cv::Mat& picture) {
 
 class PictureQuery : public testing::Test {
  protected:
+  static constexpr int kWidth = 320, kHeight = 240, kShift = 12;
+  static constexpr StereoCamera kCamera{300, 160, 120, 0.1, kWidth, kHeight};
+
+  // A picture of blobs of all sizes, wide enough to cut a left and a right picture out of it.
+  static cv::Mat texture() {
+    std::mt19937 random(3);
+    cv::Mat picture(kHeight, kWidth + kShift, CV_8U, cv::Scalar(128));
+    for (int i = 0; i < 600; ++i) {
+      const cv::Point at(static_cast<int>(random() % (kWidth + kShift)), static_cast<int>(random() % kHeight));
+      cv::circle(picture, at, 2 + static_cast<int>(random() % 9), cv::Scalar(random() % 256), cv::FILLED, cv::LINE_AA);
+    }
+    cv::GaussianBlur(picture, picture, cv::Size(5, 5), 1);
+    return picture;
+  }
+
   // A wall at one depth: what is at u in the left picture is at u - kShift in the right one.
   const cv::Mat wall_ = texture();
   const Bytes left_ = png(wall_(cv::Rect(0, 0, kWidth, kHeight)));

@@ -7,13 +7,13 @@
 namespace relmap::place {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 16;
+constexpr std::size_t kBlockHeaderBytes = 16;
 constexpr std::size_t kRunBytes = 12;
 constexpr LogLikelihood kMaxConstant = LogLikelihood{1} << 61;
 
-std::size_t padded(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
+std::size_t to_multiple_of_8(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
 
-Status corrupt(const std::string& what) { return {Reason::CORRUPT, "a block of places has " + what}; }
+Status corrupt_block(const std::string& what) { return {Reason::CORRUPT, "a block of places has " + what}; }
 
 bool is_bitmap(std::size_t slots, std::size_t places) {
   return slots * sizeof(std::uint16_t) > PlaceBlock::bitmap_bytes(static_cast<std::uint32_t>(places));
@@ -33,8 +33,8 @@ bool is_list(const PlaceBlock::List& list, std::uint32_t places) {
 }
 
 // The runs of the older and newer frames in order, and the slot of each frame.
-struct Order {
-  Order(const PlaceBlock* older, std::span<const PlaceWords> newer)
+struct FrameOrder {
+  FrameOrder(const PlaceBlock* older, std::span<const PlaceWords> newer)
       : of_older(older ? older->places() : 0), of_newer(newer.size()) {
     struct Source {
       FrameId frame;
@@ -98,13 +98,13 @@ void put_bitmap(const std::vector<std::uint16_t>& slots, std::size_t places, Byt
 }  // namespace
 
 bool PlaceBlock::lay_out(ByteSpan bytes) {
-  if (bytes.size() < kHeaderBytes) return false;
+  if (bytes.size() < kBlockHeaderBytes) return false;
   const std::uint8_t* at = bytes.data();
   places_ = load<std::uint32_t>(at);
   words_ = load<std::uint32_t>(at + 4);
   runs_ = load<std::uint32_t>(at + 8);
-  frames_ = at + kHeaderBytes;
-  constants_ = frames_ + padded(runs_ * kRunBytes);
+  frames_ = at + kBlockHeaderBytes;
+  constants_ = frames_ + to_multiple_of_8(runs_ * kRunBytes);
   offsets_ = constants_ + std::size_t{places_} * 8;
   lists_ = offsets_ + (std::size_t{words_} + 1) * 4;
   return true;
@@ -117,15 +117,15 @@ PlaceBlock PlaceBlock::trusted(ByteSpan bytes) {
 }
 
 Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, std::uint32_t vocabulary_size) {
-  if (bytes.size() < kHeaderBytes) return corrupt("a truncated header");
+  if (bytes.size() < kBlockHeaderBytes) return corrupt_block("a truncated header");
   const auto field = [&](std::size_t i) { return load<std::uint32_t>(bytes.data() + 4 * i); };
   const std::uint32_t places = field(0), runs = field(2), list_bytes = field(3);
   if (places == 0 || places > kPlacesPerBlock || field(1) != vocabulary_size || runs == 0 || runs > places ||
       (list_bytes & kBitmap) != 0)
-    return corrupt("an invalid header");
-  const std::size_t size = kHeaderBytes + padded(runs * kRunBytes) + std::size_t{places} * 8 +
+    return corrupt_block("an invalid header");
+  const std::size_t size = kBlockHeaderBytes + to_multiple_of_8(runs * kRunBytes) + std::size_t{places} * 8 +
                            (std::size_t{vocabulary_size} + 1) * 4 + list_bytes;
-  if (bytes.size() != size) return corrupt("the wrong size");
+  if (bytes.size() != size) return corrupt_block("the wrong size");
 
   const PlaceBlock block = trusted(bytes);
   std::uint32_t place = 0;
@@ -133,22 +133,22 @@ Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, std::uint32_t vocabulary_si
   for (const FrameRun& run : block.frames()) {
     if (run.first.packed() < next || !run.first.valid() || run.count == 0 || run.count > places - place ||
         std::uint64_t{run.first.index} + run.count > std::uint64_t{1} << 32)
-      return corrupt("invalid frames");
+      return corrupt_block("invalid frames");
     place += run.count;
     next = run.first.packed() + run.count;
   }
-  if (place != places) return corrupt("the wrong number of frames");
+  if (place != places) return corrupt_block("the wrong number of frames");
   for (std::uint32_t slot = 0; slot < places; ++slot)
     if (block.constant(slot) < -kMaxConstant || block.constant(slot) > kMaxConstant)
-      return corrupt("invalid constants");
+      return corrupt_block("invalid constants");
   for (std::uint32_t word = 0; word < block.words_; ++word) {
     const auto from = load<std::uint32_t>(block.offsets_ + 4 * std::size_t{word}) & ~kBitmap;
     const auto to = load<std::uint32_t>(block.offsets_ + 4 * (std::size_t{word} + 1)) & ~kBitmap;
     if (from > to || to > list_bytes || !is_list(block.list(word), places))
-      return corrupt("an invalid list of word " + std::to_string(word));
+      return corrupt_block("an invalid list of word " + std::to_string(word));
   }
   if (load<std::uint32_t>(block.offsets_ + 4 * std::size_t{block.words_}) != list_bytes)
-    return corrupt("lists that end at the wrong offset");
+    return corrupt_block("lists that end at the wrong offset");
   return block;
 }
 
@@ -166,7 +166,7 @@ std::vector<FrameRun> PlaceBlock::frames() const {
 }
 
 Bytes encode_place_block(const FabMapModel& model, const PlaceBlock* older, std::span<const PlaceWords> newer) {
-  const Order order(older, newer);
+  const FrameOrder order(older, newer);
   const std::size_t places = order.of_older.size() + newer.size();
   assert(places > 0 && places <= kPlacesPerBlock);
 
@@ -201,8 +201,8 @@ Bytes encode_place_block(const FabMapModel& model, const PlaceBlock* older, std:
   offsets.push_back(static_cast<std::uint32_t>(lists.size()));
 
   ByteWriter w;
-  w.reserve(kHeaderBytes + padded(order.runs.size() * kRunBytes) + constants.size() * 8 + offsets.size() * 4 +
-            lists.size());
+  w.reserve(kBlockHeaderBytes + to_multiple_of_8(order.runs.size() * kRunBytes) + constants.size() * 8 +
+            offsets.size() * 4 + lists.size());
   w.put(static_cast<std::uint32_t>(places));
   w.put(model.size());
   w.put(static_cast<std::uint32_t>(order.runs.size()));

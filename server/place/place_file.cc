@@ -8,16 +8,16 @@
 namespace relmap::place {
 namespace {
 
-constexpr char kMagic[] = "RELMAPPL";
-constexpr std::uint32_t kFrameBytes = 8;       // length and checksum before a block
-constexpr std::uint32_t kMaxBytes = 1u << 30;  // far more than any block has
+constexpr char kPlaceFileMagic[] = "RELMAPPL";
+constexpr std::uint32_t kFrameBytes = 8;            // length and checksum before a block
+constexpr std::uint32_t kMaxBlockBytes = 1u << 30;  // far more than any block has
 
 Status check_header(const Bytes& header, std::uint32_t vocabulary_crc, const std::string& path) {
   ByteReader r(header);
   const ByteSpan magic = r.get_bytes(8);
   const auto version = r.get<std::uint32_t>();
   const auto crc = r.get<std::uint32_t>();
-  if (std::memcmp(magic.data(), kMagic, 8) != 0) return {Reason::CORRUPT, path + " is not a place index"};
+  if (std::memcmp(magic.data(), kPlaceFileMagic, 8) != 0) return {Reason::CORRUPT, path + " is not a place index"};
   if (version != PlaceFile::kVersion)
     return {Reason::UNKNOWN_FORMAT_VERSION,
             path + " has version " + std::to_string(version) + ", known: " + std::to_string(PlaceFile::kVersion)};
@@ -45,7 +45,7 @@ Result<std::unique_ptr<PlaceFile>> PlaceFile::open(const std::string& data_folde
   if (good.reason() == Reason::IO_ERROR) return good;
   if (good.reason() != Reason::TRUNCATED) *emptied = good;
   ByteWriter w;
-  w.put_bytes(as_bytes(kMagic));
+  w.put_bytes(as_bytes(kPlaceFileMagic));
   w.put(kVersion);
   w.put(vocabulary_crc);
   if (Status cut = file->cut(0); !cut.ok()) return cut;
@@ -60,7 +60,7 @@ Result<PlaceFile::Extent> PlaceFile::read_next(std::uint64_t offset, Bytes& byte
   std::uint32_t frame[2];
   if (Status read = file_->read(offset, frame, sizeof frame); !read.ok()) return read;
   const Extent extent{offset + kFrameBytes, frame[0], frame[1]};
-  if (extent.size > kMaxBytes || extent.end() > *size)
+  if (extent.size > kMaxBlockBytes || extent.end() > *size)
     return {Reason::TRUNCATED, path() + " ends within the block at byte " + std::to_string(offset)};
   if (Status whole = read(extent, bytes); !whole.ok()) return whole;
   return extent;

@@ -20,9 +20,9 @@ namespace {
 
 constexpr std::size_t kMaxSeeds = 64;
 
-// All places stand for the unknown world except those within kNear edges of the kPasses best ones. There are two best
-// ones, since a place may have been passed twice without an edge between the passes yet.
-constexpr std::uint32_t kNear = 2 * kPlaceRadius;
+// All places stand for the unknown world except those within kNearEdges edges of the kPasses best ones. There are two
+// best ones, since a place may have been passed twice without an edge between the passes yet.
+constexpr std::uint32_t kNearEdges = 2 * kPlaceRadius;
 constexpr int kPasses = 2;
 
 struct Group {
@@ -137,7 +137,7 @@ std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::uint32_t best = best_place(scores, near);
     if (best == FrameTable::kNone) break;
-    const auto around = places_around(scores, graph, scores.frame(best), kNear);
+    const auto around = places_around(scores, graph, scores.frame(best), kNearEdges);
     near.insert(around.begin(), around.end());
   }
   return {near.begin(), near.end()};

@@ -17,9 +17,6 @@
 namespace relmap::place {
 namespace {
 
-constexpr StereoCamera kStereo{400, 256, 192, 0.12, 512, 384};
-constexpr StereoCamera kMono{400, 256, 192, 0, 512, 384};
-
 // Words that do not depend on each other, so that pictures are easy to draw.
 VocabularyModel independent_words(std::uint32_t words) {
   VocabularyModel model = random_vocabulary_model(words, 200, 1);
@@ -30,7 +27,7 @@ VocabularyModel independent_words(std::uint32_t words) {
 // Places along a chain, drawn from the vocabulary's own marginals; a tenth of the words changes from one to the next.
 class Chain {
  public:
-  explicit Chain(std::uint32_t frames, const StereoCamera& camera = kStereo)
+  explicit Chain(std::uint32_t frames, const StereoCamera& camera = kStereoCamera)
       : vocabulary(Vocabulary::from_bytes(encode_vocabulary(independent_words(500))).or_throw()),
         index(vocabulary),
         random_(2) {
@@ -165,7 +162,7 @@ TEST(PlaceIndex, MassIsSummedOverGraphNeighbours) {
   const auto vocabulary = random_vocabulary(500, 50, 1);
   PlaceIndex index(vocabulary);
   HandMadeGraph graph;
-  graph.add_session(1, kStereo);
+  graph.add_session(1, kStereoCamera);
   std::vector<std::uint32_t> words;
   for (std::uint32_t w = 0; w < 40; ++w) words.push_back(11 * w);
   for (std::uint32_t i = 0; i < 11; ++i) {
@@ -181,7 +178,7 @@ TEST(PlaceIndex, MassIsSummedOverGraphNeighbours) {
 }
 
 TEST(PlaceIndex, InAMonoSessionConsecutiveFramesAreNeighbours) {
-  Chain chain(50, kMono);
+  Chain chain(50, kMonoCamera);
   const PlaceAnswer answer = chain.index.query(chain.words_of[25], chain.graph);
   ASSERT_EQ(answer.candidates.size(), 1u);
   EXPECT_GT(answer.candidates[0].probability, 0.9);
@@ -232,7 +229,7 @@ TEST(PlaceIndex, TheMapsOwnPlacesStandForTheUnknownWorld) {
   for (const std::uint32_t places : {100u, 2100u}) {
     PlaceIndex index(vocabulary);
     HandMadeGraph graph;
-    graph.add_session(1, kStereo);
+    graph.add_session(1, kStereoCamera);
     for (std::uint32_t i = 0; i < places; ++i) {
       graph.add_frame({1, i});
       (void)index.add({1, i}, picture());
@@ -410,7 +407,7 @@ TEST_F(KeptPlaceIndex, ATruncatedFileIsRepaired) {
 TEST_F(KeptPlaceIndex, FramesThatTheMapHasLostAreNotRestored) {
   keep();
   HandMadeGraph shorter;
-  shorter.add_session(1, kStereo);
+  shorter.add_session(1, kStereoCamera);
   for (std::uint32_t i = 0; i < 6000; ++i) shorter.add_frame({1, i});
   Status restored;
   const auto index = start(&restored, shorter);
@@ -423,7 +420,7 @@ TEST_F(KeptPlaceIndex, FramesThatTheMapHasLostAreNotRestored) {
 TEST_F(KeptPlaceIndex, ASessionThatIsLeftOutIsNoLongerRecognised) {
   keep();
   HandMadeGraph going;
-  going.add_session(1, kStereo);
+  going.add_session(1, kStereoCamera);
   for (std::uint32_t i = 0; i < 64; ++i) going.add_frame({1, i});
   going.edit_session(1).state = storage::SessionState::kDeleting;
   Status restored;

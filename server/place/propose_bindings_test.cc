@@ -9,7 +9,6 @@
 namespace relmap::place {
 namespace {
 
-constexpr FrameId kMatch{1, 6};
 constexpr FrameId kFrame{2, 0};  // another session that passes the street
 
 class ProposeBindings : public testing::Test {
@@ -22,7 +21,7 @@ class ProposeBindings : public testing::Test {
   std::vector<storage::ProposedBinding> propose(const SE3& T_match_frame, double sigma,
                                                 std::uint32_t first_maskable = 0) {
     Matrix6 covariance = sigma * sigma * Matrix6::Identity();
-    return propose_bindings(street_.graph, {features_, kStreetCamera}, kFrame, kMatch, T_match_frame, covariance,
+    return propose_bindings(street_.graph, {features_, kStreetCamera}, kFrame, kStreetFrame, T_match_frame, covariance,
                             first_maskable);
   }
   std::size_t point_of(const storage::ProposedBinding& binding) const {
@@ -99,8 +98,8 @@ TEST_F(ProposeBindings, ATrackIsNamed) {
 TEST_F(ProposeBindings, RecentFramesOfTheOwnSessionAreLeftOut) {
   const QueryPicture query{features_, kStreetCamera};
   const Matrix6 covariance = 1e-4 * Matrix6::Identity();
-  EXPECT_TRUE(propose_bindings(street_.graph, query, {1, 13}, kMatch, view_, covariance, 0).empty());
-  const auto some = propose_bindings(street_.graph, query, {1, 13}, kMatch, view_, covariance, 5);
+  EXPECT_TRUE(propose_bindings(street_.graph, query, {1, 13}, kStreetFrame, view_, covariance, 0).empty());
+  const auto some = propose_bindings(street_.graph, query, {1, 13}, kStreetFrame, view_, covariance, 5);
   EXPECT_FALSE(some.empty());
   for (const storage::ProposedBinding& binding : some) EXPECT_LT(binding.landmark.base.index, 5u);
 }

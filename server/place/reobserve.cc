@@ -27,7 +27,6 @@ constexpr double kAgreementSigma = 0.5;   // pixels of the level; alignments agr
 constexpr double kBeside = 0.03;          // of the picture's width: tracks this near a landmark may be superfluous
 constexpr double kSameSurfacePixels = 2;  // points this close together have the same disparity
 constexpr double kSameDepth = 0.15;       // share of the disparity by which points of one surface may differ
-constexpr double kMaxNearer = 1.5;        // ratio of viewing distances beyond which a landmark may look different
 
 // A landmark as it appears in the picture of an older frame.
 struct View {

@@ -14,13 +14,13 @@
 namespace relmap::place {
 namespace {
 
-constexpr StereoCamera kCamera{400, 255.5, 191.5, 0.12, 512, 384};
-constexpr double kDepth = 4;  // of the wall
-constexpr FrameId kMatch{1, 1}, kFrame{2, 0};
-
 // Three frames of session 1 look at a textured wall and have landmarks on it; session 2 sees it in other light.
 class Reobserve : public testing::Test {
  protected:
+  static constexpr StereoCamera kCamera{400, 255.5, 191.5, 0.12, 512, 384};
+  static constexpr double kDepth = 4;  // of the wall
+  static constexpr FrameId kMatch{1, 1}, kFrame{2, 0};
+
   Reobserve() {
     for (const SessionNumber session : {1u, 2u}) graph_.add_session(session, kCamera);
     for (std::uint32_t i = 0; i < 3; ++i) {

@@ -12,13 +12,13 @@ using vision::testing_textures::seen_twice;
 using vision::testing_textures::Waves;
 
 constexpr int kWidth = 320, kHeight = 240;
-const StereoCamera kCamera{300, 160, 120, 0.1, kWidth, kHeight};
+const StereoCamera kRig{300, 160, 120, 0.1, kWidth, kHeight};
 
 // Checks two pictures of one wall. What the left picture shows at (u, v) is in the right one at (u - shift, v + rows).
 Status check_wall(double shift, double rows, int width = kWidth, int height = kHeight) {
   std::mt19937 random(3);
   const auto [left, right] = seen_twice(Waves(3, 6, 60), random, width, height, -shift, rows);
-  return check_stereo_pair(left, right, kCamera);
+  return check_stereo_pair(left, right, kRig);
 }
 
 TEST(StereoPair, PicturesOfTheTwoEyesAreAPair) {
@@ -45,14 +45,14 @@ TEST(StereoPair, RowsMoreThanTwoPixelsApartAreRefusedWithAdvice) {
 TEST(StereoPair, OnePictureTwiceIsRefused) {
   const Waves waves(3, 6, 60);
   const vision::Image picture = paint(kWidth, kHeight, [&](int x, int y) { return waves.at(x, y); });
-  EXPECT_EQ(check_stereo_pair(picture, picture, kCamera).reason(), Reason::NOT_STEREO);
+  EXPECT_EQ(check_stereo_pair(picture, picture, kRig).reason(), Reason::NOT_STEREO);
 }
 
 TEST(StereoPair, ALeftPictureThatShowsNothingIsRefused) {
   const Waves waves(3, 6, 60);
   const vision::Image dark = paint(kWidth, kHeight, [](int, int) { return 0.0; });
   const vision::Image right = paint(kWidth, kHeight, [&](int x, int y) { return waves.at(x, y); });
-  EXPECT_EQ(check_stereo_pair(dark, right, kCamera).reason(), Reason::EYE_DEAD);
+  EXPECT_EQ(check_stereo_pair(dark, right, kRig).reason(), Reason::EYE_DEAD);
 }
 
 TEST(StereoPair, PicturesTooSmallToTellAreAccepted) {

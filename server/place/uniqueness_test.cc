@@ -11,7 +11,7 @@
 namespace relmap::place {
 namespace {
 
-constexpr StereoCamera kMono{0, 256, 192, 0, 512, 384};
+constexpr StereoCamera kUnknownLens{0, 256, 192, 0, 512, 384};
 
 std::vector<std::uint32_t> features(std::uint32_t first, std::uint32_t count) {
   std::vector<std::uint32_t> result(count);
@@ -39,12 +39,12 @@ class Weigh : public ::testing::Test {
  protected:
   Weigh() {
     for (SessionNumber s = 1; s < 10; ++s) {
-      graph_.add_session(s, kMono);
+      graph_.add_session(s, kUnknownLens);
       for (std::uint32_t i = 0; i < 50; ++i) graph_.add_frame({s, i});
     }
   }
   Standing weigh(const std::vector<PlaceTrial>& trials) {
-    return relmap::place::weigh(graph_, {{}, kMono}, trials, trials.size(), 1).value();
+    return relmap::place::weigh(graph_, {{}, kUnknownLens}, trials, trials.size(), 1).value();
   }
   static bool is_ambiguous(const Standing& standing, const std::vector<PlaceTrial>& trials) {
     return relmap::place::is_ambiguous(standing.uniqueness, trials[standing.best].verified->inliers);
@@ -65,8 +65,8 @@ TEST_F(Weigh, APlaceWithoutRivalsIsUnique) {
 
 TEST_F(Weigh, WhereNothingIsConfirmedNothingStandsOut) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 29), false)};
-  EXPECT_FALSE(relmap::place::weigh(graph_, {{}, kMono}, trials, 1, 1).has_value());
-  EXPECT_FALSE(relmap::place::weigh(graph_, {{}, kMono}, {}, 0, 1).has_value());
+  EXPECT_FALSE(relmap::place::weigh(graph_, {{}, kUnknownLens}, trials, 1, 1).has_value());
+  EXPECT_FALSE(relmap::place::weigh(graph_, {{}, kUnknownLens}, {}, 0, 1).has_value());
 }
 
 TEST_F(Weigh, LookAlikesAreToldApartByWhatOnlyOneOfThemShows) {
@@ -141,7 +141,7 @@ TEST_F(Weigh, ARivalThatPicturesTellApartIsDismissed) {
                                        metric(fits({3, 5}, features(0, 8)))};
   int asked = 0;
   const auto weigh_with = [&](std::uint16_t changed) {
-    return relmap::place::weigh(graph_, {{}, kMono}, trials, trials.size(), 1,
+    return relmap::place::weigh(graph_, {{}, kUnknownLens}, trials, trials.size(), 1,
                                 [&](const VerifiedPlace& place) {
                                   ++asked;
                                   return place.match == FrameId{2, 5} ? Changes{30, changed} : Changes{30, 0};
@@ -158,7 +158,7 @@ TEST_F(Weigh, ARivalThatPicturesTellApartIsDismissed) {
 
 TEST_F(Weigh, OnlyAnAnswerCanBeTheBest) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 40)), fits({2, 5}, features(0, 50))};
-  const auto standing = relmap::place::weigh(graph_, {{}, kMono}, trials, 1, 1);
+  const auto standing = relmap::place::weigh(graph_, {{}, kUnknownLens}, trials, 1, 1);
   ASSERT_TRUE(standing.has_value());
   EXPECT_EQ(standing->best, 0u);
   EXPECT_TRUE(relmap::place::is_ambiguous(standing->uniqueness, 40));

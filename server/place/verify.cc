@@ -22,7 +22,6 @@
 namespace relmap::place {
 namespace {
 
-constexpr double kNearRadius = 0.02;  // of the picture's width
 constexpr double kOutOfSight = -1e9;
 // kMinToGrow inliers of matching by descriptors alone are enough if kGrown inliers are found when features are matched
 // again near where the pose predicts them; otherwise kMinInliers are needed.

@@ -11,7 +11,6 @@
 namespace relmap::place {
 namespace {
 
-constexpr FrameId kMatch{1, 6};
 const SE3 kView = SE3::exp((Vector6() << 0.2, -0.1, 0.15, 0.03, -0.08, 0.02).finished());
 
 // The true pose of the view from pose(6) * kView, relative to the frame in which the place was verified.
@@ -29,11 +28,11 @@ TEST(VerifyPlace, FindsTheTransformAndTheLandmarks) {
   SyntheticStreet street(1, 12, 0);
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6) * kView, true, points);
-  const auto place = verify_place(street.graph, as_query(features), kMatch, 7);
+  const auto place = verify_place(street.graph, as_query(features), kStreetFrame, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
-  EXPECT_EQ(place->match.session, kMatch.session);
-  EXPECT_LE(place->match.index, kMatch.index + 3);
-  EXPECT_GE(place->match.index, kMatch.index - 3);
+  EXPECT_EQ(place->match.session, kStreetFrame.session);
+  EXPECT_LE(place->match.index, kStreetFrame.index + 3);
+  EXPECT_GE(place->match.index, kStreetFrame.index - 3);
   EXPECT_EQ(place->verification, storage::Verification::kStereo);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).log().norm(), 1e-3);
   EXPECT_GT(place->inliers, 50u);
@@ -52,7 +51,7 @@ TEST(VerifyPlace, AMonoQueryIsVerified) {
   SyntheticStreet street(2, 12, 0);
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6) * kView, false, points);
-  const auto place = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  const auto place = verify_place(street.graph, as_query(features, false), kStreetFrame, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
   EXPECT_EQ(place->verification, storage::Verification::kPnP);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).log().norm(), 1e-3);
@@ -65,9 +64,9 @@ TEST(VerifyPlace, TheCovarianceAllowsForTheRotationBetweenTheEyes) {
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6) * kView, false, points);
   QueryPicture query = as_query(features, false);
-  const auto left = verify_place(street.graph, query, kMatch, 7);
+  const auto left = verify_place(street.graph, query, kStreetFrame, 7);
   query.eye_turn = Vector3(0.01, 0.03, 0);
-  const auto either = verify_place(street.graph, query, kMatch, 7);
+  const auto either = verify_place(street.graph, query, kStreetFrame, 7);
   ASSERT_TRUE(left.ok() && either.ok());
   const Matrix3 more = (either->covariance - left->covariance).bottomRightCorner<3, 3>();
   EXPECT_LT((more - query.eye_turn * query.eye_turn.transpose() / 2).norm(), 1e-12);
@@ -79,12 +78,12 @@ TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
   const auto features = street.picture(street.pose(6) * kView, false, points);
   QueryPicture query{features, kStreetCamera};
   query.camera.f = query.camera.baseline = 0;
-  const auto place = verify_place(street.graph, query, kMatch, 7);
+  const auto place = verify_place(street.graph, query, kStreetFrame, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
   EXPECT_EQ(place->verification, storage::Verification::kPnP);
   EXPECT_NEAR(place->focal_length / kStreetCamera.f, 1, 0.02);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).t.norm(), 0.1);
-  const auto known = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  const auto known = verify_place(street.graph, as_query(features, false), kStreetFrame, 7);
   EXPECT_GE(place->covariance(2, 2), known->covariance(2, 2)) << "with an unknown lens the depth is less certain";
 }
 
@@ -99,10 +98,10 @@ TEST(VerifyPlace, InliersThatDoNotDetermineTheRotationAreRefused) {
   std::erase_if(features,
                 [&](const AppearanceFeature& f) { return f.u < min_u || f.u > max_u || f.v < min_v || f.v > max_v; });
   features.resize(24);
-  const auto place = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  const auto place = verify_place(street.graph, as_query(features, false), kStreetFrame, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
   for (AppearanceFeature& f : features) f.scale = 160;  // sigmas of 32 pixels
-  const auto coarse = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  const auto coarse = verify_place(street.graph, as_query(features, false), kStreetFrame, 7);
   EXPECT_EQ(coarse.reason(), Reason::POOR_SPREAD) << coarse.status().to_string();
   EXPECT_NE(coarse.status().message().find("rotation"), std::string::npos) << coarse.status().message();
 }
@@ -138,7 +137,7 @@ double mean_nees(bool stereo, int trials) {
     SyntheticStreet street(100 + static_cast<std::uint64_t>(trial), 12, 1, 250);
     std::vector<std::size_t> points;
     const auto features = street.picture(street.pose(6) * kView, stereo, points);
-    const auto place = verify_place(street.graph, as_query(features, stereo), kMatch, 7);
+    const auto place = verify_place(street.graph, as_query(features, stereo), kStreetFrame, 7);
     EXPECT_TRUE(place.ok()) << place.status().to_string();
     if (!place.ok()) continue;
     const Vector6 error = (truth(street, *place).inverse() * place->T_match_query).log();
@@ -184,7 +183,7 @@ class VerifyLookAlikes : public testing::Test {
   Result<VerifiedPlace> verify(std::size_t features) const {
     QueryPicture query = as_query(features_);
     query.features = query.features.first(features);
-    return verify_place(street_.graph, query, kMatch, 7);
+    return verify_place(street_.graph, query, kStreetFrame, 7);
   }
 
   static constexpr std::size_t kUnlike = 17;  // fewer than kMinInliers
@@ -212,7 +211,7 @@ TEST(VerifyPlace, AnotherStreetIsRefused) {
   SyntheticStreet street(3, 12, 0.5), other(4, 12, 0.5);
   std::vector<std::size_t> points;
   const auto features = other.picture(other.pose(6) * kView, true, points);
-  EXPECT_EQ(verify_place(street.graph, as_query(features), kMatch, 7).reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(verify_place(street.graph, as_query(features), kStreetFrame, 7).reason(), Reason::TOO_FEW_INLIERS);
 }
 
 TEST(VerifyPlace, ARefusalNamesWhatIsMissing) {
@@ -229,9 +228,9 @@ TEST(VerifyPlace, ARefusalNamesWhatIsMissing) {
     corner.push_back(corner[corner.size() % 7]);
     corner.back().u += 1;
   }
-  EXPECT_FALSE(verify_place(street.graph, as_query(corner), kMatch, 7).ok());
+  EXPECT_FALSE(verify_place(street.graph, as_query(corner), kStreetFrame, 7).ok());
   features.resize(10);
-  EXPECT_EQ(verify_place(street.graph, as_query(features), kMatch, 7).reason(), Reason::TOO_FEW_FEATURES);
+  EXPECT_EQ(verify_place(street.graph, as_query(features), kStreetFrame, 7).reason(), Reason::TOO_FEW_FEATURES);
 }
 
 TEST(VerifyPlace, InliersInOneCornerAreRefused) {
@@ -241,15 +240,15 @@ TEST(VerifyPlace, InliersInOneCornerAreRefused) {
   for (const AppearanceFeature& feature : street.picture(street.pose(6), true, points))
     if (feature.u < 90 && feature.v < 90) corner.push_back(feature);
   ASSERT_GT(corner.size(), 30u);
-  EXPECT_EQ(verify_place(street.graph, as_query(corner), kMatch, 7).reason(), Reason::POOR_SPREAD);
+  EXPECT_EQ(verify_place(street.graph, as_query(corner), kStreetFrame, 7).reason(), Reason::POOR_SPREAD);
 }
 
 TEST(VerifyPlace, TheSameSeedGivesTheSameAnswer) {
   SyntheticStreet street(7, 12, 1);
   std::vector<std::size_t> points;
   const auto features = street.picture(street.pose(6) * kView, true, points);
-  const auto a = verify_place(street.graph, as_query(features), kMatch, 7);
-  const auto b = verify_place(street.graph, as_query(features), kMatch, 7);
+  const auto a = verify_place(street.graph, as_query(features), kStreetFrame, 7);
+  const auto b = verify_place(street.graph, as_query(features), kStreetFrame, 7);
   ASSERT_TRUE(a.ok() && b.ok());
   EXPECT_EQ(a->T_match_query.t, b->T_match_query.t);
   EXPECT_EQ(a->T_match_query.R, b->T_match_query.R);

@@ -9,10 +9,10 @@
 namespace relmap::place {
 namespace {
 
-constexpr char kMagic[] = "RELMAPVO";
-constexpr std::size_t kHeaderBytes = 32;
+constexpr char kVocabularyMagic[] = "RELMAPVO";
+constexpr std::size_t kVocabularyHeaderBytes = 32;
 
-std::size_t padded(std::size_t bytes) { return (bytes + 3) / 4 * 4; }
+std::size_t to_multiple_of_4(std::size_t bytes) { return (bytes + 3) / 4 * 4; }
 
 // Hands out one table after another; the total size has been checked before.
 class Cursor {
@@ -31,7 +31,7 @@ class Cursor {
   const std::uint8_t* next_;
 };
 
-Status corrupt(const std::string& what) { return {Reason::CORRUPT, "vocabulary: " + what}; }
+Status corrupt_vocabulary(const std::string& what) { return {Reason::CORRUPT, "vocabulary: " + what}; }
 
 // Offsets from 0 to `end`; strictly ascending if `none_empty`.
 bool are_offsets(std::span<const std::uint32_t> begin, std::uint32_t end, bool none_empty) {
@@ -73,20 +73,20 @@ bool is_tree(std::span<const std::uint32_t> parent) {
 
 Status check_tables(const VocabularyTables& t) {
   const auto words = static_cast<std::uint32_t>(t.centroids.size());
-  if (!are_offsets(t.branch_begin, words, true)) return corrupt("branches do not partition the words");
-  if (!is_tree(t.parent)) return corrupt("the parents are no tree");
+  if (!are_offsets(t.branch_begin, words, true)) return corrupt_vocabulary("branches do not partition the words");
+  if (!is_tree(t.parent)) return corrupt_vocabulary("the parents are no tree");
   if (!are_probabilities(t.marginal) || !are_probabilities(t.given_parent_absent) ||
       !are_probabilities(t.given_parent_present))
-    return corrupt("a probability outside its range");
+    return corrupt_vocabulary("a probability outside its range");
   for (std::uint32_t w = 0; w < words; ++w)
     if (t.parent[w] == w && (t.given_parent_absent[w] != t.marginal[w] || t.given_parent_present[w] != t.marginal[w]))
-      return corrupt("the root depends on a parent");
+      return corrupt_vocabulary("the root depends on a parent");
   if (!are_offsets(t.sample_begin, static_cast<std::uint32_t>(t.sample_words.size()), false))
-    return corrupt("sample places overlap");
+    return corrupt_vocabulary("sample places overlap");
   for (std::size_t s = 0; s + 1 < t.sample_begin.size(); ++s)
     for (std::uint32_t i = t.sample_begin[s]; i < t.sample_begin[s + 1]; ++i)
       if (t.sample_words[i] >= words || (i > t.sample_begin[s] && t.sample_words[i] <= t.sample_words[i - 1]))
-        return corrupt("sample place " + std::to_string(s) + " has unordered or unknown words");
+        return corrupt_vocabulary("sample place " + std::to_string(s) + " has unordered or unknown words");
   return {};
 }
 
@@ -105,7 +105,7 @@ Bytes encode_vocabulary(const VocabularyModel& model) {
     sample_begin.push_back(static_cast<std::uint32_t>(sample_words.size()));
   }
 
-  out.put_bytes(as_bytes(kMagic));
+  out.put_bytes(as_bytes(kVocabularyMagic));
   out.put(kVocabularyVersion);
   out.put(static_cast<std::uint32_t>(model.centroids.size()));
   out.put(static_cast<std::uint32_t>(model.branches.size()));
@@ -130,7 +130,8 @@ Bytes encode_vocabulary(const VocabularyModel& model) {
 Result<VocabularyTables> parse_vocabulary(ByteSpan bytes) {
   ByteReader in(bytes);
   const ByteSpan magic = in.get_bytes(8);
-  if (!in.ok() || std::memcmp(magic.data(), kMagic, 8) != 0) return corrupt("not a vocabulary file");
+  if (!in.ok() || std::memcmp(magic.data(), kVocabularyMagic, 8) != 0)
+    return corrupt_vocabulary("not a vocabulary file");
   const auto version = in.get<std::uint32_t>();
   if (in.ok() && version != kVocabularyVersion)
     return Status(Reason::UNKNOWN_FORMAT_VERSION,
@@ -140,22 +141,24 @@ Result<VocabularyTables> parse_vocabulary(ByteSpan bytes) {
   const std::size_t samples = in.get<std::uint32_t>();
   const std::size_t sample_words = in.get<std::uint32_t>();
   const std::size_t source_bytes = in.get<std::uint32_t>();
-  if (!in.ok()) return corrupt("shorter than its header");
+  if (!in.ok()) return corrupt_vocabulary("shorter than its header");
   if (words < 1 || words > kMaxWords || branches < 1 || branches > words || samples < 1 || samples > kMaxSamplePlaces ||
       source_bytes > kMaxSourceBytes)
-    return corrupt("implausible counts");
+    return corrupt_vocabulary("implausible counts");
 
-  const std::size_t expected = kHeaderBytes + padded(source_bytes) + (branches + words) * kDescriptorBytes +
+  const std::size_t expected = kVocabularyHeaderBytes + to_multiple_of_4(source_bytes) +
+                               (branches + words) * kDescriptorBytes +
                                4 * (branches + 1 + 4 * words + samples + 1 + sample_words + 1);
   if (bytes.size() != expected)
-    return corrupt(std::to_string(bytes.size()) + " bytes where " + std::to_string(expected) + " are announced");
+    return corrupt_vocabulary(std::to_string(bytes.size()) + " bytes where " + std::to_string(expected) +
+                              " are announced");
   VocabularyTables t;
   std::memcpy(&t.crc, bytes.data() + bytes.size() - 4, 4);
-  if (crc32c(bytes.first(bytes.size() - 4)) != t.crc) return corrupt("checksum mismatch");
+  if (crc32c(bytes.first(bytes.size() - 4)) != t.crc) return corrupt_vocabulary("checksum mismatch");
 
-  Cursor cursor(bytes.subspan(kHeaderBytes));
-  t.source = {reinterpret_cast<const char*>(bytes.data()) + kHeaderBytes, source_bytes};
-  cursor.skip_to(bytes.data() + kHeaderBytes + padded(source_bytes));
+  Cursor cursor(bytes.subspan(kVocabularyHeaderBytes));
+  t.source = {reinterpret_cast<const char*>(bytes.data()) + kVocabularyHeaderBytes, source_bytes};
+  cursor.skip_to(bytes.data() + kVocabularyHeaderBytes + to_multiple_of_4(source_bytes));
   t.branches = cursor.take<Descriptor>(branches);
   t.branch_begin = cursor.take<std::uint32_t>(branches + 1);
   t.centroids = cursor.take<Descriptor>(words);

@@ -21,6 +21,7 @@
 //       u32          CRC32C of all bytes before
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -40,6 +41,7 @@ inline constexpr std::size_t kMaxSourceBytes = 4096;
 
 // All probabilities of the model lie within [kProbabilityFloor, 1 - kProbabilityFloor].
 inline constexpr double kProbabilityFloor = 1e-4;
+inline double clip_probability(double p) { return std::clamp(p, kProbabilityFloor, 1 - kProbabilityFloor); }
 
 // The content of a vocabulary file.
 struct VocabularyModel {

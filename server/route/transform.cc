@@ -27,7 +27,7 @@ Transform compound(const storage::Graph& graph, const Path& path) {
   return result;
 }
 
-struct Offer {
+struct Reached {
   FrameId frame;
   EdgeId edge;  // by which the frame is reached
 };
@@ -38,9 +38,9 @@ Result<Transform> transform_between(const storage::Graph& graph, FrameId a, Fram
   for (const FrameId end : {a, b})
     if (!graph.hot(end)) return {Reason::NO_SUCH_FRAME, "no frame " + end.to_string()};
   Trail trail;
-  std::deque<Offer> frontier{{a, {}}};
+  std::deque<Reached> frontier{{a, {}}};
   while (!frontier.empty()) {
-    const Offer next = frontier.front();
+    const Reached next = frontier.front();
     frontier.pop_front();
     if (trail.contains(next.frame)) continue;
     const auto hot = graph.hot(next.frame);
@@ -49,7 +49,7 @@ Result<Transform> transform_between(const storage::Graph& graph, FrameId a, Fram
       return {Reason::OUT_OF_REACH, b.to_string() + " was not found among the " + std::to_string(trail.frames()) +
                                         " frames nearest to " + a.to_string()};
     if (trail.frames() % kWorkStride == 0 && work.proceed)
-      if (Status status = work.proceed(trail.memory_bytes() + frontier.size() * sizeof(Offer)); !status.ok())
+      if (Status status = work.proceed(trail.memory_bytes() + frontier.size() * sizeof(Reached)); !status.ok())
         return status;
     const std::vector<storage::Neighbour> steps = storage::neighbours(graph, next.frame, *hot);
     trail.settle(next.frame, steps, next.edge);

@@ -6,11 +6,6 @@ namespace relmap::rpc {
 
 namespace {
 
-using Context = grpc::CallbackServerContext;
-using Unary = grpc::ServerUnaryReactor;
-template <typename Reply>
-using Stream = grpc::ServerWriteReactor<Reply>;
-
 class AdminService final : public v1::Admin::CallbackService {
  public:
   AdminService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}

@@ -15,7 +15,7 @@ constexpr std::size_t kFramesPerMessage = 2000;  // of about 100 bytes each
 constexpr std::size_t kCheckStride = 256;
 
 // Where a stream broke: the session, and how many of its frames had been sent. Written like a frame id.
-struct Position {
+struct ExportPosition {
   SessionNumber session = 0;
   std::uint32_t frames = 0;
 };
@@ -38,7 +38,7 @@ class ExportStream {
   }
 
   // Skips what has been sent; the chain of poses is still followed from the start. INVALID_ARGUMENT.
-  Status skip_to(Position position) {
+  Status skip_to(ExportPosition position) {
     while (current_ < sessions_.size() && sessions_[current_].number != position.session)
       done_ += sessions_[current_++].frames;
     if (current_ == sessions_.size())

@@ -12,8 +12,8 @@ namespace relmap::rpc {
 namespace {
 
 constexpr std::uint32_t kDefaultDepth = 30;
-constexpr std::uint32_t kDefaultFrames = 1000;
-constexpr std::uint32_t kMaxFrames = 10000;
+constexpr std::uint32_t kDefaultNeighbours = 1000;
+constexpr std::uint32_t kMaxNeighbours = 10000;
 // The default limit of gRPC's clients is 4 MB.
 constexpr std::size_t kMaxReplyBytes = 3u << 20;
 constexpr std::size_t kBytesPerLandmark = 32;
@@ -56,7 +56,7 @@ Result<v1::GetNeighbourhoodReply> get_neighbourhood(const v1::GetNeighbourhoodRe
   within.edges = request.max_edges() == 0 ? kDefaultDepth : request.max_edges();
   if (request.max_metres() > 0) within.metres = request.max_metres();
   const std::uint64_t max_frames =
-      request.max_frames() == 0 ? kDefaultFrames : std::min(kMaxFrames, request.max_frames());
+      request.max_frames() == 0 ? kDefaultNeighbours : std::min(kMaxNeighbours, request.max_frames());
   SearchWork work(mapper.budget(), std::min(limits.max_search_frames, max_frames), deadline);
   const auto found = route::neighbourhood(*view, *root, within, work.limit());
   if (!found.ok()) return found.status();

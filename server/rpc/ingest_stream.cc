@@ -13,8 +13,8 @@
 namespace relmap::rpc {
 
 namespace {
-constexpr std::size_t kMaxSessions = 1024;  // on one stream
-constexpr std::size_t kMaxReplies = 256;    // that wait to be sent; beyond it news are dropped
+constexpr std::size_t kMaxStreamSessions = 1024;  // on one stream
+constexpr std::size_t kMaxReplies = 256;          // that wait to be sent; beyond it news are dropped
 // Memory of a usual incoming keyframe and of what waits to be sent. What gRPC holds has its own limit.
 constexpr std::size_t kStreamBytes = 64 * 1024;
 }  // namespace
@@ -103,8 +103,8 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
 
 Status IngestStream::join(const SessionUuid& session) {
   const MutexLock lock(mutex_);
-  if (sessions_.size() >= kMaxSessions && !sessions_.contains(session))
-    return {Reason::BUDGET_EXCEEDED, "more than " + std::to_string(kMaxSessions) + " sessions on one stream"};
+  if (sessions_.size() >= kMaxStreamSessions && !sessions_.contains(session))
+    return {Reason::BUDGET_EXCEEDED, "more than " + std::to_string(kMaxStreamSessions) + " sessions on one stream"};
   sessions_.insert(session);
   return {};
 }

@@ -6,11 +6,6 @@ namespace relmap::rpc {
 
 namespace {
 
-using Context = grpc::CallbackServerContext;
-using Unary = grpc::ServerUnaryReactor;
-template <typename Reply>
-using Stream = grpc::ServerWriteReactor<Reply>;
-
 class MapService final : public v1::Map::CallbackService {
  public:
   MapService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}

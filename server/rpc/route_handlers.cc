@@ -38,15 +38,15 @@ v1::RouteStep step_message(const route::RouteStep& step, bool covariance) {
 }
 
 // The step at which a stream broke, and the fingerprint of its request.
-struct Position {
+struct RoutePosition {
   std::size_t step = 0;
   std::uint32_t fingerprint = 0;
 
   std::string to_string() const { return std::to_string(step) + "," + std::to_string(fingerprint); }
-  static std::optional<Position> parse(const std::string& text) {
+  static std::optional<RoutePosition> parse(const std::string& text) {
     const std::size_t comma = text.find(',');
     if (comma == std::string::npos) return std::nullopt;
-    Position position;
+    RoutePosition position;
     const auto read = [&](std::size_t begin, std::size_t end, auto& number) {
       const auto [rest, error] = std::from_chars(text.data() + begin, text.data() + end, number);
       return error == std::errc{} && rest == text.data() + end;
@@ -104,7 +104,7 @@ class RouteStream {
     }
     if (next_ < route_.steps())
       reply.set_resume_token(
-          routes_.found.token(found_->number, found_, Position{next_, found_->fingerprint}.to_string()));
+          routes_.found.token(found_->number, found_, RoutePosition{next_, found_->fingerprint}.to_string()));
     return std::optional(std::move(reply));
   }
 
@@ -148,7 +148,7 @@ Result<Producer<v1::FindRouteReply>> resume(Routes& routes, const RpcLimits& lim
                                             const v1::FindRouteRequest& request, const Deadline& deadline) {
   const auto opened = routes.found.open(request.resume_token());
   if (!opened.ok()) return opened.status();
-  const auto position = Position::parse(opened->position);
+  const auto position = RoutePosition::parse(opened->position);
   if (!position || position->step == 0 || position->step >= opened->kept->answer.route.steps())
     return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
   // The ends may be left out, since the route is known.

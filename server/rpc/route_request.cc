@@ -18,8 +18,8 @@ namespace {
 
 constexpr int kMaxEnds = 100;  // alternatives; few of them may be pictures, since each takes time
 constexpr std::size_t kMaxPictures = 4;
-constexpr std::size_t kMaxFrames = 10'000;  // at an end, or to be avoided
-constexpr int kMaxLabels = 100, kMaxSessions = 10'000;
+constexpr std::size_t kMaxRouteFrames = 10'000;  // at an end, or to be avoided
+constexpr int kMaxAvoidedLabels = 100, kMaxRouteSessions = 10'000;
 
 Status too_many(const char* what, std::size_t max_count) {
   return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(max_count) + ' ' + what};
@@ -87,15 +87,15 @@ Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
 
 Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteFilter& given,
                                      const Deadline& deadline) {
-  if (given.sessions_size() > kMaxSessions) return too_many("sessions", kMaxSessions);
-  if (given.avoid_labels_size() > kMaxLabels) return too_many("labels to be avoided", kMaxLabels);
+  if (given.sessions_size() > kMaxRouteSessions) return too_many("sessions", kMaxRouteSessions);
+  if (given.avoid_labels_size() > kMaxAvoidedLabels) return too_many("labels to be avoided", kMaxAvoidedLabels);
   route::RouteFilter filter;
   for (const SessionNumber number : given.sessions()) {
     if (const auto session = storage::existing_session(map, number); !session.ok()) return session.status();
     filter.sessions.insert(number);
   }
-  if (static_cast<std::size_t>(given.avoid_frames_size()) > kMaxFrames)
-    return too_many("frames to be avoided", kMaxFrames);
+  if (static_cast<std::size_t>(given.avoid_frames_size()) > kMaxRouteFrames)
+    return too_many("frames to be avoided", kMaxRouteFrames);
   for (const v1::FrameId& avoided : given.avoid_frames()) {
     const auto frame = existing_frame(map, true, avoided, "the frame to be avoided");
     if (!frame.ok()) return frame.status();
@@ -105,7 +105,7 @@ Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteF
     const std::vector<FrameId> labelled = map.labelled(label);
     if (labelled.empty()) return {Reason::NO_SUCH_LABEL, "no frame is labelled '" + label + "'"};
     filter.avoided.insert(labelled.begin(), labelled.end());
-    if (filter.avoided.size() > kMaxFrames) return too_many("frames to be avoided", kMaxFrames);
+    if (filter.avoided.size() > kMaxRouteFrames) return too_many("frames to be avoided", kMaxRouteFrames);
     if (Status status = deadline.check(); !status.ok()) return status;
   }
   filter.min_support = given.min_support();
@@ -125,7 +125,8 @@ Result<RouteEnds> route_ends(map::Mapper& mapper, const storage::MapView& view, 
   const auto add = [&](const v1::RouteEnd& one) {
     Status status = add_end(mapper, view, one, what, deadline, ends);
     if (status.ok()) status = deadline.check();
-    return status.ok() && ends.frames.size() > kMaxFrames ? too_many("frames at one end", kMaxFrames) : status;
+    return status.ok() && ends.frames.size() > kMaxRouteFrames ? too_many("frames at one end", kMaxRouteFrames)
+                                                               : status;
   };
   if (Status status = add(end); !status.ok()) return status;
   for (const v1::RouteEnd& other : others)

@@ -36,9 +36,9 @@ class Server : public testing::Test {
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
     map_stub_ = v1::Map::NewStub(channel_);
   }
-  std::unique_ptr<grpc::ClientContext> context(int seconds = 20) {
+  std::unique_ptr<grpc::ClientContext> context(int within_s = 20) {
     auto context = std::make_unique<grpc::ClientContext>();
-    context->set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(seconds));
+    context->set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(within_s));
     return context;
   }
   grpc::Status get_frame(FrameId id, v1::GetFrameReply* reply, grpc::ClientContext* in = nullptr) {

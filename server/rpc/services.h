@@ -11,6 +11,12 @@
 
 namespace relmap::rpc {
 
+// What the methods of a service take and return.
+using Context = grpc::CallbackServerContext;
+using Unary = grpc::ServerUnaryReactor;
+template <typename Reply>
+using Stream = grpc::ServerWriteReactor<Reply>;
+
 std::unique_ptr<grpc::Service> make_map_service(Core& core, Gateway& gateway);
 std::unique_ptr<grpc::Service> make_ingest_service(Core& core, Gateway& gateway);
 std::unique_ptr<grpc::Service> make_admin_service(Core& core, Gateway& gateway);

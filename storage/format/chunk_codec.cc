@@ -7,8 +7,8 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x54504d52;  // "RMPT"
-constexpr std::size_t kHeaderBytes = 32;
+constexpr std::uint32_t kPartMagic = 0x54504d52;  // "RMPT"
+constexpr std::size_t kPartHeaderBytes = 32;
 constexpr std::size_t kEntryBytes = 12;
 
 }  // namespace
@@ -23,8 +23,8 @@ void PartWriter::copy(std::uint32_t slot, ByteSpan body, std::uint32_t crc) {
 
 Bytes PartWriter::finish() const {
   ByteWriter w;
-  w.reserve(kHeaderBytes + entries_.size() * kEntryBytes + sizeof(std::uint32_t) + bodies_.size());
-  w.put(kMagic);
+  w.reserve(kPartHeaderBytes + entries_.size() * kEntryBytes + sizeof(std::uint32_t) + bodies_.size());
+  w.put(kPartMagic);
   w.put(kPartVersion);
   w.put(part_);
   w.put(static_cast<std::uint8_t>(entries_.size()));
@@ -61,7 +61,7 @@ Result<PartReader> PartReader::open(ByteSpan bytes, Part part, ChunkId id, std::
   const ByteSpan index = r.get_bytes(count * kEntryBytes);
   const auto crc = r.get<std::uint32_t>();
   if (!r.ok()) return Status(Reason::TRUNCATED, "a chunk part of " + std::to_string(bytes.size()) + " bytes");
-  if (crc != crc32c(bytes.first(kHeaderBytes + index.size())) || magic != kMagic)
+  if (crc != crc32c(bytes.first(kPartHeaderBytes + index.size())) || magic != kPartMagic)
     return Status(Reason::CORRUPT, "header of a chunk part");
   if (stored_version != version)
     return Status(Reason::UNKNOWN_FORMAT_VERSION, "chunk part of version " + std::to_string(stored_version));

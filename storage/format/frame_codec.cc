@@ -75,7 +75,7 @@ bool has_evidence(const Edge& e) {
          !e.bound_frames.empty() || !e.consistent_with.empty();
 }
 
-Extensions extensions_of(const Edge& e) {
+Extensions edge_extensions(const Edge& e) {
   Extensions all = e.unknown;
   tags::add_uniqueness(all, e.uniqueness);
   tags::add_carried(all, e.carried);
@@ -129,7 +129,7 @@ void get_evidence(ByteReader& r, Edge& e, FrameId id) {
 void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   const bool ends_here = e.id.frame == id && e.b == id;
   const bool correlated = !is_zero(e.correlation_with_previous);
-  const Extensions extensions = extensions_of(e);
+  const Extensions extensions = edge_extensions(e);
   w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated, !e.history.empty(),
               !e.carried_by.empty(), !extensions.empty()));
   put_pair(w, e.kind, e.state);
@@ -283,14 +283,14 @@ void get_landmarks(ByteReader& r, std::vector<Landmark>& landmarks, FrameId id) 
 }
 
 constexpr std::uint8_t kLevelInFlags = 31;  // the level follows in a byte of its own
-constexpr std::uint8_t kAligned = 0x80;
+constexpr std::uint8_t kAlignedObservation = 0x80;
 constexpr std::uint32_t kMono = 0x7fc00000;  // a quiet NaN
 
 void put_observation(ByteWriter& w, const Observation& o, FrameId id) {
   const bool bound = o.origin != EdgeId();
   const bool mono = std::bit_cast<std::uint32_t>(o.u_right) == kMono;
   const std::uint8_t level = std::min(o.level, kLevelInFlags);
-  w.put(static_cast<std::uint8_t>(flags(bound, mono) | (level << 2) | (o.aligned ? kAligned : 0)));
+  w.put(static_cast<std::uint8_t>(flags(bound, mono) | (level << 2) | (o.aligned ? kAlignedObservation : 0)));
   if (level == kLevelInFlags) w.put(o.level);
   varint::put(w, o.landmark, id);
   if (bound) varint::put(w, o.origin, id);
@@ -303,7 +303,7 @@ Observation get_observation(ByteReader& r, FrameId id) {
   Observation o;
   const auto byte = r.get<std::uint8_t>();
   o.level = (byte >> 2) & 31;
-  o.aligned = (byte & kAligned) != 0;
+  o.aligned = (byte & kAlignedObservation) != 0;
   if (o.level == kLevelInFlags) o.level = r.get<std::uint8_t>();
   o.landmark = varint::get_landmark(r, id);
   if (flag(byte, 0)) o.origin = varint::get_edge(r, id);

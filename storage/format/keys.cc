@@ -3,9 +3,6 @@
 namespace relmap::storage::keys {
 namespace {
 
-constexpr std::size_t kPrefix = 1;
-constexpr std::size_t kFrameKey = kPrefix + 9;
-
 char family(Part part) {
   switch (part) {
     case Part::kHot:
@@ -75,7 +72,7 @@ std::string_view all_skipped() { return "g"; }
 std::string pending(ChunkId id) { return chunk_key(all_pending(), id); }
 std::string_view all_pending() { return "q"; }
 std::optional<ChunkId> pending_of(std::string_view key) {
-  if (key.size() != kFrameKey - 1) return std::nullopt;
+  if (key.size() != kChunkKey) return std::nullopt;
   return ChunkId{get_u32(key.substr(1)), get_u32(key.substr(5))};
 }
 
@@ -98,7 +95,7 @@ std::optional<FrameId> frame_of(std::string_view key) {
 }
 
 std::optional<PartKey> part_of(std::string_view key) {
-  if (key.size() != kFrameKey && key.size() != kFrameKey - 1) return std::nullopt;
+  if (key.size() != kFrameKey && key.size() != kChunkKey) return std::nullopt;
   for (const Part part : {Part::kHot, Part::kWarm, Part::kCold, Part::kWords}) {
     if (key[0] != family(part)) continue;
     PartKey found{part, {get_u32(key.substr(1)), get_u32(key.substr(5))}, std::nullopt};
@@ -122,7 +119,7 @@ std::string label(std::string_view label, FrameId id) {
 
 std::optional<LabelKey> label_of(std::string_view key) {
   LabelKey out;
-  std::size_t i = kPrefix;
+  std::size_t i = 1;
   for (; i + 1 < key.size(); ++i) {
     if (key[i] != '\0') {
       out.label.push_back(key[i]);

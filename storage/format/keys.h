@@ -2,6 +2,7 @@
 // as the identities do.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -9,6 +10,9 @@
 #include "storage/graph/chunk.h"
 
 namespace relmap::storage::keys {
+
+// Sizes of the keys of a session, of a part of a closed chunk, and of a part of a frame.
+inline constexpr std::size_t kSessionKey = 5, kChunkKey = 9, kFrameKey = 10;
 
 // Whether this version knows keys that begin with `first`. Keys of a later version begin with another byte; they are
 // kept as they are, and readers ignore them.

@@ -5,13 +5,13 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 8;  // u16 version, u8 kind, u8 zero, u32 length of the body
+constexpr std::size_t kSealedHeaderBytes = 8;  // u16 version, u8 kind, u8 zero, u32 length of the body
 
 }  // namespace
 
 Bytes seal(std::uint8_t kind, std::uint16_t version, ByteSpan body) {
   ByteWriter w;
-  w.reserve(kHeaderBytes + body.size() + sizeof(std::uint32_t));
+  w.reserve(kSealedHeaderBytes + body.size() + sizeof(std::uint32_t));
   w.put(version);
   w.put(kind);
   w.put(std::uint8_t{0});

@@ -8,12 +8,12 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::uint16_t kVersion = 4;  // of a session, and of the map's state
+constexpr std::uint16_t kStateVersion = 4;  // of a session, and of the map's state
 // The version of map format 2 where a session is open, or where idle work did not come last. Otherwise that format
 // wrote version 3, with the session's state, or the number of records of idle work, behind all else. Skipped sequences
 // and pending frames still have this version.
 constexpr std::uint16_t kFormat2 = 2;
-constexpr std::uint8_t kSession = 1, kState = 2, kSkipped = 3, kPending = 4;
+constexpr std::uint8_t kSessionKind = 1, kStateKind = 2, kSkippedKind = 3, kPendingKind = 4;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
 
@@ -94,24 +94,24 @@ Bytes encode_session(const Session& s) {
   Extensions extensions = s.unknown;
   tags::add_before_frozen(extensions, s.before_frozen);
   put_extensions(w, extensions);
-  return seal(kSession, kVersion, w.bytes());
+  return seal(kSessionKind, kStateVersion, w.bytes());
 }
 
 Result<Session> decode_session(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kFormat2, kVersion);
+  const auto sealed = unseal(bytes, kFormat2, kStateVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   Session s = get_session(r);
   s.refused = r.get<std::uint64_t>();
   s.given_up = r.get<std::uint64_t>();
   if (sealed->version > kFormat2) s.state = r.get<SessionState>();
-  if (sealed->version == kVersion) {
+  if (sealed->version == kStateVersion) {
     if (!set_header_extensions(s.header, get_extensions(r))) return malformed("session");
     s.unknown = get_extensions(r);
     if (!tags::take_before_frozen(s.unknown, s.before_frozen)) return malformed("session");
   }
   if (s.state > SessionState::kDeleting) return malformed("session");
-  if (sealed->kind != kSession || !r.at_end()) return malformed("session");
+  if (sealed->kind != kSessionKind || !r.at_end()) return malformed("session");
   return s;
 }
 
@@ -122,7 +122,7 @@ Bytes encode_skipped(const Skipped& skipped) {
   w.put(skipped.crc);
   codec::put_bool(w, skipped.refused);
   w.put(skipped.reason);
-  return seal(kSkipped, kFormat2, w.bytes());
+  return seal(kSkippedKind, kFormat2, w.bytes());
 }
 
 Result<Skipped> decode_skipped(ByteSpan bytes) {
@@ -135,14 +135,14 @@ Result<Skipped> decode_skipped(ByteSpan bytes) {
   skipped.crc = r.get<std::uint32_t>();
   skipped.refused = codec::get_bool(r);
   skipped.reason = r.get<Reason>();
-  if (sealed->kind != kSkipped || !r.at_end()) return malformed("record of skipped sequences");
+  if (sealed->kind != kSkippedKind || !r.at_end()) return malformed("record of skipped sequences");
   return skipped;
 }
 
 Bytes encode_pending(std::uint64_t frames) {
   ByteWriter w;
   w.put(frames);
-  return seal(kPending, kFormat2, w.bytes());
+  return seal(kPendingKind, kFormat2, w.bytes());
 }
 
 Result<std::uint64_t> decode_pending(ByteSpan bytes) {
@@ -150,7 +150,7 @@ Result<std::uint64_t> decode_pending(ByteSpan bytes) {
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   const auto frames = r.get<std::uint64_t>();
-  if (sealed->kind != kPending || !r.at_end() || frames == 0) return malformed("record of frames that wait");
+  if (sealed->kind != kPendingKind || !r.at_end() || frames == 0) return malformed("record of frames that wait");
   return frames;
 }
 
@@ -173,11 +173,11 @@ Bytes encode_state(const MapState& s) {
   Extensions extensions = s.unknown;
   tags::add_map_identity(extensions, s.identity);
   put_extensions(w, extensions);
-  return seal(kState, kVersion, w.bytes());
+  return seal(kStateKind, kStateVersion, w.bytes());
 }
 
 Result<MapState> decode_state(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kFormat2, kVersion);
+  const auto sealed = unseal(bytes, kFormat2, kStateVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   MapState s;
@@ -185,11 +185,11 @@ Result<MapState> decode_state(ByteSpan bytes) {
   std::vector<FrameId> lookups;
   if (!codec::get_table(r, lookups, codec::get_frame)) return malformed("state");
   if (sealed->version > kFormat2) s.idle_records = r.get<std::uint32_t>();
-  if (sealed->version == kVersion) {
+  if (sealed->version == kStateVersion) {
     s.unknown = get_extensions(r);
     if (!tags::take_map_identity(s.unknown, s.identity)) return malformed("state");
   }
-  if (!r.at_end() || sealed->kind != kState) return malformed("state");
+  if (!r.at_end() || sealed->kind != kStateKind) return malformed("state");
   s.lookups = {lookups.begin(), lookups.end()};
   return s;
 }

@@ -10,13 +10,6 @@
 namespace relmap::storage {
 namespace {
 
-SmallGraph chain(std::uint32_t frames, SessionNumber session = 1) {
-  SmallGraph graph;
-  graph.frame({session, 0});
-  for (std::uint32_t i = 1; i < frames; ++i) graph.join({session, i - 1}, {session, i});
-  return graph;
-}
-
 // Sessions that grow side by side, loop edges from newer frames to older ones, some of them not in force.
 class RandomSessions {
  public:
@@ -182,7 +175,7 @@ TEST(LocalGraph, ATreeHoldsThePathToEachObserver) {
 }
 
 TEST(LocalGraph, FramesFurtherThanThirtyEdgesAreOutOfReach) {
-  const SmallGraph graph = chain(100);
+  const SmallGraph graph = chain_of(100);
   LocalGraph local(graph);
   std::vector<LocalStep> steps;
   EXPECT_TRUE(local.path(local.frame({1, 20}), local.frame({1, 50}), &steps));
@@ -194,7 +187,7 @@ TEST(LocalGraph, FramesFurtherThanThirtyEdgesAreOutOfReach) {
 
 TEST(LocalGraph, APlacePassedOftenIsOneLoopEdgeAwayFromEachPass) {
   // A hundred passes, each tied to frame 10 of the first.
-  SmallGraph graph = chain(21);
+  SmallGraph graph = chain_of(21);
   for (SessionNumber pass = 2; pass <= 100; ++pass) {
     graph.frame({pass, 0});
     for (std::uint32_t i = 1; i < 21; ++i) graph.join({pass, i - 1}, {pass, i});
@@ -237,7 +230,7 @@ TEST(LocalGraph, OneEdgeMayLieOnTwoPathsFromTheBase) {
 }
 
 TEST(LocalGraph, NearestFramesAreThoseOfTheWalkUp) {
-  SmallGraph graph = chain(21);
+  SmallGraph graph = chain_of(21);
   graph.frame({2, 0});
   for (std::uint32_t i = 1; i < 21; ++i) graph.join({2, i - 1}, {2, i});
   graph.join({1, 5}, {2, 10}, 1).kind = EdgeKind::kLoop;

@@ -10,13 +10,6 @@ namespace {
 
 constexpr std::uint32_t kDepth = PathLimits().depth;
 
-SmallGraph chain(std::uint32_t frames) {
-  SmallGraph graph;
-  graph.frame({1, 0});
-  for (std::uint32_t i = 1; i < frames; ++i) graph.join({1, i - 1}, {1, i});
-  return graph;
-}
-
 std::vector<std::uint32_t> order(const PathTree& tree) {
   std::vector<std::uint32_t> indices;
   for (const PathNode& node : tree.nodes) indices.push_back(node.frame.index);
@@ -24,7 +17,7 @@ std::vector<std::uint32_t> order(const PathTree& tree) {
 }
 
 TEST(Neighbours, AreThoseOfAcceptedCarryingEdgesInIncreasingEdgeId) {
-  SmallGraph graph = chain(10);
+  SmallGraph graph = chain_of(10);
   graph.join({1, 2}, {1, 9}, 1);
   graph.join({1, 2}, {1, 8}, 1).state = EdgeState::kCandidate;
   graph.join({1, 2}, {1, 7}, 1).carries = false;
@@ -41,7 +34,7 @@ TEST(Neighbours, AreThoseOfAcceptedCarryingEdgesInIncreasingEdgeId) {
 }
 
 TEST(PathTree, IsBreadthFirstInIncreasingEdgeIdAndTheFirstDiscoveryWins) {
-  SmallGraph graph = chain(6);
+  SmallGraph graph = chain_of(6);
   graph.join({1, 1}, {1, 5}, 1);  // 0-1-5 is as long as 0-1-2, and 4 is reached from 3 or 5
   const PathTree tree = build_path_tree(graph, {1, 0});
   EXPECT_EQ(order(tree), (std::vector<std::uint32_t>{0, 1, 2, 5, 3, 4}));
@@ -52,19 +45,19 @@ TEST(PathTree, IsBreadthFirstInIncreasingEdgeIdAndTheFirstDiscoveryWins) {
 }
 
 TEST(PathTree, IsCutAtItsDepthAndAtItsNumberOfFrames) {
-  const SmallGraph graph = chain(100);
+  const SmallGraph graph = chain_of(100);
   const PathTree deep = build_path_tree(graph, {1, 0});
   EXPECT_EQ(deep.nodes.size(), kDepth + 1);
   EXPECT_TRUE(deep.cut);
   const PathTree few = build_path_tree(graph, {1, 50}, {kDepth, 7});
   EXPECT_EQ(few.nodes.size(), 7u);
   EXPECT_TRUE(few.cut);
-  EXPECT_FALSE(build_path_tree(chain(kDepth + 1), {1, 0}).cut);
-  EXPECT_FALSE(build_path_tree(chain(7), {1, 0}, {kDepth, 7}).cut);
+  EXPECT_FALSE(build_path_tree(chain_of(kDepth + 1), {1, 0}).cut);
+  EXPECT_FALSE(build_path_tree(chain_of(7), {1, 0}, {kDepth, 7}).cut);
 }
 
 TEST(PathTree, StopsAtTheFrameLookedForWithTheSamePathToIt) {
-  SmallGraph graph = chain(20);
+  SmallGraph graph = chain_of(20);
   graph.join({1, 3}, {1, 15}, 1);
   const PathTree whole = build_path_tree(graph, {1, 0});
   PathLimits limits;
@@ -76,7 +69,7 @@ TEST(PathTree, StopsAtTheFrameLookedForWithTheSamePathToIt) {
   for (std::size_t i = 0; i < part.nodes.size(); ++i) EXPECT_EQ(part.nodes[i].frame, whole.nodes[i].frame);
 }
 
-TEST(PathTree, IsEmptyForAFrameThatDoesNotExist) { EXPECT_TRUE(build_path_tree(chain(3), {2, 0}).nodes.empty()); }
+TEST(PathTree, IsEmptyForAFrameThatDoesNotExist) { EXPECT_TRUE(build_path_tree(chain_of(3), {2, 0}).nodes.empty()); }
 
 TEST(PathTree, PosesCompoundTheEdgesInBothDirections) {
   RandomFrames random(4);

@@ -9,7 +9,7 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kRecordVersion = 1;
 constexpr std::uint16_t kExtended = 2;  // of records that end in extensions
 
 // Numbers on disk; they never change.
@@ -27,7 +27,7 @@ enum Kind : std::uint8_t {
   kRemoveChunk = 11,
 };
 
-constexpr std::uint8_t kAligned = 0x80;  // beside the level, which is at most 31
+constexpr std::uint8_t kAlignedBinding = 0x80;  // beside the level, which is at most 31
 
 void put_bindings(ByteWriter& w, const std::vector<ProposedBinding>& bindings) {
   codec::put_table(w, bindings, [](ByteWriter& out, const ProposedBinding& b) {
@@ -36,7 +36,7 @@ void put_bindings(ByteWriter& w, const std::vector<ProposedBinding>& bindings) {
     out.put(b.u_left);
     out.put(b.v);
     out.put(b.u_right);
-    out.put(static_cast<std::uint8_t>(b.level | (b.aligned ? kAligned : 0)));
+    out.put(static_cast<std::uint8_t>(b.level | (b.aligned ? kAlignedBinding : 0)));
   });
 }
 
@@ -49,8 +49,8 @@ bool get_bindings(ByteReader& r, std::vector<ProposedBinding>& bindings) {
     b.v = in.get<float>();
     b.u_right = in.get<float>();
     const auto level = in.get<std::uint8_t>();
-    b.level = level & ~kAligned;
-    b.aligned = (level & kAligned) != 0;
+    b.level = level & ~kAlignedBinding;
+    b.aligned = (level & kAlignedBinding) != 0;
     return b;
   });
 }
@@ -272,13 +272,13 @@ Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_thro
   w.put(acknowledged_through);
   const Kind kind = std::visit([&](const auto& x) { return put(w, x); }, record);
   const Extensions extensions = std::visit([](const auto& x) { return extensions_of(x); }, record);
-  if (extensions.empty()) return seal(kind, kVersion, w.bytes());
+  if (extensions.empty()) return seal(kind, kRecordVersion, w.bytes());
   put_extensions(w, extensions);
   return seal(kind, kExtended, w.bytes());
 }
 
 Result<DecodedRecord> decode_record(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion, kExtended);
+  const auto sealed = unseal(bytes, kRecordVersion, kExtended);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   const auto acknowledged = r.get<std::uint64_t>();

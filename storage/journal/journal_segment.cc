@@ -12,8 +12,8 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::uint32_t kMagic = 0x4c4a4d52;  // "RMJL"
-constexpr std::uint16_t kUnsalted = 1, kVersion = 2;
+constexpr std::uint32_t kSegmentMagic = 0x4c4a4d52;  // "RMJL"
+constexpr std::uint16_t kUnsalted = 1, kSegmentVersion = 2;
 constexpr std::size_t kSaltBytes = sizeof(std::uint64_t);
 // Sizes without the salt. It stands before the reserved field in a segment's header, and at the beginning of a
 // record's.
@@ -25,7 +25,7 @@ struct RecordHeader {
   std::uint64_t sequence, acknowledged_through;
 };
 
-RecordHeader get_header(ByteReader& r) {
+RecordHeader get_record_header(ByteReader& r) {
   RecordHeader h{};
   h.length = r.get<std::uint32_t>();
   h.crc = r.get<std::uint32_t>();
@@ -71,8 +71,8 @@ std::uint64_t random_salt() {
 
 Bytes segment_header(std::uint64_t first, std::uint64_t salt) {
   ByteWriter w;
-  w.put(kMagic);
-  w.put(kVersion);
+  w.put(kSegmentMagic);
+  w.put(kSegmentVersion);
   w.put(std::uint16_t{0});
   w.put(first);
   w.put(salt);
@@ -116,8 +116,9 @@ Result<SegmentReader> SegmentReader::open(const FileSystem& files, const std::st
   if (version != kUnsalted) salt = r.get<std::uint64_t>();
   r.get<std::uint32_t>();
   const std::size_t before_crc = r.position();
-  if (magic != kMagic || r.get<std::uint32_t>() != crc32c(ByteSpan(*bytes).first(before_crc)) || !r.ok()) return reader;
-  if (version < kUnsalted || version > kVersion)
+  if (magic != kSegmentMagic || r.get<std::uint32_t>() != crc32c(ByteSpan(*bytes).first(before_crc)) || !r.ok())
+    return reader;
+  if (version < kUnsalted || version > kSegmentVersion)
     return Status(Reason::UNKNOWN_FORMAT_VERSION, path + " is of version " + std::to_string(version));
   if (salt != reader.salt_) return Status(Reason::CORRUPT, path + " is not the segment that its name says");
   reader.header_whole_ = true;
@@ -132,7 +133,7 @@ Result<std::optional<SegmentRecord>> SegmentReader::record_at(std::uint64_t offs
   if (!head.ok()) return head.status();
   ByteReader r(*head);
   if (salt_ && r.get<std::uint64_t>() != *salt_) return std::optional<SegmentRecord>();
-  const RecordHeader h = get_header(r);
+  const RecordHeader h = get_record_header(r);
   if (h.length > kMaxRecordBytes || h.length > size() - offset - head_size || h.acknowledged_through >= h.sequence)
     return std::optional<SegmentRecord>();
   auto payload = file_->read(offset + head_size, h.length);
@@ -152,7 +153,7 @@ Result<std::optional<SegmentRecord>> SegmentReader::find_after(std::uint64_t off
   if (!rest.ok()) return rest.status();
   const auto found_at = [&](std::size_t i) -> Result<std::optional<SegmentRecord>> {
     ByteReader r(ByteSpan(*rest).subspan(i + (salt_ ? kSaltBytes : 0)));
-    const RecordHeader h = get_header(r);
+    const RecordHeader h = get_record_header(r);
     if (!r.ok() || h.sequence <= after || h.sequence - after > kFar) return std::optional<SegmentRecord>();
     return record_at(offset + i);
   };

@@ -40,10 +40,6 @@ void rebuild(Map& map, const Difference& difference) {
   }
 }
 
-void throw_if(const Status& status) {
-  if (!status.ok()) throw StatusError(status);
-}
-
 // One round. Returns how many items it corrected.
 std::uint64_t rebuild_once(Map& map, Engine& engine, std::size_t memory_bytes, const OnFinding& on_finding,
                            const OnProgress& on_progress) {

@@ -10,10 +10,6 @@
 namespace relmap::storage {
 namespace {
 
-void throw_if(const Status& status) {
-  if (!status.ok()) throw StatusError(status);
-}
-
 class Repair {
  public:
   Repair(const std::shared_ptr<Engine>& engine, const std::string& quarantine, const RepairOptions& options,

@@ -17,7 +17,6 @@ namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kBatchBytes = std::size_t{8} << 20;
-constexpr std::size_t kChunkKey = 9;  // length of the key of a closed chunk's part; that of a frame's is longer
 
 void encode(ByteWriter& w, FrameId id, const FrameHot& frame) { encode_hot(w, id, frame); }
 void encode(ByteWriter& w, FrameId id, const FrameWarm& frame) { encode_warm(w, id, frame); }
@@ -71,7 +70,7 @@ class Rewriter {
   }
   static std::string name_of(Part part, ChunkId id, const std::string& key) {
     std::string name = std::string(part_name(part)) + "-" + std::to_string(id.session) + "-" + std::to_string(id.chunk);
-    if (key.size() > kChunkKey) name += "-" + std::to_string(static_cast<std::uint8_t>(key.back()));
+    if (key.size() > keys::kChunkKey) name += "-" + std::to_string(static_cast<std::uint8_t>(key.back()));
     return name;
   }
   void put(const std::string& key, Bytes value) {

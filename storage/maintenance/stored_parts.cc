@@ -10,12 +10,10 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::size_t kFamily = 1, kSessionKey = kFamily + 4, kChunkKey = kSessionKey + 4, kFrameKey = kChunkKey + 1;
-
 // The chunk of a part's key; nullopt if it is not the key of a part.
 std::optional<ChunkId> chunk_of_key(std::string_view key) {
-  if (key.size() != kChunkKey && key.size() != kFrameKey) return std::nullopt;
-  const auto frame = keys::frame_of(std::string(key.substr(0, kChunkKey)) + '\0');
+  if (key.size() != keys::kChunkKey && key.size() != keys::kFrameKey) return std::nullopt;
+  const auto frame = keys::frame_of(std::string(key.substr(0, keys::kChunkKey)) + '\0');
   return frame ? std::optional<ChunkId>(chunk_id(*frame)) : std::nullopt;
 }
 
@@ -35,8 +33,8 @@ class Walk {
       return going_;
     });
     if (scanned.ok() || !going_) return going_;
-    if (prefix.size() >= kChunkKey) return run_singly(prefix);
-    const std::uint32_t step = std::uint32_t{1} << (8 * (kChunkKey - prefix.size() - 1));
+    if (prefix.size() >= keys::kChunkKey) return run_singly(prefix);
+    const std::uint32_t step = std::uint32_t{1} << (8 * (keys::kChunkKey - prefix.size() - 1));
     for (std::uint32_t byte = 0; byte < 256 && going_; ++byte) {
       const std::uint32_t low = first + byte * step, high = low + (step - 1);
       if (high < span_.first || low > span_.last) continue;
@@ -87,7 +85,7 @@ template <typename Frame>
 void take(StoredPart<Frame>& part, std::string_view key, ByteSpan value, const Status& status) {
   constexpr Part kPart = kPartOf<Frame>;
   part.keys.emplace_back(key);
-  const bool single = key.size() == kFrameKey;
+  const bool single = key.size() == keys::kFrameKey;
   const auto slot_of_key = static_cast<std::uint8_t>(key.back());
   const auto lost = [&](std::uint64_t slots, const std::string& why) {
     const std::string where = slots ? "frame " + slots_named(part.id, slots) : "chunk " + part.id.to_string();
@@ -115,7 +113,7 @@ void take(StoredPart<Frame>& part, std::string_view key, ByteSpan value, const S
 }
 
 std::string session_key(Part part, SessionNumber session) {
-  return keys::part(part, {session, 0}).substr(0, kSessionKey);
+  return keys::part(part, {session, 0}).substr(0, keys::kSessionKey);
 }
 
 }  // namespace

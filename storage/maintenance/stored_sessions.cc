@@ -11,12 +11,11 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::size_t kSessionKey = 5;
 constexpr SessionNumber kBehind = 16;  // numbers that are tried behind the highest known one
 
 SessionNumber number_in(std::string_view key) {
   SessionNumber number = 0;
-  for (std::size_t i = 1; i < kSessionKey; ++i) number = (number << 8) | static_cast<std::uint8_t>(key[i]);
+  for (std::size_t i = 1; i < keys::kSessionKey; ++i) number = (number << 8) | static_cast<std::uint8_t>(key[i]);
   return number;
 }
 
@@ -25,7 +24,7 @@ SessionNumber number_in(std::string_view key) {
 StoredSessions load_sessions(const EngineSnapshot& snapshot) {
   StoredSessions all;
   const auto take = [&](std::string_view key, ByteSpan value, const Status& status) {
-    const SessionNumber number = key.size() == kSessionKey ? number_in(key) : 0;
+    const SessionNumber number = key.size() == keys::kSessionKey ? number_in(key) : 0;
     auto session = status.ok() ? decode_session(value) : Result<Session>(status);
     if (session.ok() && session->number == number && number != 0)
       all.sessions.push_back(std::move(*session));
@@ -36,7 +35,7 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
   };
   std::set<SessionNumber> seen;
   const Status scanned = snapshot.scan(keys::all_sessions(), [&](std::string_view key, ByteSpan value) {
-    if (key.size() == kSessionKey) seen.insert(number_in(key));
+    if (key.size() == keys::kSessionKey) seen.insert(number_in(key));
     take(key, value, Status());
     return true;
   });

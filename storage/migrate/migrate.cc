@@ -38,10 +38,6 @@ constexpr std::size_t kRebuildBytes = std::size_t{128} << 20;
                            std::string(part_name(key.part)) + " part of chunk " + key.chunk.to_string() + ": " + what));
 }
 
-void expect(const Status& status) {
-  if (!status.ok()) throw StatusError(status);
-}
-
 template <typename Frame>
 Frame whole(const keys::PartKey& key, std::optional<Frame> frame) {
   if (!frame) lost(key, "malformed record");
@@ -88,7 +84,7 @@ class Target {
     if (bytes_ >= kBatchBytes) flush();
   }
   void flush() {
-    expect(engine_->commit(epoch_, applied_, puts_, {}));
+    throw_if(engine_->commit(epoch_, applied_, puts_, {}));
     puts_.clear();
     bytes_ = 0;
   }
@@ -125,7 +121,7 @@ std::uint64_t copy_format1(const Engine& source, Target& target, const Progress&
   const auto snapshot = source.snapshot();
   std::uint64_t total = 0, done = 0, commit = 0;
   SessionNumber sessions = 0;
-  expect(snapshot->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
+  throw_if(snapshot->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
     const format1::SessionRecord record = format1::decode_session(value).or_throw();
     total += record.session.frames;
     sessions = std::max(sessions, record.session.number);
@@ -134,7 +130,7 @@ std::uint64_t copy_format1(const Engine& source, Target& target, const Progress&
       target.put(keys::skipped(record.session.number, item.to), encode_skipped(item));
     return true;
   }));
-  expect(snapshot->scan("", [&](std::string_view key, ByteSpan value) {
+  throw_if(snapshot->scan("", [&](std::string_view key, ByteSpan value) {
     const auto part = keys::part_of(key);
     if (!part) {
       if (key == keys::map_state())
@@ -181,7 +177,7 @@ void copy_journal(const Engine& source, const std::string& directory) {
     group.clear();
     bytes = 0;
   };
-  expect(source.read_journal(source.applied_sequence() + 1, [&](std::uint64_t, ByteSpan record) {
+  throw_if(source.read_journal(source.applied_sequence() + 1, [&](std::uint64_t, ByteSpan record) {
     group.emplace_back(record.begin(), record.end());
     bytes += record.size();
     if (bytes >= kBatchBytes) append();
@@ -195,14 +191,14 @@ void copy_journal(const Engine& source, const std::string& directory) {
 std::uint64_t copy_format2(const Engine& source, const std::string& from, const std::string& to,
                            const Progress& progress) {
   std::uint64_t frames = 0;
-  expect(source.snapshot()->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
+  throw_if(source.snapshot()->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
     frames += decode_session(value).or_throw().frames;
     return true;
   }));
   const auto files = posix_file_system();
-  expect(files->create_directory(to));
+  throw_if(files->create_directory(to));
   for (const char* part : {"/journal", "/map"}) {
-    expect(files->create_directory(to + part));
+    throw_if(files->create_directory(to + part));
     for (const auto& entry : fs::directory_iterator(from + part)) {
       const std::string name = entry.path().filename().string(), target = to + part + "/" + name;
       if (!entry.is_regular_file() || name == "LOCK") continue;
@@ -211,11 +207,11 @@ std::uint64_t copy_format2(const Engine& source, const std::string& from, const 
         fs::create_hard_link(entry.path(), target, not_linked);
       if (!not_linked) continue;
       const auto file = files->open_read(entry.path().string()).or_throw();
-      expect(copy_file(*file, file->size(), *files, target, [](std::uint64_t) { return Status(); }));
+      throw_if(copy_file(*file, file->size(), *files, target, [](std::uint64_t) { return Status(); }));
       if (progress) progress(0, frames);
     }
   }
-  expect(write_format(to, kFolderFormat));
+  throw_if(write_format(to, kFolderFormat));
   if (progress) progress(frames, frames);
   return frames;
 }
@@ -268,9 +264,9 @@ Result<MigrateSummary> migrate(const std::string& directory, const Progress& pro
     summary.frames = copy_format2(*source, directory, draft, progress);
   }
   for (const std::string& folder : {draft + "/map", draft + "/journal", draft, parent})
-    expect(files->sync_directory(folder));
+    throw_if(files->sync_directory(folder));
   exchange(directory, draft);
-  expect(files->sync_directory(parent));
+  throw_if(files->sync_directory(parent));
   if (Status kept = keep(format); !kept.ok()) return kept;
   return summary;
 }

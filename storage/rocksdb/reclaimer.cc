@@ -5,7 +5,7 @@
 namespace relmap::storage {
 namespace {
 
-constexpr std::uint64_t kLook = 32;  // commits between two looks
+constexpr std::uint64_t kCommitsPerLook = 32;
 constexpr std::uint64_t kMinBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kShare = 2;  // collected at half of what is kept: freeing a byte moves two
 
@@ -26,7 +26,7 @@ bool Reclaimer::due() const {
 }
 
 void Reclaimer::look() {
-  if (++commits_ % kLook != 0 || working_ || !due()) return;
+  if (++commits_ % kCommitsPerLook != 0 || working_ || !due()) return;
   if (thread_.joinable()) thread_.join();
   working_ = true;
   thread_ = std::thread([this] {

@@ -23,10 +23,7 @@ namespace fs = std::filesystem;
 // folder that is left beside the map without this file is the damaged one, after the exchange.
 constexpr const char* kComplete = "/COMPLETE";
 
-Status failed(const std::string& what) { return Status(Reason::IO_ERROR, what + ": " + std::strerror(errno)); }
-void throw_if(const Status& status) {
-  if (!status.ok()) throw StatusError(status);
-}
+Status io_error(const std::string& what) { return Status(Reason::IO_ERROR, what + ": " + std::strerror(errno)); }
 
 class FolderRepair {
  public:
@@ -154,13 +151,13 @@ class FolderRepair {
       keep(own, name.substr(1));
       move(other, own);
     } else {
-      throw StatusError(failed("exchanging " + own));
+      throw StatusError(io_error("exchanging " + own));
     }
     std::error_code ignored;
     fs::remove(own + kComplete, ignored);
   }
   void move(const std::string& from, const std::string& to) {
-    if (::rename(from.c_str(), to.c_str()) != 0) throw StatusError(failed("moving " + from));
+    if (::rename(from.c_str(), to.c_str()) != 0) throw StatusError(io_error("moving " + from));
     throw_if(files_->sync_directory(fs::path(to).parent_path()));
     throw_if(files_->sync_directory(fs::path(from).parent_path()));
   }

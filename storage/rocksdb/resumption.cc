@@ -13,7 +13,6 @@ namespace relmap::storage {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Properties = rocksdb::DB::Properties;
 
 constexpr auto kPatience = std::chrono::seconds(30);
 constexpr auto kMaxPause = std::chrono::microseconds(20'000);
@@ -37,6 +36,7 @@ Resumption::~Resumption() {
 }
 
 rocksdb::Status Resumption::go_on() {
+  using Properties = rocksdb::DB::Properties;
   const std::uint64_t errors = rocksdb_property(db_, Properties::kBackgroundErrors);
   if (!failed_ && errors == background_errors_) return {};
   if (!resuming_.valid()) {
@@ -52,6 +52,7 @@ rocksdb::Status Resumption::go_on() {
 }
 
 void Resumption::let_flush_start() const {
+  using Properties = rocksdb::DB::Properties;
   const auto started = [&] {
     return rocksdb_property(db_, Properties::kMemTableFlushPending) == 0 ||
            rocksdb_property(db_, Properties::kNumRunningFlushes) > 0;

@@ -48,4 +48,12 @@ class SmallGraph final : public PartialGraph {
   std::map<FrameId, std::shared_ptr<FrameWarm>> warm_;
 };
 
+// A session of so many frames, each joined to the one before.
+inline SmallGraph chain_of(std::uint32_t frames) {
+  SmallGraph graph;
+  graph.frame({1, 0});
+  for (std::uint32_t i = 1; i < frames; ++i) graph.join({1, i - 1}, {1, i});
+  return graph;
+}
+
 }  // namespace relmap::storage

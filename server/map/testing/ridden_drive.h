@@ -12,14 +12,16 @@
 
 namespace relmap::map {
 
+inline constexpr std::uint32_t kCircuit = 100;  // frames of the world once round, 0.2 m apart
+inline constexpr std::uint32_t kBeyond = 36;    // frames of the second round, for most tests
+
 class RiddenDrive {
  public:
-  static constexpr std::uint32_t kLap = 100;     // frames of the world, 0.2 m apart
   static constexpr std::uint32_t kBoards = 40;   // the last frame before the ride
   static constexpr std::uint32_t kAlights = 51;  // the first frame after it, 2.2 m further on
   static constexpr std::uint32_t kRidden = kAlights - kBoards - 1;
 
-  // `beyond` is the number of frames of the second lap, `stood_s` the duration of the ride. At the frames `halts` the
+  // `beyond` is the number of frames of the second round, `stood_s` the duration of the ride. At the frames `halts` the
   // robot stands still for the same time without being carried.
   explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20, std::set<std::uint32_t> halts = {})
       : world_(options(beyond)), halts_(std::move(halts)) {
@@ -38,9 +40,9 @@ class RiddenDrive {
   storage::ClosureProposalRecord closure(std::uint32_t i, double metres = 0) const {
     storage::ClosureProposalRecord proposal;
     proposal.query = frame(i);
-    proposal.match = frame(i - kLap);
+    proposal.match = frame(i - kCircuit);
     const SE3 off{Matrix3::Identity(), Vector3(0, 0, metres)};
-    proposal.T_match_query = off * (world_.T_world_frame(i - kLap).inverse() * world_.T_world_frame(i));
+    proposal.T_match_query = off * (world_.T_world_frame(i - kCircuit).inverse() * world_.T_world_frame(i));
     proposal.covariance = 1e-4 * Matrix6::Identity();
     proposal.probability = 0.99f;
     proposal.spread = 0.5f;
@@ -48,9 +50,9 @@ class RiddenDrive {
     return proposal;
   }
   // The closure that it would propose if the robot had not been carried and this place looked like another.
-  storage::ClosureProposalRecord as_driven(std::uint32_t i) const { return as_driven(i, i - kLap); }
+  storage::ClosureProposalRecord as_driven(std::uint32_t i) const { return as_driven(i, i - kCircuit); }
   storage::ClosureProposalRecord as_driven(std::uint32_t i, std::uint32_t at) const {
-    storage::ClosureProposalRecord proposal = closure(std::max(i, kLap));
+    storage::ClosureProposalRecord proposal = closure(std::max(i, kCircuit));
     proposal.query = frame(i);
     proposal.match = frame(at);
     const auto match = map_const().hot(proposal.match), query = map_const().hot(proposal.query);
@@ -67,8 +69,8 @@ class RiddenDrive {
  private:
   static sim::PointsWorldOptions options(std::uint32_t beyond) {
     sim::PointsWorldOptions options;
-    options.frames_per_lap = kLap;
-    options.frames = kLap + beyond;
+    options.frames_per_lap = kCircuit;
+    options.frames = kCircuit + beyond;
     options.births = 20;
     return options;
   }

@@ -10,6 +10,9 @@
 
 namespace relmap::place {
 
+// Cameras for its sessions: a pair of eyes, and the left one of them alone.
+inline constexpr StereoCamera kStereoCamera{400, 256, 192, 0.12, 512, 384}, kMonoCamera{400, 256, 192, 0, 512, 384};
+
 class HandMadeGraph final : public storage::Graph {
  public:
   void add_session(SessionNumber number, const StereoCamera& camera) {

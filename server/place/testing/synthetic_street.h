@@ -14,6 +14,8 @@ namespace relmap::place {
 
 inline constexpr StereoCamera kStreetCamera{400, 255.5, 191.5, 0.3, 512, 384};
 
+inline constexpr FrameId kStreetFrame{1, 6};  // about the middle of a street of 12 frames
+
 class SyntheticStreet {
  public:
   // Frames 0.3 m apart along z; `noise` in pixels.

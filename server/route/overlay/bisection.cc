@@ -9,7 +9,7 @@
 namespace relmap::route {
 namespace {
 
-constexpr std::uint32_t kNone = ~0u;
+constexpr std::uint32_t kNoNode = ~0u;
 constexpr std::uint32_t kCoarsest = 60;  // nodes
 constexpr int kStarts = 6;               // nodes from which a side is grown; the best result is kept
 constexpr int kPasses = 4;               // passes of refinement at each level
@@ -25,22 +25,22 @@ std::uint64_t total(const std::vector<std::uint32_t>& sizes) {
 // neighbour stay alone. Returns the coarse node of each node.
 std::vector<std::uint32_t> match(const WeightedGraph& graph, std::uint64_t max_size, std::mt19937& random,
                                  std::uint32_t& coarse_nodes) {
-  std::vector<std::uint32_t> order(graph.nodes()), coarse(graph.nodes(), kNone);
+  std::vector<std::uint32_t> order(graph.nodes()), coarse(graph.nodes(), kNoNode);
   std::iota(order.begin(), order.end(), 0u);
   std::shuffle(order.begin(), order.end(), random);
   coarse_nodes = 0;
   for (const std::uint32_t v : order) {
-    if (coarse[v] != kNone) continue;
-    std::uint32_t best = kNone;
+    if (coarse[v] != kNoNode) continue;
+    std::uint32_t best = kNoNode;
     double best_rating = 0;
     for (std::uint32_t i = graph.begin[v]; i < graph.begin[v + 1]; ++i) {
       const auto [u, weight] = graph.arcs[i];
-      if (coarse[u] != kNone || std::uint64_t{graph.size[u]} + graph.size[v] > max_size) continue;
+      if (coarse[u] != kNoNode || std::uint64_t{graph.size[u]} + graph.size[v] > max_size) continue;
       const double rating = double{static_cast<double>(weight)} / graph.size[u];
-      if (best == kNone || rating > best_rating) best = u, best_rating = rating;
+      if (best == kNoNode || rating > best_rating) best = u, best_rating = rating;
     }
     coarse[v] = coarse_nodes;
-    if (best != kNone) coarse[best] = coarse_nodes;
+    if (best != kNoNode) coarse[best] = coarse_nodes;
     ++coarse_nodes;
   }
   return coarse;
@@ -169,16 +169,16 @@ Sides grow(const WeightedGraph& graph, std::uint32_t start, std::uint64_t half) 
   std::uint32_t unseen = 0;
   next.push({0, start});
   while (grown < half) {
-    std::uint32_t v = kNone;
-    while (!next.empty() && v == kNone) {
+    std::uint32_t v = kNoNode;
+    while (!next.empty() && v == kNoNode) {
       if (side[next.top().second] == 0) v = next.top().second;
       next.pop();
     }
-    while (v == kNone && unseen < graph.nodes()) {  // another component
+    while (v == kNoNode && unseen < graph.nodes()) {  // another component
       if (side[unseen] == 0) v = unseen;
       ++unseen;
     }
-    if (v == kNone) break;
+    if (v == kNoNode) break;
     if (grown > 0 && grown + graph.size[v] > half + graph.size[v] / 2) break;
     side[v] = 1;
     grown += graph.size[v];

@@ -21,7 +21,7 @@ constexpr std::uint64_t kCrcBytes = 4;
 constexpr std::uint64_t kLinkBytes = 44;
 constexpr std::size_t kFlushBytes = std::size_t{1} << 18;  // bytes of a cell that are written at once
 
-enum LinkFlags : std::uint32_t { kLoop = 1, kForward = 2, kOut = 4, kIn = 8 };
+enum LinkFlags : std::uint32_t { kLoopFlag = 1, kForwardFlag = 2, kOutFlag = 4, kInFlag = 8 };
 
 void put_sealed(ByteWriter& w, const auto& put) {
   const std::size_t begin = w.size();
@@ -45,7 +45,8 @@ void put_frames(ByteWriter& w, const CellFrames& frames) {
     w.put(link.standing_s);
     w.put(link.ordinal);
     w.put(link.support);
-    w.put((link.loop ? kLoop : 0u) | (link.forward ? kForward : 0u) | (link.out ? kOut : 0u) | (link.in ? kIn : 0u));
+    w.put((link.loop ? kLoopFlag : 0u) | (link.forward ? kForwardFlag : 0u) | (link.out ? kOutFlag : 0u) |
+          (link.in ? kInFlag : 0u));
   }
 }
 
@@ -71,10 +72,10 @@ CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) 
     link.ordinal = r.get<std::uint32_t>();
     link.support = r.get<std::uint32_t>();
     const auto flags = r.get<std::uint32_t>();
-    link.loop = flags & kLoop;
-    link.forward = flags & kForward;
-    link.out = flags & kOut;
-    link.in = flags & kIn;
+    link.loop = flags & kLoopFlag;
+    link.forward = flags & kForwardFlag;
+    link.out = flags & kOutFlag;
+    link.in = flags & kInFlag;
   }
   return frames;
 }

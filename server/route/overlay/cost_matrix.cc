@@ -6,7 +6,7 @@
 namespace relmap::route {
 namespace {
 
-using Offer = void (*)(double* row, const double* other, double cost, std::size_t n);
+using OfferRow = void (*)(double* row, const double* other, double cost, std::size_t n);
 
 inline void offer_each(double* __restrict row, const double* __restrict other, double cost, std::size_t n) {
   for (std::size_t j = 0; j < n; ++j) {
@@ -27,7 +27,7 @@ __attribute__((target("avx2"))) void offer_avx2(double* __restrict row, const do
 }
 #endif
 
-Offer fastest() {
+OfferRow fastest() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2")) return offer_avx2;
 #endif
@@ -36,7 +36,7 @@ Offer fastest() {
 
 // row[j] = min(row[j], cost + other[j])
 void offer_row(double* row, const double* other, double cost, std::size_t n) {
-  static const Offer offer = fastest();
+  static const OfferRow offer = fastest();
   offer(row, other, cost, n);
 }
 

@@ -34,7 +34,7 @@ void expect_as_dijkstra(const RouteIndex::Snapshot& map, std::size_t metric, Fra
   const std::vector<FrameId> starts{from}, goals{to};
   const auto found = find_route(*map.overlay, *map.view, query, starts, goals);
   RouteOptions options;
-  options.weights = kMetrics[metric];
+  options.weights = kTownMetrics[metric];
   options.filter = query.filter;
   const auto expected = find_route(*map.view, starts, goals, options);
   ASSERT_EQ(found.ok(), expected.ok()) << from.to_string() << " " << to.to_string() << " "
@@ -63,7 +63,7 @@ TEST(RouteIndexUpdates, KeepsUpWithTheMap) {
     }
     EXPECT_EQ(map.view->version(), town.map().view()->version());
     for (int i = 0; i < 5; ++i)
-      expect_as_dijkstra(map, random() % kMetrics.size(), town.random_frame(random), town.random_frame(random));
+      expect_as_dijkstra(map, random() % kTownMetrics.size(), town.random_frame(random), town.random_frame(random));
     town.drive(90);
     town.change(random);
   }
@@ -88,7 +88,7 @@ TEST(RouteIndexUpdates, KeepsUpWithASessionThatIsDeleted) {
       while (!map.view->hot(id)) id = town.random_frame(random);
       return id;
     };
-    for (int i = 0; i < 10; ++i) expect_as_dijkstra(map, random() % kMetrics.size(), some_frame(), some_frame());
+    for (int i = 0; i < 10; ++i) expect_as_dijkstra(map, random() % kTownMetrics.size(), some_frame(), some_frame());
   }
   ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
   EXPECT_EQ(index->snapshot().overlay->outdated(), 0u);
@@ -112,7 +112,7 @@ TEST(RouteIndex, IsRightWhileTheMapChanges) {
           const SessionNumber robot = 1 + static_cast<SessionNumber>(random() % 4);
           return FrameId{robot, static_cast<std::uint32_t>(random() % map.view->session(robot)->frames)};
         };
-        expect_as_dijkstra(map, random() % kMetrics.size(), frame(), frame());
+        expect_as_dijkstra(map, random() % kTownMetrics.size(), frame(), frame());
       }
     });
   std::mt19937 random(9);
@@ -135,7 +135,7 @@ TEST(RouteIndexMemory, ObeysItsShare) {
   std::mt19937 random(3);
   for (int i = 0; i < 60; ++i) {
     if (i % 10 == 0) town.change(random);
-    expect_as_dijkstra(index->snapshot(), random() % kMetrics.size(), town.random_frame(random),
+    expect_as_dijkstra(index->snapshot(), random() % kTownMetrics.size(), town.random_frame(random),
                        town.random_frame(random));
     EXPECT_LE(town.budget().used(storage::Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
   }
@@ -158,11 +158,11 @@ TEST(RouteIndex, ManySearchesShareLittleMemory) {
         const RouteIndex::Snapshot map = index->snapshot();
         if (!map.overlay) continue;
         OverlayQuery query;
-        query.metric = random() % kMetrics.size();
+        query.metric = random() % kTownMetrics.size();
         query.stale = map.stale;
         const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
         RouteOptions options;
-        options.weights = kMetrics[query.metric];
+        options.weights = kTownMetrics[query.metric];
         try {
           const auto route = find_route(*map.overlay, *map.view, query, from, to);
           const auto expected = find_route(*map.view, from, to, options);
@@ -286,7 +286,7 @@ TEST(RouteIndex, IsKeptAfterARunThatEndsInOrder) {
   std::mt19937 random(6);
   const auto ask = [&](const RouteIndex& index) {
     for (int i = 0; i < 20; ++i)
-      expect_as_dijkstra(index.snapshot(), random() % kMetrics.size(), town.random_frame(random),
+      expect_as_dijkstra(index.snapshot(), random() % kTownMetrics.size(), town.random_frame(random),
                          town.random_frame(random));
   };
   const auto inode = [&] {

@@ -19,7 +19,7 @@
 
 namespace relmap::route {
 
-inline const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0.2, 30}};
+inline const std::vector<RouteWeights> kTownMetrics{kByDistance, kByTime, {1, 0.5, 0.2, 30}};
 
 // A town in a map. The test does the worker's part.
 class LiveTown {
@@ -38,7 +38,7 @@ class LiveTown {
 
   std::unique_ptr<RouteIndex> index(const std::string& folder = "") {
     auto index = std::make_unique<RouteIndex>(
-        RouteIndexOptions{folder, room_for_others, kMetrics, 1, 20, std::chrono::milliseconds(10)},
+        RouteIndexOptions{folder, room_for_others, kTownMetrics, 1, 20, std::chrono::milliseconds(10)},
         [this] {
           if (views_fail) throw StatusError(Status(Reason::IO_ERROR, "the disk"));
           return map_->view();
