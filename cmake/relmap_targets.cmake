@@ -41,13 +41,10 @@ endif()
 
 find_package(GTest REQUIRED)
 
-# The files of a target are compiled eight at a time (CMAKE_UNITY_BUILD), which halves the time once more. A file with a
-# name in its anonymous namespace that another file of its target has too is compiled apart: relmap_apart(FILE...).
-# CMAKE_UNITY_BUILD=OFF compiles each by itself.
+# The files of a target are compiled eight at a time (CMAKE_UNITY_BUILD), which halves the time once more. So two files of
+# a target cannot give different things in their anonymous namespaces the same name. CMAKE_UNITY_BUILD=OFF compiles each
+# by itself.
 option(CMAKE_UNITY_BUILD "Compile files of a target together" ON)
-function(relmap_apart)
-  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-endfunction()
 
 # Much of the time to compile a file goes into the headers of others, so the commonest are compiled once:
 #   relmap_precompiled        the standard library and Eigen

@@ -17,7 +17,7 @@
 namespace relmap::testing {
 namespace {
 
-constexpr double kRobots = 20, kRate = 5;  // keyframes a second of each, where nobody else needs the machine
+constexpr double kRobots = 20, kRate = 4;  // keyframes a second of each, where nobody else needs the machine
 
 BenchFigures fleet(double seconds, double rate, const std::vector<std::string>& more = {}) {
   std::vector<std::string> arguments{
@@ -64,7 +64,7 @@ bool piles_up(const BenchFigures& figures) {
 // Four of five keyframes lose a part, which is sent again.
 TEST(Fleet, LosesNothingOverABadNetwork) {
   expect_in_a_round([](double share) {
-    const BenchFigures bad = fleet(15, kRate * share);
+    const BenchFigures bad = fleet(10, kRate * share);
     expect_all_there_once(bad);
     EXPECT_GT(bad["resent_share"], 0.03) << "the network was not bad";
     EXPECT_GT(bad["closures"], 0) << "the map had nothing to do";
@@ -77,7 +77,7 @@ TEST(Fleet, LosesNothingOverABadNetwork) {
 
 TEST(Fleet, LosesNothingThoughDaemonAndRobotsAreKilled) {
   const double rate = kRate * machine_share();
-  const BenchFigures figures = fleet(20, rate, {"--kill-daemon", "3", "--kill-robots", "5", "--kills-each", "2"});
+  const BenchFigures figures = fleet(15, rate, {"--kill-daemon", "3", "--kill-robots", "5", "--kills-each", "2"});
   expect_all_there_once(figures);
   // Everything that waited is acknowledged after each kill; else the figure is NaN.
   const std::vector<double> daemon = figures.series("settled_after_restart_s");
@@ -103,9 +103,9 @@ TEST(LongFleet, LosesNothingInFiveMinutesThoughDaemonAndRobotsAreKilled) {
 TEST(Fleet, WhoFloodsOrSendsGarbageHurtsNobodyElse) {
   expect_in_a_round([](double share) {
     const double rate = kRate * share;
-    const BenchFigures quiet = fleet(6, rate);
+    const BenchFigures quiet = fleet(5, rate);
     const BenchFigures flooded = fleet(
-        6, rate, {"--flood", std::to_string(100 * share * share), "--garbage", std::to_string(200 * share * share)});
+        5, rate, {"--flood", std::to_string(100 * share * share), "--garbage", std::to_string(200 * share * share)});
     expect_all_there_once(flooded);
     return flooded["sent"] >= 0.8 * quiet["sent"] && !piles_up(flooded);
   });
