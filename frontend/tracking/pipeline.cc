@@ -12,17 +12,10 @@
 
 namespace relmap::tracking {
 
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
-
+// Fields of Pipeline::Impl cannot have types of an anonymous namespace.
 struct Captured {
   CapturedPair pair;
-  Clock::time_point arrived;
+  std::chrono::steady_clock::time_point arrived;
 };
 
 // One eye's picture, prepared for tracking.
@@ -37,6 +30,14 @@ struct LeftEye {
   Eye eye;
   Captured captured;  // without its pictures
 };
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
 
 // "pair 17 (000017.png): ..."
 Status of_pair(const CapturedPair& pair, const Status& status) {

@@ -21,6 +21,21 @@
 
 namespace relmap::tracking {
 
+// Estimates the standard deviation of a coordinate measured on level 0, from the residuals of the estimated motions.
+class MeasurementNoise {
+ public:
+  double sigma() const { return sigma_; }  // pixels
+  void learn(double variance_factor) {
+    // Small steps, so that a pair with many moving things does not upset the estimate.
+    const double factor = std::clamp(variance_factor, 0.25, 4.0);
+    sigma_ = std::clamp(sigma_ * std::pow(factor, 0.5 * kRate), 0.08, 1.0);
+  }
+
+ private:
+  static constexpr double kRate = 0.05;
+  double sigma_ = 0.3;
+};
+
 namespace {
 
 // Search radii around an expected position, as a share of the picture's width.
@@ -82,21 +97,6 @@ std::vector<vision::PicturePoint> points_of(std::span<const Sighting> sightings)
     points.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y())});
   return points;
 }
-
-// Estimates the standard deviation of a coordinate measured on level 0, from the residuals of the estimated motions.
-class MeasurementNoise {
- public:
-  double sigma() const { return sigma_; }  // pixels
-  void learn(double variance_factor) {
-    // Small steps, so that a pair with many moving things does not upset the estimate.
-    const double factor = std::clamp(variance_factor, 0.25, 4.0);
-    sigma_ = std::clamp(sigma_ * std::pow(factor, 0.5 * kRate), 0.08, 1.0);
-  }
-
- private:
-  static constexpr double kRate = 0.05;
-  double sigma_ = 0.3;
-};
 
 }  // namespace
 
