@@ -120,9 +120,9 @@ TEST_F(Libdc1394Test, ReadsAndWritesFeatures) {
   EXPECT_EQ(500u, value);
   ASSERT_EQ(DC1394_SUCCESS, dc1394_feature_set_absolute_control(opened.get(), DC1394_FEATURE_SHUTTER, DC1394_ON));
   ASSERT_EQ(DC1394_SUCCESS, dc1394_feature_set_absolute_value(opened.get(), DC1394_FEATURE_SHUTTER, 0.01f));
-  float seconds = 0;
-  ASSERT_EQ(DC1394_SUCCESS, dc1394_feature_get_absolute_value(opened.get(), DC1394_FEATURE_SHUTTER, &seconds));
-  EXPECT_NEAR(0.01f, seconds, 4e-5f);
+  float exposure_s = 0;
+  ASSERT_EQ(DC1394_SUCCESS, dc1394_feature_get_absolute_value(opened.get(), DC1394_FEATURE_SHUTTER, &exposure_s));
+  EXPECT_NEAR(0.01f, exposure_s, 4e-5f);
 
   ASSERT_EQ(DC1394_SUCCESS, dc1394_external_trigger_set_source(opened.get(), DC1394_TRIGGER_SOURCE_SOFTWARE));
   ASSERT_EQ(DC1394_SUCCESS, dc1394_external_trigger_set_power(opened.get(), DC1394_ON));
