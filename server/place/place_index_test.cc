@@ -3,12 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <random>
-#include <thread>
 
 #include "server/place/testing/hand_made_graph.h"
 #include "server/place/testing/random_vocabulary.h"
@@ -260,29 +258,6 @@ TEST(PlaceIndex, AFrameWithoutWordsIsNotAdded) {
   EXPECT_FALSE(chain.index.contains({1, 50}));
   EXPECT_EQ(chain.index.size(), 50u);
   EXPECT_EQ(chain.index.left_out(), 0u);
-}
-
-TEST(PlaceIndex, ReadersAndTheWriterMayWorkAtOnce) {
-  Chain chain(300);
-  PlaceIndex index(chain.vocabulary);
-  for (std::uint32_t i = 0; i < 100; ++i) (void)index.add({1, i}, chain.words_of[i]);
-  const auto query = chain.seen_again(50);
-  std::atomic<bool> stop{false};
-  std::atomic<int> wrong{0};
-  std::vector<std::thread> readers;
-  for (int r = 0; r < 2; ++r)
-    readers.emplace_back([&] {
-      while (!stop) {
-        const PlaceAnswer answer = index.query(query, chain.graph);
-        if (answer.candidates.empty() || apart(answer.candidates[0].frame, 50) > 2) ++wrong;
-        if (index.memory_bytes() == 0) ++wrong;
-      }
-    });
-  for (std::uint32_t i = 100; i < 300; ++i) (void)index.add({1, i}, chain.words_of[i]);
-  stop = true;
-  for (std::thread& reader : readers) reader.join();
-  EXPECT_EQ(wrong, 0);
-  EXPECT_EQ(index.size(), 300u);
 }
 
 // An index that is opened several times in one folder.
