@@ -277,7 +277,7 @@ TEST(RouteIndex, MakesDamagedCellsAnew) {
 }
 
 // A run continues with the cells of the run before if the map is the same and nothing is damaged.
-TEST(RouteIndex, IsKeptAfterARunThatEndsInOrder) {
+TEST(RouteIndexFile, IsKeptAfterARunThatEndsInOrder) {
   const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
