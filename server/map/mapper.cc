@@ -423,7 +423,7 @@ std::vector<storage::JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
     trouble = error.status();
   }
   if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(*places, *budget, frame, cold->words);
-  if (!trouble.ok()) throw StatusError(trouble);
+  throw_if(trouble);
   count_doubts(frame.session, found);
   return std::move(found.records);
 }

@@ -118,7 +118,7 @@ class Reindexer {
 
   void commit(const std::vector<Put>& puts, const std::vector<std::string>& deletes) {
     const Status done = engine_.commit(epoch_, engine_.applied_sequence(), puts, deletes);
-    if (!done.ok()) throw StatusError(done);
+    throw_if(done);
     ++last_commit_;
   }
 

@@ -86,7 +86,7 @@ class Rewriter {
     }
     const std::vector<std::string> deletes(deletes_.begin(), deletes_.end());
     const Status committed = engine_.commit(epoch_, engine_.applied_sequence(), puts, deletes);
-    if (!committed.ok()) throw StatusError(committed);
+    throw_if(committed);
     puts_.clear();
     deletes_.clear();
     batch_bytes_ = 0;

@@ -16,7 +16,7 @@ Entries committed(const EngineSnapshot& snapshot, const std::string& prefix) {
     if (auto entry = keys::label_of(key)) entries.emplace(std::move(entry->label), entry->frame);
     return true;
   });
-  if (!status.ok()) throw StatusError(status);
+  throw_if(status);
   return entries;
 }
 
@@ -62,7 +62,7 @@ void visit_skipped(const EngineSnapshot& snapshot, const SkippedTable& since, Se
                                                           skipped.status().to_string()));
         return going = visit(*skipped);
       });
-  if (!scanned.ok()) throw StatusError(scanned);
+  throw_if(scanned);
   for (auto it = since.lower_bound({session, sequence}); going && it != since.end() && it->first.first == session; ++it)
     going = visit(it->second);
 }

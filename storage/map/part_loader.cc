@@ -44,7 +44,7 @@ LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::s
       }
       return true;
     });
-    if (!scanned.ok()) throw StatusError(scanned);
+    throw_if(scanned);
   }
   loaded.part = std::make_shared<const PackedPart<Frame>>(std::move(budget), id, std::move(records));
   return loaded;
