@@ -72,7 +72,7 @@ class Admin : public ::testing::Test {
     record_drive();
     RunningDaemon daemon(options_);
     Process frontend = stream(options_, 2000);
-    ASSERT_EQ(frontend.wait(std::chrono::seconds(60)), 0) << read_text(folder_ / "frontend.err");
+    ASSERT_EQ(frontend.wait(kPatience), 0) << read_text(folder_ / "frontend.err");
     ASSERT_TRUE(daemon.client()->wait_idle().ok());
     ASSERT_EQ(daemon.stop(), 0) << daemon.log();
   }
@@ -137,7 +137,7 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
       EXPECT_THAT(map::derived_differences(*map), IsEmpty());
     }
 
-    ASSERT_EQ(frontend.wait(std::chrono::seconds(60)), 0);
+    ASSERT_EQ(frontend.wait(kPatience), 0);
     ASSERT_TRUE(client->wait_idle().ok());
     const Finished again = admin({"--server", daemon.address(), "backup", later});
     ASSERT_EQ(again.exit_code, kFine) << said(again);
@@ -325,7 +325,7 @@ TEST_F(Admin, AnInterruptedBackupIsNeverMistakenForACompleteOne) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5 * attempt));
     const bool hard = attempt % 2 == 1;
     backup.signal(hard ? SIGKILL : SIGINT);
-    const int code = backup.wait(std::chrono::seconds(60)).value_or(-1);
+    const int code = backup.wait(kPatience).value_or(-1);
     EXPECT_THAT(code, ::testing::AnyOf(kFine, kInterrupted, 128 + SIGKILL)) << read_text(folder_ / "admin.err");
     interrupted += code != kFine;
     if (!hard) {
@@ -388,7 +388,7 @@ TEST_F(Admin, ReindexCompletesAfterAKillHalfWay) {
     while (reindex.running() && read_text(folder_ / "admin.err").find("words") == std::string::npos)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     reindex.kill();
-    return reindex.wait(std::chrono::seconds(60)) == 128 + SIGKILL;
+    return reindex.wait(kPatience) == 128 + SIGKILL;
   };
   int attempts = 0;  // it may be done before the kill comes
   while (!killed_half_way()) {

@@ -35,7 +35,7 @@ struct Load {
 // Keyframes of drives among points, ready made: the same world, other noise.
 class BatchIngest : public ::testing::Test {
  protected:
-  explicit BatchIngest(const Load& load = {3, 80, 55, 100, 6, seconds(50)}) : load_(load) {}
+  explicit BatchIngest(const Load& load = {3, 80, 55, 100, 6, kPatience}) : load_(load) {}
 
   void SetUp() override {
     setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
@@ -93,7 +93,7 @@ class BatchIngest : public ::testing::Test {
         batch.reset();
       } else if (interrupted % 3 == 1) {
         batch->signal(SIGTERM);
-        EXPECT_TRUE(batch->wait(seconds(60)));
+        EXPECT_TRUE(batch->wait(kPatience));
         batch.reset();
       } else {  // relmap goes on when it is back
         daemon->process().kill();
@@ -278,7 +278,7 @@ TEST_F(BatchIngest, TheSameCommandResumesWithAnyOptions) {
     const auto begun = [&] { return daemon.client()->sessions().or_throw().size(); };
     while (batch.running() && begun() < sessions + 2) std::this_thread::sleep_for(milliseconds(2));
     batch.signal(signal);
-    ASSERT_TRUE(batch.wait(seconds(60))) << text;
+    ASSERT_TRUE(batch.wait(kPatience)) << text;
     const Finished rest = run(command(options.data, more));
     EXPECT_EQ(rest.exit_code, 0) << text << rest.standard_error;
     sessions += drives_.size();

@@ -94,7 +94,7 @@ class ChangedRecording : public ::testing::Test {
     };
     while (batch.running() && !begun()) std::this_thread::sleep_for(milliseconds(1));
     batch.signal(SIGTERM);
-    const auto code = batch.wait(seconds(60));
+    const auto code = batch.wait(kPatience);
     ASSERT_TRUE(code);
     ASSERT_EQ(*code, 1) << "it was over too soon to be interrupted";
   }

@@ -39,7 +39,7 @@ TEST(DaemonLog, SaysWhoConnectedAndWhatWasRecovered) {
     frames = client->status().or_throw().frames;
     ASSERT_GT(frames, 2u);
     // A stream's end is told when both sides have let go of it.
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
     while (daemon.log().find("is no longer connected") == std::string::npos &&
            std::chrono::steady_clock::now() < deadline)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -16,7 +16,6 @@
 namespace relmap::testing {
 namespace {
 
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -56,7 +55,7 @@ class Exports : public ::testing::Test {
 
   Finished relmap(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {built_program("relmap"), "--server", folder_ / "map"});
-    return run_program(arguments, seconds(50));
+    return run_program(arguments);
   }
   // What is in the folder of exports, after an export into it.
   std::vector<std::string> exported(std::vector<std::string> arguments) {

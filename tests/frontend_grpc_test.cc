@@ -106,7 +106,7 @@ TEST_F(FrontendGrpc, OnlyASourceThatEndedEndsItsSession) {
   Process interrupted(command(drive(), {"--rate", "20"}), {});
   while (interrupted.running() && settled().size() < 4) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   interrupted.signal(SIGINT);
-  EXPECT_EQ(interrupted.wait(std::chrono::seconds(60)), 4);
+  EXPECT_EQ(interrupted.wait(kPatience), 4);
   {
     const auto held = daemon_.lock();
     EXPECT_TRUE(daemon_.ends.empty());

@@ -139,7 +139,7 @@ TEST_F(FrontendProgram, LeavesAFileThatIsNotCompleteApart) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     std::this_thread::sleep_for(std::chrono::milliseconds(interrupted ? 1500 : 0));
     if (interrupted) process.signal(SIGINT);
-    EXPECT_EQ(process.wait(std::chrono::seconds(60)), interrupted ? 4 : 0) << read_text(error);
+    EXPECT_EQ(process.wait(kPatience), interrupted ? 4 : 0) << read_text(error);
   }
   EXPECT_TRUE(fs::exists(keyframes + ".part"));
   EXPECT_GT(fs::file_size(keyframes), fs::file_size(keyframes + ".part"));

@@ -21,12 +21,12 @@
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
 #include "server/intake/testing/fake_sink.h"
+#include "tests/support/patience.h"
 
 namespace relmap::testing {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::seconds;
 using std::chrono::steady_clock;
 
 std::string random_url() {
@@ -101,7 +101,7 @@ TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
         start_daemon();
       }
     }
-    const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + seconds(60));
+    const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + kPatience);
     EXPECT_TRUE(summary.all_settled());
     EXPECT_EQ(summary.settled, 60u);
     EXPECT_TRUE(summary.refused.empty());
@@ -127,7 +127,7 @@ TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {
   EXPECT_EQ((*publisher)->last_keyframe()->sequence, 9u);
   EXPECT_EQ((*publisher)->progress().spooled, 10u);
   ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 10)).ok());
-  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + seconds(60)).all_settled());
+  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + kPatience).all_settled());
   EXPECT_EQ(sink_.journal().size(), 11u);
 }
 
@@ -142,7 +142,7 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
     heard.push_back(news);
   });
   ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
-  ASSERT_TRUE((*publisher)->finish(steady_clock::now() + seconds(60)).all_settled());
+  ASSERT_TRUE((*publisher)->finish(steady_clock::now() + kPatience).all_settled());
 
   storage::Edge closure;
   closure.a = {1, 3};
@@ -163,7 +163,7 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   EXPECT_EQ(ingest::closure_news(*view, closure)->kind, PoseNews::Kind::kLocalised);
   closure.state = storage::EdgeState::kRemoved;
   EXPECT_EQ(ingest::closure_news(*view, closure)->kind, PoseNews::Kind::kClosureOut);
-  const auto deadline = steady_clock::now() + seconds(10);
+  const auto deadline = steady_clock::now() + kPatience;
   const auto count = [&] {
     const std::lock_guard lock(mutex);
     return heard.size();
@@ -197,7 +197,7 @@ TEST_F(LcmIngestTest, ForeignMessagesAreCountedAndHurtNobody) {
   Bytes absurd = part;
   std::fill_n(absurd.begin() + 68, 4, std::uint8_t{0x7f});  // the length of its data
   const auto count = [&](Reason reason) { return server_->stats().messages_refused[intake::index_of(reason)]; };
-  const auto deadline = steady_clock::now() + seconds(10);
+  const auto deadline = steady_clock::now() + kPatience;
   while ((count(Reason::CORRUPT) < 2 || count(Reason::UNKNOWN_PROTOCOL_VERSION) == 0) &&
          steady_clock::now() < deadline) {
     (*link)->publish(kKeyframeChannel, Bytes(10, 1));

@@ -13,7 +13,6 @@
 namespace relmap::testing {
 namespace {
 
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -55,7 +54,7 @@ class LeavingDaemon : public ::testing::Test {
   Finished relmap(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(),
                      {built_program("relmap"), "--server", "127.0.0.1:" + std::to_string(port_), "--json"});
-    return run_program(arguments, seconds(30));
+    return run_program(arguments);
   }
 
   StoppingMap map_;

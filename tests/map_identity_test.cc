@@ -123,7 +123,7 @@ TEST_F(MapIdentityTest, ALiveRobotIsToldAndKeepsItsKeyframes) {
     while (robot.running() && first.client()->status().or_throw().frames < 20)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     robot.signal(SIGINT);
-    EXPECT_EQ(robot.wait(std::chrono::seconds(60)), 4);
+    EXPECT_EQ(robot.wait(kPatience), 4);
   }
   const Finished told = send({"--server", second.address(), "--live", "--rate", "100", "--patience", "1", "--json"});
   EXPECT_EQ(told.exit_code, 3) << told.standard_error;
@@ -146,13 +146,13 @@ TEST_F(MapIdentityTest, ARestoredMapGetsWhatTheSpoolHasAndNamesTheRestAsGaps) {
     while (robot.running() && daemon.client()->status().or_throw().frames < 20)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     robot.signal(SIGINT);
-    EXPECT_EQ(robot.wait(std::chrono::seconds(60)), 4);
+    EXPECT_EQ(robot.wait(kPatience), 4);
     // A process of its own begins a segment of its own.
     Process again(command({"--server", options.data, "--live", "--rate", "40"}), {});
     while (again.running() && daemon.client()->status().or_throw().frames < 60)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     again.signal(SIGINT);
-    EXPECT_EQ(again.wait(std::chrono::seconds(60)), 4);
+    EXPECT_EQ(again.wait(kPatience), 4);
     EXPECT_EQ(daemon.stop(), 0);
   }
   fs::remove_all(options.data);
@@ -200,7 +200,7 @@ TEST_F(MapIdentityTest, AnInterruptedRecordingIsNotPiecedTogetherFromTwoRuns) {
     while (robot.running() && daemon.client()->status().or_throw().frames < frames)
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     robot.signal(SIGINT);
-    EXPECT_EQ(robot.wait(std::chrono::seconds(60)), 4);
+    EXPECT_EQ(robot.wait(kPatience), 4);
   };
   std::uint64_t held = 0;
   {

@@ -13,7 +13,6 @@
 namespace relmap::testing {
 namespace {
 
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -36,7 +35,7 @@ class Operator : public ::testing::Test {
 
   Finished relmap(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
-    return run_program(arguments, seconds(50));
+    return run_program(arguments);
   }
   // What standard output says.
   std::string edge(std::vector<std::string> arguments) const {
@@ -260,7 +259,7 @@ TEST_F(Operator, IsAskedWhichSessionOfANameIsMeant) {
 
 TEST_F(Operator, IsToldThatAnAnswerCannotBeWritten) {
   const std::string command = built_program("relmap") + " --server " + options_.data + " sessions >/dev/full";
-  const Finished lost = run_program({"/bin/sh", "-c", command}, seconds(20));
+  const Finished lost = run_program({"/bin/sh", "-c", command});
   EXPECT_EQ(lost.exit_code, 1);
   EXPECT_THAT(lost.standard_error, HasSubstr("IO_ERROR"));
 }

@@ -22,7 +22,6 @@ namespace relmap::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -58,7 +57,7 @@ class PictureQuestions : public ::testing::Test {
 
   Finished relmap(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
-    return run_program(arguments, seconds(50));
+    return run_program(arguments);
   }
   void take_in(const std::vector<std::string>& arguments) const {
     std::vector<std::string> command{"ingest"};

@@ -1,10 +1,9 @@
 // Checks the figures that docs/ publish of the benchmarks, with shorter runs: counts must be equal, ratios and errors
 // may be 1.5 times the published ones. The figures are read from the documents, so that these and the code cannot
-// change without each other. Times are not tested, only ratios of times of the same run; `relmap-bench` measures them.
+// change without each other. Times are not tested; for their ratios see published_ratios_test.cc.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -24,18 +23,7 @@ namespace {
 const char* const kRba = "docs/rba.md";
 const char* const kFigures = "docs/figures.md";
 const char* const kFrontEnd = "docs/frontend.md";
-constexpr double kFactor = 1.5;
-constexpr std::chrono::seconds kPatience{200};  // with a busy machine
 
-// expect_at_most() allows smaller values than published, expect_about() does not.
-void expect_at_most(double value, double published, const std::string& what) {
-  std::printf("%s: %g, published %g\n", what.c_str(), value, published);
-  EXPECT_LE(value, kFactor * published) << what;
-}
-void expect_about(double value, double published, const std::string& what) {
-  expect_at_most(value, published, what);
-  EXPECT_GE(value, published / kFactor) << what;
-}
 // Compares by how much a ratio exceeds 1.
 void expect_excess_about(double ratio, double published, const std::string& what) {
   expect_about(ratio - 1, published - 1, what + ", beyond 1");
@@ -45,17 +33,6 @@ void expect_excess_about(double ratio, double published, const std::string& what
 void expect_share_at_most(double share, double steps, double published_percent, const std::string& what) {
   std::printf("%s: %g of %g, published %g %%\n", what.c_str(), std::round(share * steps), steps, published_percent);
   EXPECT_LE(std::round(share * steps), std::ceil(kFactor * published_percent / 100 * steps)) << what;
-}
-
-// How many times as long as relmap a sliding window takes, both times being medians of one run. A disturbance may
-// affect only one of them, but hardly in three runs.
-void expect_time_of_a_sliding_window(const BenchFigures& found, const std::vector<std::string>& again,
-                                     double published) {
-  double best = found["ceres_over_relmap"];
-  for (int round = 0; round < 2 && best < published / kFactor; ++round)
-    best = std::max(best, BenchFigures(again)["ceres_over_relmap"]);
-  std::printf("%g times as long, published %g\n", best, published);
-  EXPECT_GE(best, published / kFactor) << "a sliding window over relmap";
 }
 
 // The figures of a table's row that begins with `name`, one in each of its `columns`.
@@ -87,13 +64,10 @@ TEST(PublishedFigures, HoldForTheUpdateOfAKeyframe) {
   expect_about(found["registration_error_m"] / 3,
                published_figure(kFigures, "registration error, m \\| ([0-9.]+) \\|") / 20, "registration error, m");
   EXPECT_NEAR(found["rms_px"], published_figure(kFigures, "reprojection, px [^|]*\\| ([0-9.]+) \\("), 0.005);
-  expect_time_of_a_sliding_window(found, {"rba", "--seeds", "1", "--no-full"},
-                                  published_figure(kRba, "in the same run, ([0-9.]+) times as long"));
 }
 
 TEST(PublishedFigures, HoldForTheUpdateOfAKeyframeWithManyMeasurements) {
-  const std::vector<std::string> command{"rba", "--observations", "120", "--seeds", "1", "--no-full"};
-  const BenchFigures found(command);
+  const BenchFigures found({"rba", "--observations", "120", "--seeds", "1", "--no-full"});
   EXPECT_NEAR(found["measurements_per_keyframe"],
               published_figure(kRba, "With ([0-9]+) measurements per keyframe \\(`--observations 120`\\)"), 1);
   const auto errors = published(kFigures,
@@ -104,8 +78,6 @@ TEST(PublishedFigures, HoldForTheUpdateOfAKeyframeWithManyMeasurements) {
                       errors.at(1) / errors.at(0), "error of a sliding window over relmap's");
   EXPECT_NEAR(found["rms_px"], published_figure(kFigures, "reprojection, px [^|]*\\| [^|]*\\| [^|]*\\| ([0-9.]+) \\("),
               0.005);
-  expect_time_of_a_sliding_window(found, command,
-                                  published_figure(kRba, "an update takes [0-9.]+ ms, Ceres ([0-9.]+) times as long"));
   EXPECT_EQ(found["unsupported_edges"], 0);
   EXPECT_EQ(found["allocations_per_update"], 0);
   EXPECT_EQ(found["numerical_failures"], 0);
@@ -170,7 +142,7 @@ TEST(PublishedFigures, HoldForClosuresThatBecomeEdges) {
 }
 
 TEST(PublishedFigures, HoldForTheSameSolutionInOneFrame) {
-  const BenchFigures found({"rba", "--scenario", "euclidean", "--seeds", "1"}, kPatience);
+  const BenchFigures found({"rba", "--scenario", "euclidean", "--seeds", "1"});
   const std::string number = "([0-9.e-]+)";
   const auto full = published(kRba, "full relative against full Euclidean \\| " + number + " \\| " + number + " \\|");
   expect_at_most(found["chain_full_over_euclidean_mean"], full.at(0), "full relative against Euclidean, mean");
@@ -213,41 +185,13 @@ TEST(PublishedFigures, HoldForClosingALoopOfAnyLength) {
 TEST(PublishedFigures, HoldForAPlacePassedAgainAndAgain) {
   const auto of_thousand = published(kRba, "([0-9,]+) are in force for the ([0-9,]+) points that the drive saw");
   constexpr int kLaps = 15;
-  const std::vector<std::string> command{"rba", "--scenario", "laps", "--laps", std::to_string(kLaps)};
-  const BenchFigures found(command);
+  const BenchFigures found({"rba", "--scenario", "laps", "--laps", std::to_string(kLaps)});
   expect_at_most(found["landmarks_in_force"] / found["points_seen"] - 1, of_thousand.at(0) / of_thousand.at(1) - 1,
                  "landmarks in force for each point seen, beyond 1");
   EXPECT_EQ(found["unsupported_edges"], 0);
   // Of the points of the first lap, those that each of the thousand laps replaced.
   const double replaced = of_thousand.at(1) / 1000, first = found["points_seen"] - (kLaps - 1) * replaced;
   EXPECT_NEAR(1 - replaced / first, 0.7, 0.05) << "seven landmarks in ten are seen again";
-  // Where landmarks do not become fixed, an update takes longer with every lap. A disturbance may affect only the last
-  // laps, but hardly in three runs.
-  const auto times = published(kFigures,
-                               "of the second lap ([0-9,]+) / [0-9,]+, of the fifth [0-9,]+ / [0-9,]+, of the twelfth "
-                               "[0-9,]+ / [0-9,]+, of the thousandth ([0-9,]+) /");
-  const auto growth = [](const BenchFigures& figures) {
-    const auto by_lap = figures.series("update_p50_us_by_lap");
-    EXPECT_EQ(by_lap.size(), static_cast<std::size_t>(kLaps));
-    return *std::min_element(by_lap.end() - 4, by_lap.end()) / by_lap.at(1);
-  };
-  const double ratio = times.at(1) / times.at(0);
-  double best = growth(found);
-  for (int round = 0; round < 2 && best > kFactor * ratio; ++round)
-    best = std::min(best, growth(BenchFigures(command)));
-  expect_at_most(best, ratio, "median update of the last laps over that of the second");
-}
-
-// A five-hundredth of the published drive, in a sixteenth of its memory. Both times are medians of the same run, but
-// seconds apart, so that a disturbance may affect only the later one; hardly in three runs.
-TEST(PublishedFigures, HoldForAnUpdateInAMapThatGrows) {
-  const double ratio = published_figure(kFigures, "so the ratios are ([0-9.]+) and [0-9.]+;");
-  double best = HUGE_VAL;
-  for (int round = 0; round < 3 && best > kFactor * ratio; ++round) {
-    const BenchFigures found({"rba", "--scenario", "exploration", "--frames", "2000", "--memory-budget-mb", "16"});
-    best = std::min(best, found["update_p50_us"] / found["first_tenth_update_p50_us"]);
-  }
-  expect_at_most(best, ratio, "median update of the last tenth over that of the first");
 }
 
 TEST(PublishedFigures, HoldForThePlaceIndex) {
@@ -271,28 +215,6 @@ TEST(PublishedFigures, HoldForTheMapOnDisk) {
   expect_at_most(found["rss_max_mb"] - 64,
                  published_figure(kFigures, "peak resident memory, MB \\| ([0-9]+) \\|") - budget_mb,
                  "peak resident memory beyond the budget, MB");
-}
-
-// Times of the same run, on one thread. A disturbance may affect only one of them, but hardly in three runs.
-TEST(PublishedFigures, HoldForUnpackingARawFrame) {
-  const auto grey = published(kFigures, "\\| grey \\| [0-9.]+ / [0-9.]+ \\| ([0-9.]+) \\| ([0-9.]+) \\|");
-  const auto colour =
-      published(kFigures, "\\| with a colour filter, to grey \\| [0-9.]+ / [0-9.]+ \\| ([0-9.]+) \\| ([0-9.]+) \\|");
-  double over_copy = HUGE_VAL, colour_over_copy = HUGE_VAL, gain = 0, colour_gain = 0;
-  for (int round = 0; round < 3; ++round) {
-    const BenchFigures found({"unpack"});
-    over_copy = std::min(over_copy, found["unpack_over_memcpy"]);
-    colour_over_copy = std::min(colour_over_copy, found["unpack_bayer_over_memcpy"]);
-    gain = std::max(gain, found["plain_over_unpack"]);
-    colour_gain = std::max(colour_gain, found["plain_over_unpack_bayer"]);
-    if (over_copy <= kFactor * grey.at(0) && colour_over_copy <= kFactor * colour.at(0) &&
-        gain >= grey.at(1) / kFactor && colour_gain >= colour.at(1) / kFactor)
-      break;
-  }
-  expect_at_most(over_copy, grey.at(0), "grey, over a copy");
-  expect_at_most(colour_over_copy, colour.at(0), "with a colour filter, over a copy");
-  EXPECT_GE(gain, grey.at(1) / kFactor) << "the plain loop over ours";
-  EXPECT_GE(colour_gain, colour.at(1) / kFactor) << "the plain loop over ours, with a colour filter";
 }
 
 TEST(PublishedFigures, HoldForRoutesByCells) {
@@ -342,7 +264,7 @@ TEST(PublishedFigures, HoldForTheFrontEndAgainstAPlainPipeline) {
 
 // The first 40 m of the published drive of 750 m.
 TEST(PublishedFigures, HoldForAMotorwayOfLowTexture) {
-  const BenchFigures found({"frontend", "--scene", "motorway", "--frames", "16", "--reference", "klt"}, kPatience);
+  const BenchFigures found({"frontend", "--scene", "motorway", "--frames", "16", "--reference", "klt"});
   const auto row = published(kFrontEnd,
                              "a motorway of low texture, 300 pairs at 25 m/s \\(`--scene motorway`\\) \\| [0-9]+ \\| "
                              "[0-9]+ \\| ([0-9.]+) \\| ([0-9.]+) \\| ([0-9.]+) \\| ([0-9.]+) \\|");
@@ -372,19 +294,18 @@ void expect_every_fault_survived(const BenchFigures& found, double frames, std::
 }
 
 TEST(PublishedFigures, HoldForADriveWithEveryFault) {
-  const BenchFigures found({"frontend", "--faults", "all", "--seed", "4", "--frames", "220"}, kPatience);
+  const BenchFigures found({"frontend", "--faults", "all", "--seed", "4", "--frames", "220"});
   expect_every_fault_survived(found, 220, 0);
 }
 
 TEST(PublishedFigures, HoldForADriveWithEveryFaultAndAGyro) {
-  const BenchFigures found({"frontend", "--faults", "all", "--seed", "4", "--frames", "170", "--imu"}, kPatience);
+  const BenchFigures found({"frontend", "--faults", "all", "--seed", "4", "--frames", "170", "--imu"});
   expect_every_fault_survived(found, 170, 1);
 }
 
 // One drive of the published eight, with less than half of its pairs.
 TEST(PublishedFigures, HoldForTenSecondsOfBlack) {
-  const BenchFigures found({"frontend", "--frames", "220", "--circuit", "100", "--faults", "long_black:60", "--imu"},
-                           kPatience);
+  const BenchFigures found({"frontend", "--frames", "220", "--circuit", "100", "--faults", "long_black:60", "--imu"});
   EXPECT_EQ(found["blind_steps"], 1);
   EXPECT_EQ(found["topological_share"], 1);
   const auto errors =

@@ -15,7 +15,6 @@ namespace relmap::testing {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 
 constexpr std::uint32_t kFrames = 400;
@@ -36,7 +35,7 @@ class SessionDeletion : public ::testing::Test {
 
   Finished relmap(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
-    return run_program(arguments, seconds(50));
+    return run_program(arguments);
   }
   Finished ingest(std::vector<std::string> drives, const std::vector<std::string>& more = {}) const {
     drives.insert(drives.begin(), "ingest");
@@ -71,11 +70,11 @@ TEST_F(SessionDeletion, GoesOnByItselfAfterKillsAndLeavesTheOthersWhole) {
     Process deleting({built_program("relmap"), "--server", options_.data, "session", "delete", "2", "--yes"}, {});
     const std::uint32_t before = seen.back();
     const auto client = daemon->client();
-    const auto until = std::chrono::steady_clock::now() + seconds(60);
+    const auto until = std::chrono::steady_clock::now() + kPatience;
     while (frames_of(*client, 2) == before && std::chrono::steady_clock::now() < until)
       std::this_thread::sleep_for(milliseconds(2));
     daemon->process().kill();
-    deleting.wait(seconds(60));
+    deleting.wait(kPatience);
     daemon = std::make_unique<RunningDaemon>(options_);
     seen.push_back(frames_of(*daemon->client(), 2));
     EXPECT_LT(seen.back(), before) << "what a reader has seen to go may come back until it is committed, but the "

@@ -39,7 +39,7 @@ class ClosureHandlers : public testing::Test {
   }
   // First makes a dry run, which must report the same changes and change nothing.
   v1::SetEdgeStateReply set(v1::SetEdgeStateRequest request) {
-    EXPECT_TRUE(map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50)).ok());
+    map_.settle();
     const std::uint64_t version = map_.mapper->view()->version();
     request.set_dry_run(true);
     const auto dry = call(*map_.core, set_edge_state, request, deadline_).or_throw();

@@ -58,7 +58,7 @@ class ImportGraph : public ::testing::Test {
         route::RouteIndexOptions{}, [this] { return mapper_->view(); },
         std::make_shared<storage::Budget>(std::size_t{64} << 20));
     core.routes.index->start();
-    ASSERT_TRUE(core.routes.index->wait_current(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+    ASSERT_TRUE(core.routes.index->wait_current(std::chrono::steady_clock::now() + std::chrono::minutes(10)));
   }
   std::vector<storage::Edge> loops() const {
     std::vector<storage::Edge> found;

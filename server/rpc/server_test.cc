@@ -246,7 +246,7 @@ TEST_F(Server, CallsBeyondTheLimitsAreRefusedAtOnce) {
   v1::GetStatusReply other;
   EXPECT_TRUE(stub->GetStatus(context().get(), {}, &other).ok());
   // A call releases its budget a moment after its answer.
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(10);
   while (map_.mapper->budget().used(storage::Share::kReplies) > 0 && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_EQ(map_.mapper->budget().used(storage::Share::kReplies), 0u);

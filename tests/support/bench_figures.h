@@ -6,13 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/patience.h"
+
 namespace relmap::testing {
 
 class BenchFigures {
  public:
   // Runs a subcommand of relmap-bench to its end, and prints its output. Throws if it fails.
-  explicit BenchFigures(const std::vector<std::string>& arguments,
-                        std::chrono::milliseconds patience = std::chrono::seconds(50));
+  explicit BenchFigures(const std::vector<std::string>& arguments, std::chrono::milliseconds patience = kPatience);
 
   // Throw if there is no such figure. null becomes NaN, which satisfies no comparison.
   double operator[](const std::string& key) const;

@@ -5,6 +5,7 @@
 #include "proto/base/crc32c.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
+#include "tests/support/patience.h"
 
 namespace relmap::testing {
 
@@ -62,7 +63,7 @@ Reason HandRobot::refusal(std::uint32_t sequence) const {
 
 bool repeat_until(const std::function<void()>& what, const std::function<bool()>& done) {
   using std::chrono::milliseconds;
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
   while (std::chrono::steady_clock::now() < deadline) {
     what();
     for (int i = 0; i < 20; ++i) {

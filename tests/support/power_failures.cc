@@ -15,6 +15,7 @@
 #include "storage/engine/memory_engine.h"
 #include "storage/maintenance/verify.h"
 #include "storage/testing/forwarding_engine.h"
+#include "tests/support/patience.h"
 #include "tools/sim/points_world.h"
 
 namespace relmap::testing {
@@ -197,7 +198,7 @@ class Run {
       return;
     }
     acknowledged_ = life.acknowledged();
-    if (const Status idle = life.mapper().wait_idle(steady_clock::now() + seconds(40)); !idle.ok())
+    if (const Status idle = life.mapper().wait_idle(steady_clock::now() + kPatience); !idle.ok())
       return wrong(idle.to_string());
     check(life.mapper());
     final_ = storage::hash_map(*life.mapper().view());
@@ -228,7 +229,7 @@ class Run {
 
   // As a robot does: what is not acknowledged is sent, and sent again.
   void feed(Life& life) {
-    const auto deadline = steady_clock::now() + seconds(40);
+    const auto deadline = steady_clock::now() + kPatience;
     std::uint64_t sent = acknowledged_;
     auto resend = steady_clock::now() + milliseconds(100);
     while (disk_.has_power() && life.acknowledged() < kFrames) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/patience.h"
 #include "tests/support/private_network.h"
 
 namespace relmap::testing {
@@ -51,8 +52,7 @@ struct Finished {
   std::string standard_output, standard_error;
 };
 // Runs a program to its end; throws if it takes longer than `patience`.
-Finished run_program(const std::vector<std::string>& arguments,
-                     std::chrono::milliseconds patience = std::chrono::seconds(50));
+Finished run_program(const std::vector<std::string>& arguments, std::chrono::milliseconds patience = kPatience);
 
 std::string read_text(const std::string& path);
 

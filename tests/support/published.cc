@@ -1,6 +1,9 @@
 #include "tests/support/published.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <cstdio>
 #include <regex>
 #include <stdexcept>
 
@@ -25,6 +28,16 @@ std::vector<double> published(const std::string& document, const std::string& pa
 
 double published_figure(const std::string& document, const std::string& pattern) {
   return published(document, pattern).at(0);
+}
+
+void expect_at_most(double value, double published, const std::string& what) {
+  std::printf("%s: %g, published %g\n", what.c_str(), value, published);
+  EXPECT_LE(value, kFactor * published) << what;
+}
+
+void expect_about(double value, double published, const std::string& what) {
+  expect_at_most(value, published, what);
+  EXPECT_GE(value, published / kFactor) << what;
 }
 
 }  // namespace relmap::testing

@@ -14,4 +14,10 @@ std::vector<double> published(const std::string& document, const std::string& pa
 // The same for a pattern with one group.
 double published_figure(const std::string& document, const std::string& pattern);
 
+// Fail the test if a short run's value is more than 1.5 times the published one; expect_about() also if it is less than
+// the published one divided by 1.5.
+constexpr double kFactor = 1.5;
+void expect_at_most(double value, double published, const std::string& what);
+void expect_about(double value, double published, const std::string& what);
+
 }  // namespace relmap::testing

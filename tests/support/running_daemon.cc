@@ -67,7 +67,7 @@ std::string RunningDaemon::log() const { return read_text(log_file(options_)); }
 
 int RunningDaemon::stop() {
   process_->signal(SIGTERM);
-  return process_->wait(std::chrono::seconds(40)).value_or(-1);
+  return process_->wait(kPatience).value_or(-1);
 }
 
 }  // namespace relmap::testing

@@ -26,7 +26,7 @@ struct DaemonOptions {
 // Throws with the daemon's log if it does not serve within `patience`; 0: does not wait.
 class RunningDaemon {
  public:
-  explicit RunningDaemon(const DaemonOptions& options, std::chrono::milliseconds patience = std::chrono::seconds(30));
+  explicit RunningDaemon(const DaemonOptions& options, std::chrono::milliseconds patience = kPatience);
 
   Process& process() { return *process_; }
   // Whether DIR/endpoint names this process.

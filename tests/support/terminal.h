@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/patience.h"
 #include "tests/support/process.h"
 
 namespace relmap::testing {
@@ -14,7 +15,6 @@ namespace relmap::testing {
 // the program asks, calls `meanwhile` and then types `typed`. `standard_error` has what the terminal showed, with its
 // line ends and echo. Throws if the program takes longer than `patience`.
 Finished run_on_terminal(const std::vector<std::string>& arguments, const std::string& typed,
-                         const std::function<void()>& meanwhile = {},
-                         std::chrono::milliseconds patience = std::chrono::seconds(50));
+                         const std::function<void()>& meanwhile = {}, std::chrono::milliseconds patience = kPatience);
 
 }  // namespace relmap::testing

@@ -29,8 +29,7 @@ class ServedMap {
     core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
     take_in(circuit);
     take_in(elsewhere);
-    const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
-    EXPECT_TRUE(idle.ok()) << idle.to_string();
+    settle();
   }
 
   void take_in(const sim::PointsWorld& world) {
@@ -44,12 +43,17 @@ class ServedMap {
     EXPECT_TRUE(taken.ok()) << taken.status().to_string();
   }
 
+  // Waits until the mapper has nothing to do; it comes to the end of the deadline only if something hangs.
+  void settle() const {
+    const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::minutes(10));
+    EXPECT_TRUE(idle.ok()) << idle.to_string();
+  }
+
   // Adds frames 0 .. count - 1 of the circuit as a mono session.
   SessionNumber take_in_with_one_eye(std::uint32_t count) {
     const SessionNumber session = mapper->begin_session(map::with_one_eye(circuit.keyframe(0)).session).or_throw();
     for (std::uint32_t i = 0; i < count; ++i) submit(session, map::with_one_eye(circuit.keyframe(i)));
-    const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
-    EXPECT_TRUE(idle.ok()) << idle.to_string();
+    settle();
     return session;
   }
 
