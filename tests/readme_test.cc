@@ -24,6 +24,7 @@
 #include "tests/support/published.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"
+#include "tests/support/source_tree.h"
 
 namespace relmap::testing {
 namespace {
@@ -177,6 +178,18 @@ TEST(Readme, BuildsAsTheDemoDoes) {
     }
   }
   EXPECT_EQ(seen, 3);
+}
+
+TEST(Readme, OfTheServerDescribesEverySetting) {
+  std::string source = content_of("server/ops/config.cc");
+  source.erase(0, source.find("settings() {"));
+  source.erase(source.find("return table;"));
+  const std::string described = content_of("server/README.md");
+  const std::regex key(R"re(\{"([a-z_.]+)",)re");
+  std::size_t keys = 0;
+  for (std::sregex_iterator found(source.begin(), source.end(), key), end; found != end; ++found, ++keys)
+    EXPECT_NE(described.find("| `" + found->str(1) + "` |"), std::string::npos) << found->str(1);
+  EXPECT_GE(keys, 24u) << "settings() has another form";
 }
 
 TEST(Readme, TellsOfTheDriveThatTheDemoMakes) {
