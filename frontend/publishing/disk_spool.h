@@ -3,8 +3,9 @@
 //
 // Its folder holds `lock`, `session` (the header with the uuid), `recording` (one line that identifies the source),
 // `map` (one line with uuid and epoch of the map that the session is in), `unrepeatable` (an empty file, present if the
-// session is so) and numbered segments. A segment is a sequence of checksummed records (keyframe, gap). Records are
-// only ever appended; a segment is deleted when none of its records is needed any more.
+// source cannot be read again with the same result) and numbered segments. A segment is a sequence of checksummed
+// records (keyframe, gap). Records are only ever appended; a segment is deleted when none of its records is needed any
+// more.
 #pragma once
 
 #include <cstdint>
@@ -27,9 +28,10 @@ class DiskSpool final : public Spool {
                                                  const std::string& recording = {});
   ~DiskSpool() override;
 
-  // Deletes the keyframes and the map, so that the session starts over. It keeps its uuid, so that a map does not take
-  // the same keyframes twice. An unrepeatable session gets a new uuid, since a map that has a part of it would
-  // otherwise get keyframes of another run behind that part. IO_ERROR.
+  // Deletes the spooled keyframes and the file `map`, so that the session starts over. The server's map does not
+  // change. The session keeps its uuid, so that a map does not take the same keyframes twice. An unrepeatable session
+  // gets a new uuid, since a map that has a part of it would otherwise get keyframes of another run behind that part.
+  // IO_ERROR.
   Status begin_anew();
 
   std::size_t damaged_bytes() const { return damaged_bytes_; }  // dropped by open()

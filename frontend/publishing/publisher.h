@@ -1,5 +1,5 @@
 // Publishes keyframes to relmapd: they go into a spool and are sent, if necessary repeatedly, until the daemon
-// acknowledges them as settled (applied, refused, or given up as a gap).
+// acknowledges them as settled (durable in its journal, refused, or given up as a gap).
 #pragma once
 
 #include <chrono>

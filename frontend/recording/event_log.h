@@ -32,7 +32,8 @@ class EventLog {
   EventLog(std::unique_ptr<std::istream> in, std::uint64_t bytes, std::string name);
 
   // Returns the next event; nothing at the end. Damage is skipped up to the next sync word. If the end is damaged,
-  // returns once TRUNCATED (in the middle of an event), CORRUPT (no event) or IO_ERROR; the message has the byte.
+  // returns once TRUNCATED (in the middle of an event), CORRUPT (no event) or IO_ERROR; the message gives the byte
+  // offset.
   Result<std::optional<Event>> next();
 
   // The first 64 KiB of an event's data, more than any message of relmap has; valid until the next call of any

@@ -35,8 +35,8 @@ class Spares {
     spares_.push_back({std::move(object), bytes, of});
   }
 
-  // Takes a free object that was a version of `of`. If there is none and the store is full, takes the oldest free one,
-  // whose frame has not been asked for for long. Null if there is neither.
+  // Takes a free object that was a version of `of`. If there is none and the store is full, takes the free one
+  // that was put in longest ago. Null if there is neither.
   std::shared_ptr<T> take(FrameId of = {}) {
     const auto free = [](const Spare& spare) { return only_ours(spare.object); };
     auto found = std::find_if(spares_.begin(), spares_.end(), [&](const Spare& s) { return s.of == of && free(s); });

@@ -25,6 +25,7 @@ class Dc1394Link : public CameraLink, private ProcessEvents {
   Status open(const std::string& program, const std::vector<std::string>& arguments, std::uint64_t guid);
   // The same with a process that is already running, for tests.
   Status open_at(FileHandle socket, std::uint64_t guid);
+  // Where the camera is on the bus, in the words of libdc1394's process ("node 1"); empty before open().
   const std::string& place() const { return place_; }
 
   Status read(std::uint64_t address, std::span<std::uint32_t> quadlets) override;
