@@ -197,15 +197,13 @@ class EurocPictures : public DataTest {
 
 // Compares with the row of docs/figures.md that begins with `name`.
 void expect_as_published(const std::vector<double>& metres, double nees, const std::string& name) {
-  constexpr double kFactor = 1.5;
   const auto row = published("docs/figures.md", "\\| " + name +
                                                     " \\| ([0-9]+); [^|]* \\| ([0-9.]+) / ([0-9.]+) cm \\| "
                                                     "([0-9.]+) \\|");
   EXPECT_GE(static_cast<double>(metres.size()), row.at(0) / kFactor) << "answered";
-  EXPECT_LE(100 * metres[metres.size() / 2], kFactor * row.at(1)) << "cm, median";
-  EXPECT_LE(100 * metres.back(), kFactor * row.at(2)) << "cm, worst";
-  EXPECT_LE(nees, kFactor * row.at(3));
-  EXPECT_GE(nees, row.at(3) / kFactor);
+  expect_at_most(100 * metres[metres.size() / 2], row.at(1), "cm, median");
+  expect_at_most(100 * metres.back(), row.at(2), "cm, worst");
+  expect_about(nees, row.at(3), "squared error");
 }
 
 TEST_F(EurocPictures, OfTheSessionsOwnCameraAreUndistortedByIt) {

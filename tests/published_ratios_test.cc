@@ -18,29 +18,43 @@ namespace {
 const char* const kRba = "docs/rba.md";
 const char* const kFigures = "docs/figures.md";
 
-// Expects at most 1.5 times the published ratio in one run of at most five: a disturbance may affect only one of two
-// times, but hardly each time.
-void expect_ratio(const std::vector<std::string>& command, const std::function<double(const BenchFigures&)>& ratio,
-                  double published, const std::string& what) {
-  double least = HUGE_VAL;
-  for (int round = 0; round < 5 && !(least <= kFactor * published); ++round)
-    least = std::min(least, ratio(BenchFigures(command)));
-  expect_at_most(least, published, what);
+struct Ratio {
+  std::function<double(const BenchFigures&)> of;
+  double published;
+  std::string what;
+};
+
+// Expects at most 1.5 times each published ratio in one run of at most three: a disturbance may affect only one of two
+// times, but hardly in three runs.
+void expect_ratios(const std::vector<std::string>& command, const std::vector<Ratio>& ratios) {
+  std::vector<double> least(ratios.size(), HUGE_VAL);
+  bool hold = false;
+  for (int round = 0; round < 3 && !hold; ++round) {
+    const BenchFigures found(command);
+    hold = true;
+    for (std::size_t i = 0; i < ratios.size(); ++i) {
+      least[i] = std::min(least[i], ratios[i].of(found));
+      hold = hold && least[i] <= kFactor * ratios[i].published;
+    }
+  }
+  for (std::size_t i = 0; i < ratios.size(); ++i) expect_at_most(least[i], ratios[i].published, ratios[i].what);
 }
 
-std::function<double(const BenchFigures&)> relmap_over_ceres() {
-  return [](const BenchFigures& found) { return 1 / found["ceres_over_relmap"]; };
+std::function<double(const BenchFigures&)> inverse(const std::string& key) {
+  return [key](const BenchFigures& found) { return 1 / found[key]; };
 }
 
 TEST(PublishedRatios, HoldForTheUpdateOfAKeyframe) {
-  expect_ratio({"rba", "--seeds", "3", "--no-full"}, relmap_over_ceres(),
-               1 / published_figure(kRba, "in the same run, ([0-9.]+) times as long"), "relmap over a sliding window");
+  expect_ratios({"rba", "--seeds", "3", "--no-full"},
+                {{inverse("ceres_over_relmap"), 1 / published_figure(kRba, "in the same run, ([0-9.]+) times as long"),
+                  "relmap over a sliding window"}});
 }
 
 TEST(PublishedRatios, HoldForTheUpdateOfAKeyframeWithManyMeasurements) {
-  expect_ratio({"rba", "--observations", "120", "--seeds", "1", "--no-full"}, relmap_over_ceres(),
-               1 / published_figure(kRba, "an update takes [0-9.]+ ms, Ceres ([0-9.]+) times as long"),
-               "relmap over a sliding window");
+  expect_ratios({"rba", "--observations", "120", "--seeds", "1", "--no-full"},
+                {{inverse("ceres_over_relmap"),
+                  1 / published_figure(kRba, "an update takes [0-9.]+ ms, Ceres ([0-9.]+) times as long"),
+                  "relmap over a sliding window"}});
 }
 
 // Where landmarks do not become fixed, an update takes longer with every lap.
@@ -52,8 +66,8 @@ TEST(PublishedRatios, HoldForAPlacePassedAgainAndAgain) {
     const auto by_lap = found.series("update_p50_us_by_lap");
     return *std::min_element(by_lap.end() - 4, by_lap.end()) / by_lap.at(1);
   };
-  expect_ratio({"rba", "--scenario", "laps", "--laps", "15"}, growth, times.at(1) / times.at(0),
-               "median update of the last laps over that of the second");
+  expect_ratios({"rba", "--scenario", "laps", "--laps", "15"},
+                {{growth, times.at(1) / times.at(0), "median update of the last laps over that of the second"}});
 }
 
 // A five-hundredth of the published drive, in a sixteenth of its memory.
@@ -61,9 +75,9 @@ TEST(PublishedRatios, HoldForAnUpdateInAMapThatGrows) {
   const auto growth = [](const BenchFigures& found) {
     return found["update_p50_us"] / found["first_tenth_update_p50_us"];
   };
-  expect_ratio({"rba", "--scenario", "exploration", "--frames", "2000", "--memory-budget-mb", "16"}, growth,
-               published_figure(kFigures, "so the ratios are ([0-9.]+) and [0-9.]+;"),
-               "median update of the last tenth over that of the first");
+  expect_ratios({"rba", "--scenario", "exploration", "--frames", "2000", "--memory-budget-mb", "16"},
+                {{growth, published_figure(kFigures, "so the ratios are ([0-9.]+) and [0-9.]+;"),
+                  "median update of the last tenth over that of the first"}});
 }
 
 TEST(PublishedRatios, HoldForUnpackingARawFrame) {
@@ -71,14 +85,11 @@ TEST(PublishedRatios, HoldForUnpackingARawFrame) {
   const auto colour =
       published(kFigures, "\\| with a colour filter, to grey \\| [0-9.]+ / [0-9.]+ \\| ([0-9.]+) \\| ([0-9.]+) \\|");
   const auto figure = [](const std::string& key) { return [key](const BenchFigures& found) { return found[key]; }; };
-  const auto inverse = [](const std::string& key) {
-    return [key](const BenchFigures& found) { return 1 / found[key]; };
-  };
-  expect_ratio({"unpack"}, figure("unpack_over_memcpy"), grey.at(0), "grey, over a copy");
-  expect_ratio({"unpack"}, figure("unpack_bayer_over_memcpy"), colour.at(0), "with a colour filter, over a copy");
-  expect_ratio({"unpack"}, inverse("plain_over_unpack"), 1 / grey.at(1), "ours over the plain loop");
-  expect_ratio({"unpack"}, inverse("plain_over_unpack_bayer"), 1 / colour.at(1),
-               "ours over the plain loop, with a colour filter");
+  expect_ratios({"unpack"},
+                {{figure("unpack_over_memcpy"), grey.at(0), "grey, over a copy"},
+                 {figure("unpack_bayer_over_memcpy"), colour.at(0), "with a colour filter, over a copy"},
+                 {inverse("plain_over_unpack"), 1 / grey.at(1), "ours over the plain loop"},
+                 {inverse("plain_over_unpack_bayer"), 1 / colour.at(1), "ours over the plain loop, with a filter"}});
 }
 
 }  // namespace
