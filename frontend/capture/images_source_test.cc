@@ -71,7 +71,7 @@ TEST(ImagesSource, TakesListsOfTimesAndNames) {
 
 // Of a folder on a network disk each picture costs a way there and back: a source that is opened for its first pairs
 // does not ask for all of them.
-TEST(ImagesSource, PicturesAreMissedWhenThatIsAsked) {
+TEST(ImagesSource, MissingPicturesAreLookedForOnlyWhenAskedFor) {
   TemporaryFolder folder;
   write_text(folder.path() / "calib.txt", kKittiCalibration);
   for (const char* name : {"a.pgm", "b.pgm", "c.pgm"})

@@ -324,7 +324,7 @@ TEST_F(PublisherCoreTest, ADaemonOfAnotherMapIsSentNothingAndNotBelieved) {
   EXPECT_EQ(sent(), (std::vector<std::uint32_t>{21, 22, 23, 24}));
 }
 
-TEST_F(PublisherCoreTest, OfTwoDaemonsTheOneOfTheSessionsMapIsUsed) {
+TEST_F(PublisherCoreTest, TheOneOfTwoDaemonsThatHasTheSessionsMapIsUsed) {
   push(1);
   core_.introduce({{1}, map_of(9)}, now_);
   core_.acknowledge(ack(1), now_);

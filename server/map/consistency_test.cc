@@ -73,7 +73,7 @@ class Standing : public Consistency {
   }
 };
 
-TEST_F(Standing, FramesOfAStandingRobotAreOneWitness) {
+TEST_F(Standing, FramesOfAStandingRobotCountAsOneWitness) {
   close(6, 5, 0);
   EXPECT_THAT(test_consistency(graph_, close(9, 5, 0)).agreeing, IsEmpty());
   EXPECT_EQ(test_consistency(graph_, close(11, 7, 0)).agreeing.size(), 2u);

@@ -17,10 +17,9 @@
 #include "server/map/commit_scheduler.h"
 #include "server/map/deterministic_driver.h"
 #include "server/map/journal_writer.h"
-#include "server/map/known_places.h"
-#include "server/map/lookup.h"
 #include "server/map/lookup_queue.h"
 #include "server/map/map_builder.h"
+#include "server/map/place_recognition.h"
 #include "server/map/record_log.h"
 #include "server/map/recovery.h"
 #include "server/map/session_registry.h"
@@ -51,10 +50,7 @@ struct Mapper::Impl {
         budget(std::move(budget_in)),
         vocabulary(std::move(vocabulary_in)),
         options(std::move(options_in)),
-        places(vocabulary ? std::make_unique<place::PlaceIndex>(
-                                vocabulary, place::PlaceIndexOptions{budget->allowance(storage::Share::kPlaceIndex),
-                                                                     options.folder})
-                          : nullptr) {}
+        recognition(vocabulary ? std::make_unique<PlaceRecognition>(vocabulary, budget, options.folder) : nullptr) {}
 
   CommitScheduler::Hooks commit_hooks();
   BackgroundWork::Hooks background_hooks();
@@ -80,9 +76,7 @@ struct Mapper::Impl {
   void fail(const std::string& what, const Status& why);
   std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
 
-  // Lookup thread; in deterministic mode the worker.
-  std::vector<storage::JournalRecord> look_up_one(FrameId frame);
-  void count_doubts(SessionNumber session, const Lookup& found);
+  // Lookup thread.
   bool journal_patiently(const storage::JournalRecord& record);
 
   void tell_waiting() const {
@@ -95,7 +89,7 @@ struct Mapper::Impl {
     return storage;
   }
   bool all_done() const RELMAP_REQUIRES(mutex);
-  bool recognises_places() const { return options.closures && places; }
+  bool recognises_places() const { return options.closures && recognition; }
 
   const std::shared_ptr<storage::Engine> engine;
   const std::shared_ptr<storage::Budget> budget;
@@ -128,9 +122,7 @@ struct Mapper::Impl {
 
   std::unique_ptr<storage::Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
-  const std::unique_ptr<place::PlaceIndex> places;  // null without a vocabulary
-  place::PictureCache pictures;                     // of the lookup thread
-  CameraDoubts doubts;
+  const std::unique_ptr<PlaceRecognition> recognition;  // null without a vocabulary
   LookupQueue lookups{budget};
   BackgroundWork background{options.idle_slice, background_hooks()};
   DeterministicDriver in_step{options.idle_slice, lookups, driver_hooks()};
@@ -184,7 +176,7 @@ DeterministicDriver::Hooks Mapper::Impl::driver_hooks() {
                 note_applied(sequence, record, result);
                 closures.announce(*map->view(), result.closures);
               },
-          .look_up = [this](FrameId frame) { return look_up_one(frame); },
+          .look_up = [this](FrameId frame) { return recognition->look_up(*map->view(), frame); },
           .relaxation_pending = [this] { return !map->state().pending.empty(); },
           .next_removal = [this] { return background.next_removal(); }};
 }
@@ -261,8 +253,7 @@ void Mapper::Impl::recover() {
   }
   // With some words missing, places would silently not be recognised.
   if (recognises_places())
-    if (Status indexed = index_known_places(*view, *vocabulary, lookups, *places, *budget); !indexed.ok())
-      fail("the words of the map's places", indexed);
+    if (Status loaded = recognition->load(*view, lookups); !loaded.ok()) fail("the words of the map's places", loaded);
 }
 
 void Mapper::Impl::start() {
@@ -278,7 +269,7 @@ void Mapper::Impl::start() {
   patient = true;
   worker = std::thread([this] { work(); });
   if (recognises_places() && !options.deterministic)
-    lookups.start([this](FrameId frame) { return look_up_one(frame); },
+    lookups.start([this](FrameId frame) { return recognition->look_up(*map->view(), frame); },
                   [this](const storage::JournalRecord& record) { return journal_patiently(record); },
                   [this] { tell_waiting(); });
 }
@@ -405,38 +396,9 @@ void Mapper::Impl::fail(const std::string& what, const Status& why) {
 
 void Mapper::Impl::begin_deletion(const storage::Session& session) {
   if (!storage::is_going(session)) return;
-  doubts.forget(session.number);
-  if (places) places->leave_out(session.number);
+  if (recognition) recognition->forget(session.number);
   lookups.forget_failed(session.number);
   if (session.frames > 0) background.delete_session(session.number);
-}
-
-std::vector<storage::JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
-  const auto view = map->view();
-  Lookup found;
-  Status trouble;
-  const auto session = view->session(frame.session);
-  if (!session || storage::is_going(*session)) return {};  // it is no place any more
-  try {
-    found = look_up(*view, *places, pictures, frame);
-  } catch (const StatusError& error) {
-    trouble = error.status();
-  }
-  if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(*places, *budget, frame, cold->words);
-  throw_if(trouble);
-  count_doubts(frame.session, found);
-  return std::move(found.records);
-}
-
-void Mapper::Impl::count_doubts(SessionNumber session, const Lookup& found) {
-  if (found.contradiction) {
-    const auto doubt = doubts.contradict(session, found.contradiction->with, found.contradiction->what.message());
-    if (doubt) spdlog::warn("the calibration of session {} is in doubt: {}", doubt->session, doubt->message);
-    return;
-  }
-  for (const storage::JournalRecord& record : found.records)
-    if (const auto* proposal = std::get_if<storage::ClosureProposalRecord>(&record))
-      doubts.confirm(session, proposal->match.session);
 }
 
 // Waits until the record is durable, because only then is the lookup done. The queue may be full of robots' keyframes,
@@ -504,8 +466,8 @@ Status Mapper::Impl::stop() {
     changed.notify_all();
   }
   worker.join();
-  if (places)
-    if (const Status saved = places->save(); !saved.ok())
+  if (recognition)
+    if (const Status saved = recognition->save(); !saved.ok())
       spdlog::warn("the next start reads more of the map for its place index: {}", saved.to_string());
   return storage_status();
 }
@@ -583,7 +545,7 @@ void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
 
 std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
 const MapIdentity& Mapper::identity() const { return impl_->identity; }
-const place::PlaceIndex& Mapper::places() const { return *impl_->places; }
+const place::PlaceIndex& Mapper::places() const { return impl_->recognition->places(); }
 const place::Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
 storage::Budget& Mapper::budget() const { return *impl_->budget; }
 storage::Engine& Mapper::engine() const { return *impl_->engine; }
@@ -591,9 +553,11 @@ storage::Engine& Mapper::engine() const { return *impl_->engine; }
 MapperStats Mapper::stats() const {
   MapperStats stats;
   stats.durable_sequence = impl_->writer->durable_through();
-  stats.places = impl_->places ? impl_->places->size() : 0;
-  stats.doubts = impl_->doubts.doubts();
-  stats.places_left_out = impl_->places ? impl_->places->left_out() : 0;
+  if (impl_->recognition) {
+    stats.places = impl_->recognition->places().size();
+    stats.places_left_out = impl_->recognition->places().left_out();
+    stats.doubts = impl_->recognition->doubts();
+  }
   stats.pending_frames = impl_->map->view()->pending_frames();
   const Status journal = impl_->writer->health();
   const MutexLock lock(impl_->mutex);

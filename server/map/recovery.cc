@@ -31,4 +31,16 @@ Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& b
   return replayed;
 }
 
+void find_open_lookups(const std::set<FrameId>& known, const Replayed& replayed, bool deterministic,
+                       LookupQueue& lookups) {
+  if (deterministic) {  // every lookup was done before the next keyframe was taken in
+    for (const FrameId frame : known) lookups.open(frame);
+    if (!replayed.frames.empty() && !replayed.looked_up) lookups.open(replayed.frames.back());
+    return;
+  }
+  std::set<FrameId> open = known;
+  open.insert(replayed.frames.begin(), replayed.frames.end());
+  for (const FrameId frame : open) lookups.push(frame);
+}
+
 }  // namespace relmap::map

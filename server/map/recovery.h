@@ -1,11 +1,13 @@
-// Crash recovery: re-applies the journal's records after the last commit.
+// Crash recovery: re-applies the journal's records after the last commit, and finds the lookups that were not finished.
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <vector>
 
 #include "proto/base/ids.h"
 #include "proto/base/status.h"
+#include "server/map/lookup_queue.h"
 #include "server/map/map_builder.h"
 #include "storage/engine/engine.h"
 
@@ -25,5 +27,12 @@ struct Replayed {
 // Applies the journal's records from `from` on. Does not throw: failures are in `trouble`, so that the daemon still
 // starts, read-only.
 Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& builder);
+
+// Opens the frames whose lookup may not have been made, or may not have reached the journal: `known`, which were open
+// at the last commit (MapState::lookups), and those that the journal added since. A proposal made twice changes
+// nothing. `deterministic`: the caller looks them up itself, and had made every lookup before the next keyframe was
+// taken in.
+void find_open_lookups(const std::set<FrameId>& known, const Replayed& replayed, bool deterministic,
+                       LookupQueue& lookups);
 
 }  // namespace relmap::map

@@ -3,7 +3,7 @@
 namespace relmap::storage {
 
 Status Quarantine::keep(const std::string& name, ByteSpan bytes) {
-  if (Status made = files_->create_directory(directory_); !made.ok()) return made;
+  if (Status made = create_durable_directory(*files_, directory_); !made.ok()) return made;
   used_ = true;
   std::string path = directory_ + "/" + name;
   for (int n = 2; files_->open_read(path).ok(); ++n) path = directory_ + "/" + name + "." + std::to_string(n);

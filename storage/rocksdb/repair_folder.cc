@@ -162,7 +162,7 @@ class FolderRepair {
     throw_if(files_->sync_directory(fs::path(from).parent_path()));
   }
   void keep(const std::string& path, const std::string& name) {
-    throw_if(files_->create_directory(quarantine_));
+    throw_if(create_durable_directory(*files_, quarantine_));
     std::string to = quarantine_ + "/" + name;
     for (int n = 2; fs::exists(to); ++n) to = quarantine_ + "/" + name + "." + std::to_string(n);
     changed_ = true;

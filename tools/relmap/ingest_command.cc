@@ -282,7 +282,7 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_option("PATH", options->paths, "recordings: folders of pictures, files of keyframes, logs of lcm-logger")
       ->required();
   command->add_option("--source", how.recordings.source, "kind of the recordings; auto recognises it")
-      ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "raw", "lcmlog"}))
+      ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "raw", "log"}))
       ->capture_default_str();
   auto* const jobs = command->add_option("--jobs", how.jobs, "recordings taken in at a time")
                          ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))
@@ -336,7 +336,6 @@ void add_ingest(CLI::App& app, Action& action) {
       "pair is plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD) fails before any of it is in the map.");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
-    if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";
     if (options->deterministic) options->batch.jobs = 1;
     action = [options](client::Client& client, terminal::Console& console) {
       return ingest(*options, client, console);
