@@ -1,22 +1,12 @@
 #include <cerrno>
-#include <cstdarg>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 
 #include "client/drawing.h"
+#include "proto/base/printf_text.h"
 
 namespace relmap::client {
 namespace {
-
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-  char text[256];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
 
 // Widths of ' ' to '~', in thousandths of the em.
 constexpr int kDejaVuWidths[] = {317,  400, 459, 837, 636, 950, 779, 274, 390, 390, 500, 837, 317, 360, 317, 336,
@@ -49,12 +39,12 @@ std::string escape(const std::string& text) {
   return out;
 }
 
-std::string hex(Colour c) { return format("#%02x%02x%02x", c.red, c.green, c.blue); }
+std::string hex(Colour c) { return printf_text("#%02x%02x%02x", c.red, c.green, c.blue); }
 
 class SvgDrawing : public Drawing {
  public:
   SvgDrawing(double width, double height, Colour paper) {
-    body_ = format(
+    body_ = printf_text(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%g\" height=\"%g\" viewBox=\"0 0 %g %g\" "
         "font-family=\"Helvetica, Arial, 'DejaVu Sans', sans-serif\">\n",
         width, height, width, height);
@@ -64,36 +54,36 @@ class SvgDrawing : public Drawing {
   void polyline(const std::vector<Vector2>& points, const Stroke& stroke) override {
     if (points.size() < 2) return;
     body_ += "<polyline points=\"" + list(points) + "\" fill=\"none\" stroke=\"" + hex(stroke.colour) +
-             format("\" stroke-width=\"%.2f\" stroke-linejoin=\"round\"", stroke.width);
+             printf_text("\" stroke-width=\"%.2f\" stroke-linejoin=\"round\"", stroke.width);
     if (stroke.dash > 0)
-      body_ += format(" stroke-dasharray=\"%.2f\"", stroke.dash);
+      body_ += printf_text(" stroke-dasharray=\"%.2f\"", stroke.dash);
     else
       body_ += " stroke-linecap=\"round\"";
-    if (stroke.opacity < 1) body_ += format(" stroke-opacity=\"%.2f\"", stroke.opacity);
+    if (stroke.opacity < 1) body_ += printf_text(" stroke-opacity=\"%.2f\"", stroke.opacity);
     body_ += "/>\n";
   }
 
   void polygon(const std::vector<Vector2>& points, Colour fill, double opacity) override {
     body_ += "<polygon points=\"" + list(points) + "\" fill=\"" + hex(fill) + "\"";
-    if (opacity < 1) body_ += format(" fill-opacity=\"%.2f\"", opacity);
+    if (opacity < 1) body_ += printf_text(" fill-opacity=\"%.2f\"", opacity);
     body_ += "/>\n";
   }
 
   void disc(const Vector2& middle, double radius, Colour fill, double rim, Colour rim_colour) override {
-    body_ +=
-        format("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"", middle.x(), middle.y(), radius) + hex(fill) + "\"";
-    if (rim > 0) body_ += format(" stroke-width=\"%.2f\" stroke=\"", rim) + hex(rim_colour) + "\"";
+    body_ += printf_text("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"", middle.x(), middle.y(), radius) +
+             hex(fill) + "\"";
+    if (rim > 0) body_ += printf_text(" stroke-width=\"%.2f\" stroke=\"", rim) + hex(rim_colour) + "\"";
     body_ += "/>\n";
   }
 
   void text(const Vector2& at, const std::string& utf8, const TextStyle& style) override {
     const char* anchor = style.anchor == Anchor::kLeft ? "start" : style.anchor == Anchor::kMiddle ? "middle" : "end";
-    body_ += format("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\" text-anchor=\"%s\"%s fill=\"", at.x(), at.y(),
-                    style.size, anchor, style.bold ? " font-weight=\"bold\"" : "") +
+    body_ += printf_text("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\" text-anchor=\"%s\"%s fill=\"", at.x(), at.y(),
+                         style.size, anchor, style.bold ? " font-weight=\"bold\"" : "") +
              hex(style.colour) + "\"";
     if (style.halo > 0)
-      body_ += format(" stroke=\"#ffffff\" stroke-width=\"%.2f\" stroke-linejoin=\"round\" paint-order=\"stroke\"",
-                      2 * style.halo);
+      body_ += printf_text(" stroke=\"#ffffff\" stroke-width=\"%.2f\" stroke-linejoin=\"round\" paint-order=\"stroke\"",
+                           2 * style.halo);
     body_ += ">" + escape(utf8) + "</text>\n";
   }
 
@@ -121,7 +111,7 @@ class SvgDrawing : public Drawing {
  private:
   static std::string list(const std::vector<Vector2>& points) {
     std::string out;
-    for (const Vector2& p : points) out += format("%s%.2f,%.2f", out.empty() ? "" : " ", p.x(), p.y());
+    for (const Vector2& p : points) out += printf_text("%s%.2f,%.2f", out.empty() ? "" : " ", p.x(), p.y());
     return out;
   }
   std::string body_;

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <utility>
 
+#include "proto/base/big_endian.h"
+
 namespace relmap::recording {
 
 namespace {
@@ -14,12 +16,6 @@ constexpr std::array<std::uint8_t, 4> kSyncWord = {0xed, 0xa1, 0xda, 0x01};
 constexpr std::size_t kHeaderBytes = 28;
 constexpr std::uint32_t kMaxChannel = 999, kMaxLength = 0x7fffffff;  // as LCM
 constexpr std::size_t kBufferBytes = std::size_t{256} << 10;
-
-std::uint32_t big_endian(ByteSpan bytes) {
-  std::uint32_t value = 0;
-  for (const std::uint8_t b : bytes) value = value << 8 | b;
-  return value;
-}
 
 }  // namespace
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "frontend/vision/jpeg.h"
+#include "proto/base/big_endian.h"
 
 namespace relmap::vision {
 
@@ -19,12 +20,6 @@ namespace {
 // libjpeg holds all coefficients of a JPEG with several scans in memory at once.
 constexpr double kMaxCoefficientBytes = 96e6;
 constexpr int kMaxScans = 100;
-
-std::uint32_t big_endian(ByteSpan bytes, std::size_t at, std::size_t count) {
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < count; ++i) value = (value << 8) | bytes[at + i];
-  return value;
-}
 
 Result<PictureSize> refuse_if_large(PictureSize size) {
   if (size.width < 1 || size.height < 1)
@@ -43,7 +38,7 @@ Result<PictureSize> png_size(ByteSpan file) {
   static constexpr std::array<std::uint8_t, 4> kHeader{'I', 'H', 'D', 'R'};
   if (file.size() < 33 || !std::equal(kHeader.begin(), kHeader.end(), file.begin() + 12))
     return {Reason::PICTURE_DAMAGED, "PNG without a header"};
-  const std::uint32_t width = big_endian(file, 16, 4), height = big_endian(file, 20, 4);
+  const std::uint32_t width = big_endian(file.subspan(16, 4)), height = big_endian(file.subspan(20, 4));
   constexpr std::uint32_t kMax = 1u << 30;
   if (width > kMax || height > kMax)
     return {Reason::PICTURE_TOO_LARGE,
@@ -56,11 +51,11 @@ Result<PictureSize> png_size(ByteSpan file) {
 Status check_png(ByteSpan file) {
   constexpr std::size_t kSignature = 8, kFrame = 12;  // length, type and CRC of a chunk
   for (std::size_t at = kSignature; at + kFrame <= file.size();) {
-    const std::size_t length = big_endian(file, at, 4);
+    const std::size_t length = big_endian(file.subspan(at, 4));
     if (length > file.size() - at - kFrame) break;
     const std::string type(file.begin() + static_cast<std::ptrdiff_t>(at) + 4,
                            file.begin() + static_cast<std::ptrdiff_t>(at) + 8);
-    if (crc32_z(0, &file[at + 4], 4 + length) != big_endian(file, at + 8 + length, 4))
+    if (crc32_z(0, &file[at + 4], 4 + length) != big_endian(file.subspan(at + 8 + length, 4)))
       return {Reason::PICTURE_DAMAGED,
               "PNG is damaged in the chunk of " + std::to_string(length) + " bytes at byte " + std::to_string(at)};
     if (type == "IEND") return {};
@@ -115,7 +110,7 @@ class JpegWalk {
       }
       if (code == 0x01 || code == 0xd8) continue;  // markers without a body
       if (at_ + 2 > file_.size()) return damaged("JPEG ends within a marker");
-      const std::size_t length = big_endian(file_, at_, 2);
+      const std::size_t length = big_endian(file_.subspan(at_, 2));
       if (length < 2 || at_ + length > file_.size()) return damaged("JPEG ends within a segment");
       const ByteSpan body = file_.subspan(at_ + 2, length - 2);
       const bool frame = code >= 0xc0 && code <= 0xcf && code != 0xc4 && code != 0xc8 && code != 0xcc;
@@ -136,8 +131,8 @@ class JpegWalk {
 
   Status read_frame(int code, ByteSpan body) {
     if (body.size() < 6) return damaged("JPEG with a short frame header");
-    height_ = static_cast<int>(big_endian(body, 1, 2));
-    width_ = static_cast<int>(big_endian(body, 3, 2));
+    height_ = static_cast<int>(big_endian(body.subspan(1, 2)));
+    width_ = static_cast<int>(big_endian(body.subspan(3, 2)));
     components_ = body[5];
     if (components_ == 0 || body.size() < 6 + 3u * static_cast<unsigned>(components_))
       return damaged("JPEG with a short frame header");

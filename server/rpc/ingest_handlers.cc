@@ -5,6 +5,7 @@
 #include "relmap/v1/status.pb.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/ingest_messages.h"
+#include "server/rpc/messages.h"
 
 namespace relmap::rpc {
 
@@ -14,11 +15,7 @@ const Status kNoIntake{Reason::UNSUPPORTED, "this server does not take keyframes
 
 void add_counts(const std::map<Reason, std::uint64_t>& counts,
                 google::protobuf::RepeatedPtrField<v1::ReasonCount>& to) {
-  for (const auto& [reason, count] : counts) {
-    v1::ReasonCount& added = *to.Add();
-    added.set_reason(to_wire(reason));
-    added.set_count(count);
-  }
+  for (const auto& [reason, count] : counts) add_count(to, reason, count);
 }
 
 void put_robot(const intake::RobotStats& stats, v1::Robot& robot) {

@@ -51,6 +51,12 @@ Result<storage::EdgeKind> from_wire(v1::EdgeKind kind) {
   return static_cast<storage::EdgeKind>(kind);
 }
 
+void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reason reason, std::uint64_t count) {
+  v1::ReasonCount& added = *counts.Add();
+  added.set_reason(to_wire(reason));
+  added.set_count(count);
+}
+
 namespace {
 
 v1::Uniqueness uniqueness_message(const storage::Uniqueness& uniqueness) {

@@ -4,6 +4,7 @@
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
+#include "relmap/v1/status.pb.h"
 #include "server/route/stretches.h"
 #include "storage/graph/graph.h"
 
@@ -36,6 +37,8 @@ void tell_unmeasured(const route::UnmeasuredStretches& stretches, Message& messa
   message.set_unmeasured_steps(stretches.steps());
   message.set_unmeasured_m(stretches.distance_m());
 }
+
+void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reason reason, std::uint64_t count);
 
 struct FrameParts {
   bool landmarks = false, observations = false, appearance = false, thumbnail = false;

@@ -26,7 +26,7 @@ v1::Error error_of(const grpc::Status& status) {
 }
 
 // Long, so that even a busy machine ends well before it where nothing is waited for.
-constexpr std::chrono::minutes kStopPatience{2};
+constexpr std::chrono::minutes kStopPatience{10};
 
 class Server : public testing::Test {
  protected:
@@ -271,7 +271,7 @@ TEST_F(Server, StoppingRefusesNewCallsAndEndsRunningOnes) {
   // The call is refused by us or, a moment later, by gRPC itself.
   EXPECT_THAT(status.error_code(), testing::AnyOf(grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::CANCELLED));
   stopper.join();
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, kStopPatience / 2);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, kStopPatience) << "it waited for its deadline";
 }
 
 TEST_F(Server, StoppingDoesNotWaitForIdleConnections) {
@@ -279,7 +279,7 @@ TEST_F(Server, StoppingDoesNotWaitForIdleConnections) {
   ASSERT_TRUE(get_frame({1, 1}, &reply).ok());  // and the connection stays
   const auto begun = std::chrono::steady_clock::now();
   server_->stop(kStopPatience);
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, kStopPatience / 2);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, kStopPatience) << "it waited for its deadline";
 }
 
 TEST(Roles, EveryMethodHasOne) {

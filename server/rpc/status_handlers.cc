@@ -7,18 +7,13 @@
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/status.pb.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/messages.h"
 
 namespace relmap::rpc {
 
 namespace {
 
 constexpr std::chrono::milliseconds kWaitSlice{100};
-
-void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reason reason, std::uint64_t count) {
-  v1::ReasonCount& added = *counts.Add();
-  added.set_reason(to_wire(reason));
-  added.set_count(count);
-}
 
 void put_daemon(const DaemonFacts& facts, v1::GetStatusReply& reply) {
   reply.set_version(facts.version);

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <iterator>
 #include <ostream>
 #include <set>
 
 #include "proto/base/json.h"
 #include "proto/base/number_text.h"
+#include "proto/base/printf_text.h"
 #include "tools/relmap/degrees.h"
 
 namespace relmap::cli {
@@ -17,15 +16,6 @@ namespace relmap::cli {
 namespace {
 
 constexpr double kEarthRadius = 6'378'137, kFlattening = 1 / 298.257223563;  // WGS 84
-
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-  char text[1024];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
 
 // On one line, whatever the name of a session holds.
 std::string on_one_line(std::string text) {
@@ -84,8 +74,8 @@ class Plane {
     const double c = std::cos(root_.heading / kDegrees), s = std::sin(root_.heading / kDegrees);
     const double east = c * p.x() + s * p.z(), north = c * p.z() - s * p.x();
     std::string text =
-        format("[%.9f,%.9f", root_.longitude + east / metres_east_, root_.latitude + north / metres_north_);
-    if (root_.altitude) text += format(",%.3f", *root_.altitude - p.y());
+        printf_text("[%.9f,%.9f", root_.longitude + east / metres_east_, root_.latitude + north / metres_north_);
+    if (root_.altitude) text += printf_text(",%.3f", *root_.altitude - p.y());
     return text + ']';
   }
 
@@ -125,7 +115,7 @@ class Features {
     for (const FrameId frame : frames) {
       const Vector3& p = part_.find(frame)->t;
       text += text.empty() ? "" : ",";
-      text += plane_ ? plane_->point(p) : format("[%.4f,%.4f,%.4f]", p.x(), p.y(), p.z());
+      text += plane_ ? plane_->point(p) : printf_text("[%.4f,%.4f,%.4f]", p.x(), p.y(), p.z());
     }
     return text;
   }
@@ -222,8 +212,8 @@ std::size_t write_tum(const RelaxedMap& map, std::size_t number, const FrameTime
     const Vector3& t = placed.T_root_frame.t;
     const Eigen::Quaterniond q = placed.T_root_frame.quaternion();
     const auto us = static_cast<long long>(time->second);
-    out << format("%lld.%06lld %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", us / 1000000, us % 1000000, t.x(), t.y(), t.z(),
-                  q.x(), q.y(), q.z(), q.w());
+    out << printf_text("%lld.%06lld %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", us / 1000000, us % 1000000, t.x(), t.y(),
+                       t.z(), q.x(), q.y(), q.z(), q.w());
   }
   return left_out;
 }
@@ -232,8 +222,8 @@ void write_kitti(const MapPart& part, std::ostream& out) {
   for (const PlacedFrame& placed : part.frames) {
     const Matrix3& R = placed.T_root_frame.R;
     const Vector3& t = placed.T_root_frame.t;
-    out << format("%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", R(0, 0), R(0, 1), R(0, 2), t.x(),
-                  R(1, 0), R(1, 1), R(1, 2), t.y(), R(2, 0), R(2, 1), R(2, 2), t.z());
+    out << printf_text("%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", R(0, 0), R(0, 1), R(0, 2),
+                       t.x(), R(1, 0), R(1, 1), R(1, 2), t.y(), R(2, 0), R(2, 1), R(2, 2), t.z());
   }
 }
 
@@ -245,8 +235,8 @@ void write_g2o(const RelaxedMap& map, std::size_t number, std::ostream& out) {
   for (const PlacedFrame& placed : part.frames) {
     const Vector3& t = placed.T_root_frame.t;
     const Eigen::Quaterniond q = placed.T_root_frame.quaternion();
-    out << format("VERTEX_SE3:QUAT %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g\n", numbers.at(placed.frame), t.x(),
-                  t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    out << printf_text("VERTEX_SE3:QUAT %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g\n", numbers.at(placed.frame),
+                       t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
   out << "FIX " << numbers.at(part.root) << '\n';
   Vector6 scale;  // a small rotation is twice the vector part of its quaternion
@@ -256,11 +246,11 @@ void write_g2o(const RelaxedMap& map, std::size_t number, std::ostream& out) {
     const client::RelaxationEdge& edge = map.springs[spring].relaxed;
     const Eigen::Quaterniond q = edge.T_ab.quaternion();
     std::string line =
-        format("EDGE_SE3:QUAT %zu %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g", numbers.at(edge.a),
-               numbers.at(edge.b), edge.T_ab.t.x(), edge.T_ab.t.y(), edge.T_ab.t.z(), q.x(), q.y(), q.z(), q.w());
+        printf_text("EDGE_SE3:QUAT %zu %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g", numbers.at(edge.a),
+                    numbers.at(edge.b), edge.T_ab.t.x(), edge.T_ab.t.y(), edge.T_ab.t.z(), q.x(), q.y(), q.z(), q.w());
     const Matrix6 information = scale.asDiagonal() * edge.covariance.inverse() * scale.asDiagonal();
     for (int i = 0; i < 6; ++i)
-      for (int j = i; j < 6; ++j) line += format(" %.12g", 0.5 * (information(i, j) + information(j, i)));
+      for (int j = i; j < 6; ++j) line += printf_text(" %.12g", 0.5 * (information(i, j) + information(j, i)));
     out << line << '\n';
   }
 }
@@ -281,8 +271,8 @@ void write_ply_head(const RelaxedMap& map, std::size_t number, std::uint64_t lan
   for (const PlacedFrame& placed : part.frames) {
     const Vector3& t = placed.T_root_frame.t;
     const Rgb c = session_colour(placed.frame.session);
-    out << format("%.6f %.6f %.6f %d %d %d %u %u 0\n", t.x(), t.y(), t.z(), c.red, c.green, c.blue,
-                  placed.frame.session, placed.frame.index);
+    out << printf_text("%.6f %.6f %.6f %d %d %d %u %u 0\n", t.x(), t.y(), t.z(), c.red, c.green, c.blue,
+                       placed.frame.session, placed.frame.index);
   }
 }
 
@@ -290,8 +280,8 @@ std::string ply_landmark(FrameId base, const SE3& T_root_base, const client::Exp
   const Vector3 p = T_root_base * Vector3(landmark.point.cast<double>());
   const Rgb c = session_colour(base.session);
   // Paler than the frames.
-  return format("%.6f %.6f %.6f %d %d %d %u %u %u\n", p.x(), p.y(), p.z(), (c.red + 255) / 2, (c.green + 255) / 2,
-                (c.blue + 255) / 2, base.session, base.index, landmark.observers);
+  return printf_text("%.6f %.6f %.6f %d %d %d %u %u %u\n", p.x(), p.y(), p.z(), (c.red + 255) / 2, (c.green + 255) / 2,
+                     (c.blue + 255) / 2, base.session, base.index, landmark.observers);
 }
 
 void write_ply_tail(const RelaxedMap& map, std::size_t number, std::ostream& out) {
@@ -300,8 +290,8 @@ void write_ply_tail(const RelaxedMap& map, std::size_t number, std::ostream& out
   for (const std::size_t index : part.edges) {
     const RelaxedMap::Spring& spring = map.springs[index];
     const int kind = spring.kind == client::EdgeKind::kLoop ? 2 : spring.kind == client::EdgeKind::kPrior ? 1 : 0;
-    out << format("%zu %zu %d %d\n", numbers.at(spring.relaxed.a), numbers.at(spring.relaxed.b), kind,
-                  spring.doubtful ? 1 : 0);
+    out << printf_text("%zu %zu %d %d\n", numbers.at(spring.relaxed.a), numbers.at(spring.relaxed.b), kind,
+                       spring.doubtful ? 1 : 0);
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include "proto/base/json.h"
 #include "proto/base/mutex.h"
+#include "proto/base/printf_text.h"
 #include "proto/keyframe/keyframe.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
@@ -22,6 +23,7 @@
 namespace {
 
 namespace fs = std::filesystem;
+using relmap::printf_text;
 using relmap::SE3;
 using relmap::StereoCamera;
 
@@ -45,17 +47,11 @@ void prepare_folder(const fs::path& folder, bool overwrite) {
   fs::create_directories(folder);
 }
 
-std::string format(const char* pattern, auto... values) {
-  char text[1024];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
-
 // The left camera in the first left camera's coordinates, 3x4, row by row.
 std::string kitti_pose(const SE3& T) {
   std::string line;
   for (int r = 0; r < 3; ++r)
-    line += format("%s%.9e %.9e %.9e %.9e", r == 0 ? "" : " ", T.R(r, 0), T.R(r, 1), T.R(r, 2), T.t(r));
+    line += printf_text("%s%.9e %.9e %.9e %.9e", r == 0 ? "" : " ", T.R(r, 0), T.R(r, 1), T.R(r, 2), T.t(r));
   return line + "\n";
 }
 
@@ -68,7 +64,7 @@ void write_poses(const fs::path& path, int frames, const PoseOf& pose_of) {
 
 std::string kitti_calibration(const StereoCamera& c) {
   const auto row = [&](const char* name, double shift) {
-    return format("%s: %.12e 0 %.12e %.12e 0 %.12e %.12e 0 0 0 1 0\n", name, c.f, c.cx, shift, c.f, c.cy, 0.0);
+    return printf_text("%s: %.12e 0 %.12e %.12e 0 %.12e %.12e 0 0 0 1 0\n", name, c.f, c.cx, shift, c.f, c.cy, 0.0);
   };
   return row("P0", 0) + row("P1", -c.f * c.baseline);
 }
@@ -209,7 +205,7 @@ struct PicturesCommand {
     for (int i = 0; i < world.frames; ++i)
       if (!scene.dropped(i)) delivered.push_back(i);
     for (const int i : delivered)
-      times << format("%.6e\n", static_cast<double>(scene.time_us(i) - scene.time_us(0)) * 1e-6);
+      times << printf_text("%.6e\n", static_cast<double>(scene.time_us(i) - scene.time_us(0)) * 1e-6);
     write_poses(folder / "poses.txt", static_cast<int>(delivered.size()),
                 [&](int k) { return scene.truth(delivered[k]); });
     if (!world.faults.empty() || world.drop_share > 0) write_faults(scene, folder / "faults.csv");
@@ -229,9 +225,9 @@ struct PicturesCommand {
            "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
     for (const relmap::ImuSample& sample : relmap::sim::simulate_inertial(scene, inertial)) {
       const relmap::Vector3 &w = sample.gyro, &a = sample.acceleration;
-      csv << format("%lld,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n",
-                    static_cast<long long>(sample.time_us - world.start_us) * 1000, w.x(), w.y(), w.z(), a.x(), a.y(),
-                    a.z());
+      csv << printf_text("%lld,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n",
+                         static_cast<long long>(sample.time_us - world.start_us) * 1000, w.x(), w.y(), w.z(), a.x(),
+                         a.y(), a.z());
     }
     create(folder / "imu.yaml") << inertial_calibration();
   }
@@ -242,9 +238,9 @@ struct PicturesCommand {
         "# EuRoC's layout, but that body B is the left camera: T_BS takes points from the unit to the camera.\n"
         "sensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [";
     for (int r = 0; r < 3; ++r)
-      text += format("%.9g, %.9g, %.9g, %.9g,\n         ", R(r, 0), R(r, 1), R(r, 2), inertial.position(r));
+      text += printf_text("%.9g, %.9g, %.9g, %.9g,\n         ", R(r, 0), R(r, 1), R(r, 2), inertial.position(r));
     return text +
-           format(
+           printf_text(
                "0, 0, 0, 1]\nrate_hz: %g\ngyroscope_noise_density: %g  # rad/s/sqrt(Hz)\n"
                "gyroscope_random_walk: %g  # rad/s^2/sqrt(Hz)\naccelerometer_noise_density: %g  # m/s^2/sqrt(Hz)\n"
                "accelerometer_random_walk: %g  # m/s^3/sqrt(Hz)\n"
@@ -270,7 +266,7 @@ struct PicturesCommand {
       if (!scene.riding(i)) continue;
       const std::vector<bool> moving = scene.moving(i);
       const auto count = static_cast<double>(std::count(moving.begin(), moving.end(), true));
-      csv << format("%d,%d,%.3f\n", i, scene.carried(i) ? 1 : 0, count / static_cast<double>(moving.size()));
+      csv << printf_text("%d,%d,%.3f\n", i, scene.carried(i) ? 1 : 0, count / static_cast<double>(moving.size()));
     }
   }
 
@@ -312,7 +308,7 @@ struct PicturesCommand {
     const cv::Mat view(picture.height, picture.width, CV_8U, const_cast<std::uint8_t*>(picture.pixels.data()));
     const std::vector<int> how = picture_format == "png" ? std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, 1}
                                                          : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 95};
-    const fs::path path = folder / format("%06d.%s", i, picture_format.c_str());
+    const fs::path path = folder / printf_text("%06d.%s", i, picture_format.c_str());
     if (!cv::imwrite(path.string(), view, how)) throw std::runtime_error("cannot write " + path.string());
   }
 

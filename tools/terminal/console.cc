@@ -8,17 +8,11 @@
 #include <iostream>
 
 #include "proto/base/bar_text.h"
+#include "proto/base/printf_text.h"
 
 namespace relmap::terminal {
 
 namespace {
-
-template <typename... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[128];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
 
 std::string padded(const std::string& text, std::size_t width, bool right) {
   const std::string pad(width - std::min(width, width_of(text)), ' ');
@@ -60,9 +54,9 @@ void Console::facts(const std::vector<std::pair<std::string, std::string>>& fact
 
 std::string bytes_text(std::uint64_t bytes) {
   const auto value = static_cast<double>(bytes);
-  if (value >= 1e9) return format("%.1f GB", value / 1e9);
-  if (value >= 1e6) return format("%.1f MB", value / 1e6);
-  return format("%.1f kB", value / 1e3);
+  if (value >= 1e9) return printf_text("%.1f GB", value / 1e9);
+  if (value >= 1e6) return printf_text("%.1f MB", value / 1e6);
+  return printf_text("%.1f kB", value / 1e3);
 }
 
 std::string time_text(std::int64_t time_us) {
@@ -71,15 +65,15 @@ std::string time_text(std::int64_t time_us) {
   gmtime_r(&seconds, &utc);
   char text[32];
   std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
-  return text + format(".%03dZ", static_cast<int>(time_us / 1000 % 1000));
+  return text + printf_text(".%03dZ", static_cast<int>(time_us / 1000 % 1000));
 }
 
 std::string duration_text(double seconds) {
-  if (seconds < 120) return format("%.1f s", seconds);
+  if (seconds < 120) return printf_text("%.1f s", seconds);
   const auto minutes = static_cast<long>(seconds / 60);
-  if (minutes < 120) return format("%ld min %02ld s", minutes, static_cast<long>(seconds) % 60);
-  if (minutes < 48 * 60) return format("%ld h %02ld min", minutes / 60, minutes % 60);
-  return format("%ld d %ld h", minutes / (24 * 60), minutes / 60 % 24);
+  if (minutes < 120) return printf_text("%ld min %02ld s", minutes, static_cast<long>(seconds) % 60);
+  if (minutes < 48 * 60) return printf_text("%ld h %02ld min", minutes / 60, minutes % 60);
+  return printf_text("%ld d %ld h", minutes / (24 * 60), minutes / 60 % 24);
 }
 
 std::string vector_text(const Vector3& v) {

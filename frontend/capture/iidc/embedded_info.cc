@@ -2,16 +2,13 @@
 
 #include "frontend/capture/iidc/cycle_clock.h"
 #include "frontend/capture/iidc/registers.h"
+#include "proto/base/big_endian.h"
 
 namespace relmap::iidc {
 
 namespace {
 
 constexpr std::uint32_t kMaxLost = 1'000'000;  // counters ahead: hours
-
-std::uint32_t big_endian(std::span<const std::uint8_t> bytes) {
-  return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 | std::uint32_t{bytes[2]} << 8 | bytes[3];
-}
 
 }  // namespace
 
@@ -29,7 +26,7 @@ Result<bool> embed_info(const RegisterFile& registers) {
 
 std::optional<EmbeddedInfo> embedded_info(std::span<const std::uint8_t> frame) {
   if (frame.size() < 8) return std::nullopt;
-  const EmbeddedInfo info{big_endian(frame), big_endian(frame.subspan(4))};
+  const EmbeddedInfo info{big_endian(frame.first(4)), big_endian(frame.subspan(4, 4))};
   if (!is_cycle_time(info.cycle)) return std::nullopt;
   return info;
 }

@@ -1,4 +1,4 @@
-#include "server/map/known_places.h"
+#include "server/map/place_recognition.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/map/recovery.h"
 #include "server/map/testing/points_drive.h"
 #include "server/place/testing/random_vocabulary.h"
 #include "storage/engine/memory_engine.h"
@@ -21,8 +22,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// A map of a session of six frames with features, and an index that knows nothing yet.
-class KnownPlacesTest : public ::testing::Test {
+// A map of a session of six frames with features, none of which is a place yet.
+class PlaceRecognitionTest : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kDriven = 6;
 
@@ -52,7 +53,7 @@ class KnownPlacesTest : public ::testing::Test {
     map_.reset();
     map_ = storage::Map::open(engine_, epoch_, budget_).or_throw();
   }
-  Status index() { return index_known_places(*map_->view(), *vocabulary_, lookups_, places_, *budget_); }
+  Status load() { return recognition_.load(*map_->view(), lookups_); }
 
   const std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
   const std::uint64_t epoch_ = engine_->acquire().or_throw();
@@ -62,44 +63,44 @@ class KnownPlacesTest : public ::testing::Test {
     return vocabulary_->words(features);
   };
   std::unique_ptr<storage::Map> map_;
-  place::PlaceIndex places_{vocabulary_};
+  PlaceRecognition recognition_{vocabulary_, budget_, ""};
   LookupQueue lookups_{budget_};
 };
 
-TEST_F(KnownPlacesTest, EveryFrameWithWordsBecomesAPlace) {
+TEST_F(PlaceRecognitionTest, EveryFrameWithWordsBecomesAPlace) {
   drive(words_);
-  EXPECT_TRUE(index().ok());
-  EXPECT_EQ(places_.size(), kDriven);
-  EXPECT_EQ(budget_->used(storage::Share::kPlaceIndex), places_.memory_bytes());
+  EXPECT_TRUE(load().ok());
+  EXPECT_EQ(recognition_.places().size(), kDriven);
+  EXPECT_EQ(budget_->used(storage::Share::kPlaceIndex), recognition_.places().memory_bytes());
 }
 
-TEST_F(KnownPlacesTest, CommittedFramesBecomePlacesToo) {
+TEST_F(PlaceRecognitionTest, CommittedFramesBecomePlacesToo) {
   drive(words_);
   ASSERT_TRUE(map_->commit().ok());
   open_map();
-  EXPECT_TRUE(index().ok());
-  EXPECT_EQ(places_.size(), kDriven);
+  EXPECT_TRUE(load().ok());
+  EXPECT_EQ(recognition_.places().size(), kDriven);
 }
 
-TEST_F(KnownPlacesTest, AFrameWhoseLookupIsOpenIsLeftToIt) {
+TEST_F(PlaceRecognitionTest, AFrameWhoseLookupIsOpenIsLeftToIt) {
   drive(words_);
   lookups_.open(frame(3));
-  EXPECT_TRUE(index().ok());
-  EXPECT_FALSE(places_.contains(frame(3)));
-  EXPECT_EQ(places_.size(), kDriven - 1);
+  EXPECT_TRUE(load().ok());
+  EXPECT_FALSE(recognition_.places().contains(frame(3)));
+  EXPECT_EQ(recognition_.places().size(), kDriven - 1);
 }
 
-TEST_F(KnownPlacesTest, WordsThatARepairHasLostAreComputedFromTheFeatures) {
+TEST_F(PlaceRecognitionTest, WordsThatARepairHasLostAreComputedFromTheFeatures) {
   drive({});
   ASSERT_TRUE(map_->commit().ok());
   open_map();
   const auto cold = map_->view()->cold(frame(0));
   ASSERT_TRUE(cold->words.empty() && !cold->appearance.empty());
-  EXPECT_TRUE(index().ok());
-  EXPECT_EQ(places_.size(), kDriven);
+  EXPECT_TRUE(load().ok());
+  EXPECT_EQ(recognition_.places().size(), kDriven);
 }
 
-TEST_F(KnownPlacesTest, WordsThatCannotBeReadAreAnError) {
+TEST_F(PlaceRecognitionTest, WordsThatCannotBeReadAreAnError) {
   drive(words_);
   ASSERT_TRUE(map_->commit().ok());
   const std::string key = storage::keys::frame(storage::Part::kWords, frame(2));
@@ -108,10 +109,22 @@ TEST_F(KnownPlacesTest, WordsThatCannotBeReadAreAnError) {
   const std::vector<storage::Put> puts{{key, damaged}};
   ASSERT_TRUE(engine_->commit(epoch_, engine_->applied_sequence(), puts, {}).ok());
   open_map();
-  EXPECT_EQ(index().reason(), Reason::DATA_LOSS);
+  EXPECT_EQ(load().reason(), Reason::DATA_LOSS);
 }
 
-TEST_F(KnownPlacesTest, OpenFramesAndThoseOfTheJournalAreLookedUpByTheThread) {
+TEST_F(PlaceRecognitionTest, ALookupMakesItsFrameAPlaceUnlessTheSessionIsBeingDeleted) {
+  drive(words_);
+  EXPECT_THAT(recognition_.look_up(*map_->view(), frame(0)), IsEmpty()) << "there is no other place yet";
+  EXPECT_TRUE(recognition_.places().contains(frame(0)));
+  MapBuilder(*map_, words_, rba::RbaOptions{})
+      .apply(map_->view()->state().applied_sequence + 1,
+             storage::SetSessionStateRecord{kDriveSession, storage::SessionState::kDeleting});
+  map_->publish();
+  (void)recognition_.look_up(*map_->view(), frame(1));
+  EXPECT_FALSE(recognition_.places().contains(frame(1)));
+}
+
+TEST_F(PlaceRecognitionTest, OpenFramesAndThoseOfTheJournalAreLookedUpByTheThread) {
   find_open_lookups({frame(1), frame(2)}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, false,
                     lookups_);
   std::vector<FrameId> looked_up;
@@ -128,7 +141,7 @@ TEST_F(KnownPlacesTest, OpenFramesAndThoseOfTheJournalAreLookedUpByTheThread) {
   EXPECT_THAT(looked_up, ElementsAre(frame(1), frame(2), frame(3))) << "each once";
 }
 
-TEST_F(KnownPlacesTest, InDeterministicModeOnlyTheLastFrameOfTheJournalMayLackItsLookup) {
+TEST_F(PlaceRecognitionTest, InDeterministicModeOnlyTheLastFrameOfTheJournalMayLackItsLookup) {
   find_open_lookups({}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, true, lookups_);
   EXPECT_THAT(lookups_.open_frames(), IsEmpty());
   find_open_lookups({frame(1)}, {.frames = {frame(2), frame(3)}, .looked_up = false, .trouble = {}}, true, lookups_);
