@@ -64,7 +64,7 @@ void write_poses(const fs::path& path, int frames, const PoseOf& pose_of) {
 
 std::string kitti_calibration(const StereoCamera& c) {
   const auto row = [&](const char* name, double shift) {
-    return printf_text("%s: %.12e 0 %.12e %.12e 0 %.12e %.12e 0 0 0 1 0\n", name, c.f, c.cx, shift, c.f, c.cy, 0.0);
+    return printf_text("%s: %.12e 0 %.12e %.12e 0 %.12e %.12e 0 0 0 1 0\n", name, c.f, c.cx, shift, c.f, c.cy);
   };
   return row("P0", 0) + row("P1", -c.f * c.baseline);
 }
