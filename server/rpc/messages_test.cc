@@ -27,5 +27,15 @@ TEST(VerificationOnTheWire, HasOnlyStoredValuesAndHomography) {
     EXPECT_EQ(wire.contains(value), v1::Verification_IsValid(value)) << value;
 }
 
+TEST(CountsOfReasons, AreAppended) {
+  v1::GetStatusReply reply;
+  add_count(*reply.mutable_refused_by_reason(), Reason::CORRUPT, 3);
+  add_count(*reply.mutable_refused_by_reason(), Reason::BAD_SIZE, 1);
+  ASSERT_EQ(reply.refused_by_reason_size(), 2);
+  EXPECT_EQ(reply.refused_by_reason(0).reason(), v1::REASON_CORRUPT);
+  EXPECT_EQ(reply.refused_by_reason(0).count(), 3u);
+  EXPECT_EQ(reply.refused_by_reason(1).reason(), v1::REASON_BAD_SIZE);
+}
+
 }  // namespace
 }  // namespace relmap::rpc

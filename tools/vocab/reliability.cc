@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "proto/base/printf_text.h"
 
 namespace relmap::vocab {
 namespace {
@@ -14,30 +15,24 @@ constexpr const char* kColours[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", 
 double x_of(double p) { return kLeft + p * kSide; }
 double y_of(double p) { return kTop + (1 - p) * kSide; }
 
-template <typename... Values>
-std::string print(const char* format, Values... values) {
-  char text[512];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
-
 std::string text_at(double x, double y, const char* anchor, const std::string& text) {
-  return print("<text x='%.1f' y='%.1f' text-anchor='%s'>", x, y, anchor) + text + "</text>\n";
+  return printf_text("<text x='%.1f' y='%.1f' text-anchor='%s'>", x, y, anchor) + text + "</text>\n";
 }
 
 std::string axes() {
-  std::string svg =
-      print("<rect x='%g' y='%g' width='%g' height='%g' fill='none' stroke='#888'/>\n", kLeft, kTop, kSide, kSide) +
-      print("<line x1='%g' y1='%g' x2='%g' y2='%g' stroke='#bbb' stroke-dasharray='5 4'/>\n", x_of(0), y_of(0), x_of(1),
-            y_of(1));
+  std::string svg = printf_text("<rect x='%g' y='%g' width='%g' height='%g' fill='none' stroke='#888'/>\n", kLeft, kTop,
+                                kSide, kSide) +
+                    printf_text("<line x1='%g' y1='%g' x2='%g' y2='%g' stroke='#bbb' stroke-dasharray='5 4'/>\n",
+                                x_of(0), y_of(0), x_of(1), y_of(1));
   for (int tenth = 0; tenth <= 10; tenth += 2) {
-    const std::string label = print("%.1f", tenth / 10.0);
+    const std::string label = printf_text("%.1f", tenth / 10.0);
     svg += text_at(x_of(tenth / 10.0), kTop + kSide + 18, "middle", label);
     svg += text_at(kLeft - 8, y_of(tenth / 10.0) + 4, "end", label);
   }
   return svg + text_at(kLeft + kSide / 2, kTop + kSide + 38, "middle", "probability that was given") +
-         print("<text transform='translate(%g %g) rotate(-90)' text-anchor='middle'>share that came true</text>\n",
-               18.0, kTop + kSide / 2);
+         printf_text(
+             "<text transform='translate(%g %g) rotate(-90)' text-anchor='middle'>share that came true</text>\n", 18.0,
+             kTop + kSide / 2);
 }
 
 }  // namespace
@@ -64,7 +59,7 @@ Reliability reliability(std::span<const Prediction> predictions, double min_prob
 }
 
 std::string draw(const std::vector<ReliabilityCurve>& curves) {
-  std::string svg = print(
+  std::string svg = printf_text(
       "<svg xmlns='http://www.w3.org/2000/svg' width='%g' height='%g' font-family='sans-serif' font-size='13'>\n"
       "<rect width='100%%' height='100%%' fill='white'/>\n",
       kLeft + kSide + kRight, kTop + kSide + kBelow);
@@ -75,16 +70,16 @@ std::string draw(const std::vector<ReliabilityCurve>& curves) {
     std::string line;
     for (const auto& bin : reliability.bins) {
       if (bin.predictions < kMinPredictions) continue;
-      line += print("%.1f,%.1f ", x_of(bin.said), y_of(bin.came_true));
-      svg +=
-          print("<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='0.7'/>\n", x_of(bin.said),
-                y_of(bin.came_true), std::min(12.0, 2 + std::sqrt(static_cast<double>(bin.predictions)) / 3), stroke);
+      line += printf_text("%.1f,%.1f ", x_of(bin.said), y_of(bin.came_true));
+      svg += printf_text("<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='0.7'/>\n", x_of(bin.said),
+                         y_of(bin.came_true), std::min(12.0, 2 + std::sqrt(static_cast<double>(bin.predictions)) / 3),
+                         stroke);
     }
-    svg += "<polyline points='" + line + print("' fill='none' stroke='%s' stroke-width='1.5'/>\n", stroke);
+    svg += "<polyline points='" + line + printf_text("' fill='none' stroke='%s' stroke-width='1.5'/>\n", stroke);
     const double y = kTop + 16 + 22 * static_cast<double>(colour++);
-    svg += print("<circle cx='%g' cy='%g' r='5' fill='%s'/>\n", kLeft + kSide + 20, y - 4, stroke);
+    svg += printf_text("<circle cx='%g' cy='%g' r='5' fill='%s'/>\n", kLeft + kSide + 20, y - 4, stroke);
     svg += text_at(kLeft + kSide + 32, y, "start",
-                   name + print(": %zu predictions, off by %.3f", reliability.predictions, reliability.error));
+                   name + printf_text(": %zu predictions, off by %.3f", reliability.predictions, reliability.error));
   }
   return svg + "</svg>\n";
 }
