@@ -156,14 +156,18 @@ std::uint32_t first_recent(const storage::Graph& graph, FrameId query) {
   }
 }
 
+storage::FrameRange recent_past(const storage::Graph& graph, FrameId query) {
+  return {query.session, first_recent(graph, query), std::numeric_limits<std::uint32_t>::max()};
+}
+
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
                FrameId frame) {
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
   const storage::Session session = *view.session(frame.session);
   if (!session.header.camera.is_stereo()) return {};
-  const std::uint32_t recent = first_recent(view, frame);
-  const storage::FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
+  const storage::FrameRange own_past = recent_past(view, frame);
+  const std::uint32_t recent = own_past.first;
   const place::QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
 
   const place::PlaceAnswer answer =

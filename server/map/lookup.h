@@ -8,6 +8,7 @@
 #include "server/place/picture_cache.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
+#include "storage/graph/frame_range.h"
 #include "storage/graph/graph.h"
 #include "storage/journal/journal_record.h"
 
@@ -20,6 +21,8 @@ inline constexpr std::uint32_t kRecentEdges = 20;
 inline constexpr std::uint32_t kMaxRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const storage::Graph& graph, FrameId query);
+// The query's oldest recent frame and all later ones of its session: they are no answers to what the query shows.
+storage::FrameRange recent_past(const storage::Graph& graph, FrameId query);
 
 // A keyframe that shows a place but fits another calibration: its session's camera, or that of the place's session, is
 // not as calibrated.

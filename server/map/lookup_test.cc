@@ -47,6 +47,14 @@ TEST(FirstRecent, EndsWhereAMonoSessionIsBroken) {
   EXPECT_EQ(first_recent(graph, {1, 29}), 0u) << "one is missing, and all are of one time";
 }
 
+TEST(RecentPast, IsAllOfTheSessionFromTheFirstRecentFrameOn) {
+  const place::HandMadeGraph graph = session_of(place::kStereoCamera, 100);
+  const storage::FrameRange past = recent_past(graph, {1, 70});
+  EXPECT_FALSE(past.contains({1, 49}));
+  for (const std::uint32_t i : {50u, 70u, 99u, 1000u}) EXPECT_TRUE(past.contains({1, i})) << i;
+  EXPECT_FALSE(past.contains({2, 70})) << "of another session";
+}
+
 // Session 1 has driven a street; robots with other cameras stand where one of its frames was taken.
 class LookUpAs : public ::testing::Test {
  protected:

@@ -1,7 +1,6 @@
 #include "server/map/propose.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "proto/base/number_text.h"
@@ -24,7 +23,7 @@ struct Seen {
   Seen(const storage::Graph& view, FrameId id)
       : frame(id),
         cold(view.cold(id)),
-        own_past{id.session, first_recent(view, id), std::numeric_limits<std::uint32_t>::max()},
+        own_past(recent_past(view, id)),
         picture{cold->appearance, view.session(id.session)->header.camera, {&own_past, 1}} {}
   Seen(const Seen&) = delete;
   Seen& operator=(const Seen&) = delete;

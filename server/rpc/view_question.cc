@@ -1,6 +1,5 @@
 #include "server/rpc/view_question.h"
 
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -68,7 +67,7 @@ Result<SeenView> see_frame(const v1::View& view, const storage::Graph& graph) {
   SeenView seen;
   seen.features = cold->appearance;
   seen.camera = session->header.camera;
-  seen.masked.push_back({frame->session, map::first_recent(graph, *frame), std::numeric_limits<std::uint32_t>::max()});
+  seen.masked.push_back(map::recent_past(graph, *frame));
   return seen;
 }
 
