@@ -6,11 +6,13 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "proto/base/ids.h"
 #include "proto/base/status.h"
+#include "storage/graph/frame.h"
 
 namespace relmap::intake {
 
@@ -54,6 +56,13 @@ struct RobotStats {
   std::vector<SessionUuid> same_name;  // sessions that other robots of this name send at the same time
   bool silent = false;                 // it fell silent without an end and was forgotten; values as last heard
 };
+
+// Whether a silent robot is not missing, because its session in the map (nullopt: the map has none) has ended since or
+// is being deleted.
+inline bool has_left(const RobotStats& robot, const std::optional<storage::Session>& session) {
+  if (!robot.silent || !session) return false;
+  return storage::is_going(*session) || session->state == storage::SessionState::kEnded;
+}
 
 // An event of a robot that sends keyframes.
 struct RobotEvent {

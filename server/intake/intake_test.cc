@@ -801,6 +801,23 @@ TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   EXPECT_FALSE(listed().at(0).silent);
 }
 
+TEST(SilentRobot, HasLeftOnceItsSessionHasEndedOrIsBeingDeleted) {
+  using storage::SessionState;
+  RobotStats robot;
+  storage::Session session;
+  for (const SessionState state :
+       {SessionState::kOpen, SessionState::kEnded, SessionState::kFrozen, SessionState::kDeleting}) {
+    session.state = state;
+    robot.silent = true;
+    const bool gone = state == SessionState::kEnded || state == SessionState::kDeleting;
+    EXPECT_EQ(has_left(robot, session), gone) << static_cast<int>(state);
+    robot.silent = false;
+    EXPECT_FALSE(has_left(robot, session)) << static_cast<int>(state) << ": it sends again";
+  }
+  robot.silent = true;
+  EXPECT_FALSE(has_left(robot, std::nullopt)) << "the map has no such session";
+}
+
 TEST_F(IntakeTest, SilentRobotsAreRememberedWithinBounds) {
   IntakeOptions options;
   options.max_sessions = 4;

@@ -50,11 +50,8 @@ Result<v1::ListRobotsReply> list_robots(const v1::ListRobotsRequest&, const Dead
   if (!intake.server) return kNoIntake;
   std::vector<intake::RobotStats> robots = intake.server->robots();
   const auto view = mapper.view();
-  // A silent robot is not missing if its session has ended or is being deleted.
-  std::erase_if(robots, [&](const intake::RobotStats& robot) {
-    const auto session = robot.silent ? view->session(robot.session) : std::nullopt;
-    return session && (storage::is_going(*session) || session->state == storage::SessionState::kEnded);
-  });
+  std::erase_if(robots,
+                [&](const intake::RobotStats& robot) { return intake::has_left(robot, view->session(robot.session)); });
   for (intake::RobotStats& robot : robots)
     if (const auto session = view->session(robot.session)) robot.name = session->display_name;
   std::sort(robots.begin(), robots.end(), [](const intake::RobotStats& a, const intake::RobotStats& b) {
