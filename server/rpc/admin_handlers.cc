@@ -93,9 +93,9 @@ class VerifyReport {
 
 Status verify_map(map::Mapper& mapper, const storage::VerifyOptions& options, JobStream<v1::VerifyReply>& stream) {
   storage::Budget& budget = mapper.budget();
-  storage::VerifyOptions within = options;
-  within.memory_bytes = std::min(options.memory_bytes, budget.allowance(storage::Share::kReplies) / 2);
-  Charge charge(budget, storage::Share::kReplies);
+  constexpr storage::Share kShare = storage::Share::kReplies;
+  const storage::VerifyOptions within = storage::beside_others(options, budget, kShare);
+  Charge charge(budget, kShare);
   if (Status charged = charge.grow_to(within.memory_bytes); !charged.ok()) return charged;
   VerifyReport report(stream);
   const storage::Engine& engine = mapper.engine();

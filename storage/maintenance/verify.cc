@@ -378,6 +378,11 @@ class Verifier {
 
 }  // namespace
 
+VerifyOptions beside_others(VerifyOptions options, const Budget& budget, Share share) {
+  options.memory_bytes = std::min(options.memory_bytes, budget.allowance(share) / 2);
+  return options;
+}
+
 Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
                              const OnProgress& on_progress, const OnDifference& on_difference) try {
   return Verifier(snapshot, options, on_finding, on_progress, on_difference).run();

@@ -15,6 +15,7 @@
 #include "storage/engine/engine.h"
 #include "storage/maintenance/finding.h"
 #include "storage/map/map.h"
+#include "storage/memory/budget.h"
 
 namespace relmap::storage {
 
@@ -24,6 +25,10 @@ struct VerifyOptions {
   std::vector<SessionNumber> sessions;               // only their frames; empty: all
   std::size_t memory_bytes = std::size_t{32} << 20;  // for decoded chunks, and for what is counted again
 };
+
+// The options for a verification that is charged to `share`: with at most half of the memory that the share allows, so
+// that it does not take all from the others that are charged to it.
+VerifyOptions beside_others(VerifyOptions options, const Budget& budget, Share share);
 
 struct VerifySummary {
   std::uint64_t sessions = 0;

@@ -341,6 +341,18 @@ TEST_F(Verify, HoldsNoMoreMemoryThanItMay) {
   EXPECT_EQ(broken.findings, found().findings);
 }
 
+TEST(VerifyBesideOthers, TakesHalfOfItsShareAtMost) {
+  VerifyOptions asked;
+  asked.sessions = {2, 3};
+  const Budget small(std::size_t{64} << 20), large(std::size_t{64} << 30);
+  ASSERT_LT(small.allowance(Share::kReplies), asked.memory_bytes);
+  const VerifyOptions tight = beside_others(asked, small, Share::kReplies);
+  EXPECT_EQ(tight.memory_bytes, small.allowance(Share::kReplies) / 2);
+  EXPECT_EQ(tight.sessions, asked.sessions);
+  EXPECT_EQ(beside_others(asked, small, Share::kEngine).memory_bytes, small.allowance(Share::kEngine) / 2);
+  EXPECT_EQ(beside_others(asked, large, Share::kReplies).memory_bytes, asked.memory_bytes) << "no more than asked for";
+}
+
 TEST_F(Verify, StopsWhenToldTo) {
   std::uint64_t calls = 0;
   const auto summary = verify(*engine->snapshot(), {}, {}, [&](const MaintenanceProgress& progress) {
