@@ -524,6 +524,21 @@ Status Mapper::wait_idle(Clock::time_point deadline) const {
   return impl_->failed && !impl_->all_done() ? impl_->storage : Status();
 }
 
+Result<std::uint64_t> Mapper::wait_deleted(SessionNumber session, Clock::time_point until) const {
+  const auto left = [&] { return std::uint64_t{view()->session(session)->frames}; };
+  std::uint64_t frames = left();
+  if (frames > 0)
+    if (Status health = impl_->health(); health.reason() == Reason::READ_ONLY) return health;
+  // Looks without the lock, since a view that is given up may have much to release.
+  for (std::uint64_t looked = 0; frames > 0 && Clock::now() < until; frames = left()) {
+    MutexLock lock(impl_->mutex);
+    impl_->changed.wait_until(impl_->mutex, until,
+                              [&]() RELMAP_REQUIRES(impl_->mutex) { return impl_->applied != looked; });
+    looked = impl_->applied;
+  }
+  return frames;
+}
+
 Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
   const std::uint64_t ticket = impl_->commits.ask();
   MutexLock lock(impl_->mutex);

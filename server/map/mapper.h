@@ -89,6 +89,10 @@ class Mapper {
   // (for batch jobs and tests). DEADLINE if that takes longer.
   Status wait_idle(std::chrono::steady_clock::time_point deadline) const;
 
+  // Waits until a session that is being deleted has no frames left, but at most until `until`; returns how many it has.
+  // The session must exist. READ_ONLY (stats().storage) if it has frames and the map is read-only, so that they stay.
+  Result<std::uint64_t> wait_deleted(SessionNumber session, std::chrono::steady_clock::time_point until) const;
+
   // Commits everything dirty now and returns the last committed journal sequence. DEADLINE, or why the commit failed.
   Result<std::uint64_t> commit(std::chrono::steady_clock::time_point deadline);
 

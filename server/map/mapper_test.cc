@@ -244,6 +244,19 @@ TEST(Mapper, AFullQueueRefusesAndLosesNothing) {
   EXPECT_EQ(mapper->view()->session(session)->frames, 60u);
 }
 
+TEST(Mapper, AWaitForADeletionTellsHowManyFramesAreLeft) {
+  const sim::PointsWorld world(small_world(20));
+  const auto mapper = open_mapper(storage::make_memory_engine());
+  ASSERT_TRUE(feed(*mapper, world, 0, 20).ok());
+  const SessionNumber session = mapper->view()->sessions().front().number;
+  EXPECT_EQ(mapper->wait_deleted(session, std::chrono::steady_clock::now()).or_throw(), 20u) << "nothing deletes it";
+  const storage::SetSessionStateRecord deleting{session, storage::SessionState::kDeleting};
+  ASSERT_TRUE(mapper->submit_and_wait(deleting).ok());
+  EXPECT_EQ(mapper->wait_deleted(session, soon()).or_throw(), 0u);
+  EXPECT_EQ(mapper->view()->session(session)->frames, 0u) << "as readers see it";
+  EXPECT_EQ(mapper->wait_deleted(session, std::chrono::steady_clock::now()).or_throw(), 0u);
+}
+
 TEST(Mapper, AfterStopNothingIsTaken) {
   const auto mapper = open_mapper(storage::make_memory_engine());
   ASSERT_TRUE(mapper->stop().ok());
@@ -297,6 +310,8 @@ TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
     EXPECT_THAT(storage.message(), testing::HasSubstr(throws ? "beyond record 11" : "journal record 12"));
     EXPECT_EQ(mapper->submit_and_wait(storage::IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
     EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
+    const SessionNumber session = view->sessions().front().number;
+    EXPECT_EQ(mapper->wait_deleted(session, soon()).reason(), Reason::READ_ONLY) << "no frame would go";
   }
 }
 

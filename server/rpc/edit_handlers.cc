@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <chrono>
-#include <thread>
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
@@ -13,7 +12,7 @@ namespace relmap::rpc {
 
 namespace {
 
-constexpr std::chrono::milliseconds kLookEach{100};  // between looks at the progress of a deletion
+constexpr std::chrono::milliseconds kTellEach{100};  // between messages of the progress of a deletion
 
 }  // namespace
 
@@ -80,17 +79,13 @@ Result<Producer<v1::Progress>> delete_session(const v1::DeleteSessionRequest& re
       [&mapper, number, total, deadline, ended = false]() mutable -> Result<std::optional<v1::Progress>> {
         if (ended) return std::optional<v1::Progress>();
         if (Status status = deadline.check(); !status.ok()) return status;
-        auto left = mapper.view()->session(number)->frames;
-        if (left > 0) {
-          if (const Status storage = mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
-          std::this_thread::sleep_for(kLookEach);
-          left = mapper.view()->session(number)->frames;
-        }
-        ended = left == 0;
+        const auto left = mapper.wait_deleted(number, std::chrono::steady_clock::now() + kTellEach);
+        if (!left.ok()) return left.status();
+        ended = *left == 0;
         v1::Progress progress;
         progress.set_step("deleting");
         progress.set_total(total);
-        progress.set_done(total - std::min<std::uint64_t>(left, total));
+        progress.set_done(total - std::min(*left, total));
         progress.set_unit("frames");
         return std::optional<v1::Progress>(std::move(progress));
       });
