@@ -15,8 +15,9 @@ EdgeId DryRun::propose(const storage::ClosureProposalRecord& record) {
   return closure_between(recorder_, record.query, record.match)->id;
 }
 
-std::uint64_t DryRun::removal(EdgeId id) const {
-  return storage::find_edge(recorder_, id) ? removal_mark(recorder_, id) : 0;
+std::uint64_t DryRun::removal(const storage::SetEdgeStateRecord& record) const {
+  if (!removes_all(record) || !storage::find_edge(recorder_, record.edge)) return 0;
+  return removal_mark(recorder_, record.edge);
 }
 
 }  // namespace relmap::map

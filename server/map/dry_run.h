@@ -25,9 +25,9 @@ class DryRun {
   // Stores a closure; returns its id.
   EdgeId propose(const storage::ClosureProposalRecord& record);
 
-  // The removal_mark() of a closure in the map with the edits made so far; 0 if there is no such edge. Must be called
-  // before the removal.
-  std::uint64_t removal(EdgeId id) const;
+  // The removal_mark() of a record that removes_all(), in the map with the edits made so far; 0 of another record, or
+  // if there is no such edge. Must be called before the removal.
+  std::uint64_t removal(const storage::SetEdgeStateRecord& record) const;
 
   // An edge, which must exist, as the edits leave it.
   storage::Edge edge(EdgeId id) const { return *storage::find_edge(recorder_, id); }

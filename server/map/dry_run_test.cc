@@ -58,8 +58,10 @@ TEST_F(DryRuns, TheMarkOfARemovalIsThatOfTheMap) {
   propose(62);
   propose(64);
   DryRun run(drive_.map(), drive_.map().state());
-  EXPECT_EQ(run.removal(closure(62).id), removal_mark(drive_.map(), closure(62).id));
-  EXPECT_EQ(run.removal({{kDriveSession, 62}, 99}), 0U) << "there is no such edge";
+  const EdgeId id = closure(62).id;
+  EXPECT_EQ(run.removal(edit_record(id, EdgeAction::kRemove)), removal_mark(drive_.map(), id));
+  EXPECT_EQ(run.removal(edit_record(id, EdgeAction::kRemoveAlone)), 0U) << "it takes out nothing else";
+  EXPECT_EQ(run.removal(edit_record({{kDriveSession, 62}, 99}, EdgeAction::kRemove)), 0U) << "there is no such edge";
 }
 
 TEST_F(DryRuns, WhatProceedRefusesIsThrown) {

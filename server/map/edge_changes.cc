@@ -12,6 +12,11 @@ std::optional<EdgeStanding> standing(const storage::Edge* edge) {
   return edge ? std::optional<EdgeStanding>(*edge) : std::nullopt;
 }
 
+const std::vector<EdgeId>& carriers_of(const std::optional<EdgeStanding>& edge) {
+  static const std::vector<EdgeId> kNone;
+  return edge ? edge->carried_by : kNone;
+}
+
 void add_changes(const storage::FrameHot& before, const storage::FrameHot& after,
                  std::map<EdgeId, EdgeChange>& changes) {
   const auto compare = [&](EdgeId id) {
@@ -66,6 +71,26 @@ std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vecto
   std::erase_if(first, [](const EdgeChange& change) { return change.before == change.after; });
   std::sort(first.begin(), first.end(), [](const EdgeChange& x, const EdgeChange& y) { return x.id < y.id; });
   return first;
+}
+
+std::vector<EdgeId> also_changed(const std::vector<EdgeChange>& changes, EdgeId edited) {
+  std::vector<EdgeId> others;
+  for (const EdgeChange& change : changes)
+    if (change.kind == storage::EdgeKind::kLoop && change.id != edited && change.before && change.after &&
+        change.before->state != change.after->state)
+      others.push_back(change.id);
+  return others;
+}
+
+CarryingChanges carrying_changes(const std::vector<EdgeChange>& changes) {
+  CarryingChanges stretches;
+  for (const EdgeChange& change : changes) {
+    if (change.kind == storage::EdgeKind::kLoop) continue;
+    const std::vector<EdgeId>&before = carriers_of(change.before), &after = carriers_of(change.after);
+    if (before.empty()) stretches.carried.add(change.a, change.b, after);
+    if (after.empty()) stretches.not_carried.add(change.a, change.b, before);
+  }
+  return stretches;
 }
 
 }  // namespace relmap::map

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/route/stretches.h"
 #include "storage/graph/editable_graph.h"
 #include "storage/graph/forwarding_graph.h"
 
@@ -38,6 +39,17 @@ struct EdgeChange {
 
 // The combined changes of two successive edits, ascending by id: from before the first to after the second.
 std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vector<EdgeChange>& second);
+
+// The closures that an edit of `edited` brings into another state without naming them, in the order of `changes`.
+// Closures that come or go are not among them.
+std::vector<EdgeId> also_changed(const std::vector<EdgeChange>& changes, EdgeId edited);
+
+// Where robots count as carried after an edit and did not before, and the reverse. An edge of which only the closures
+// that show it differ is in neither.
+struct CarryingChanges {
+  route::CarriedStretches carried, not_carried;
+};
+CarryingChanges carrying_changes(const std::vector<EdgeChange>& changes);
 
 // Passes every edit on to another graph and records the edges before it.
 class EdgeRecorder final : public storage::ForwardingGraph<storage::EditableGraph> {

@@ -299,6 +299,15 @@ Result<EdgeAction> action_of(const storage::SetEdgeStateRecord& record) {
           "a loop closure can only be removed, restored, put into force, or left to the vote again"};
 }
 
+bool removes_all(const storage::SetEdgeStateRecord& record) {
+  return record.state == storage::EdgeState::kRemoved && !record.alone;
+}
+
+Status check_edge_record(const storage::SetEdgeStateRecord& record) {
+  if (record.shown == 0 || removes_all(record)) return {};
+  return {Reason::INVALID_ARGUMENT, "shown is only allowed in the removal of a closure and all that agree with it"};
+}
+
 std::uint64_t removal_mark(const storage::Graph& graph, EdgeId closure) {
   std::vector<EdgeId> going;
   for (const StateChange& change : removal(graph, closure)) going.push_back(change.id);

@@ -13,6 +13,12 @@ storage::SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::
 // The action that a record describes. UNSUPPORTED if it describes none.
 Result<EdgeAction> action_of(const storage::SetEdgeStateRecord& record);
 
+// Whether the record removes a closure and all that agree with it. True also of one that describes no action because it
+// is decided, too: check_edge_edit() refuses that.
+bool removes_all(const storage::SetEdgeStateRecord& record);
+// What needs no map: INVALID_ARGUMENT if the record has a `shown` and is not removes_all().
+Status check_edge_record(const storage::SetEdgeStateRecord& record);
+
 // Identifies the set of closures that a removal of `closure` would take out: their number times 2^32 plus the CRC-32C
 // of their ids. Never 0. The closure must exist.
 std::uint64_t removal_mark(const storage::Graph& graph, EdgeId closure);

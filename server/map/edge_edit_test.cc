@@ -143,6 +143,23 @@ TEST_F(EdgeEdit, ARemovalIsRefusedIfItWouldRemoveOtherClosuresThanShown) {
   EXPECT_EQ(state(66), storage::EdgeState::kRemoved);
 }
 
+TEST(EdgeRecord, OnlyARemovalOfAllThatAgreeIsBoundToWhatWasShown) {
+  for (const EdgeAction action : {EdgeAction::kRemove, EdgeAction::kRemoveAlone, EdgeAction::kRestore,
+                                  EdgeAction::kAccept, EdgeAction::kWithdraw}) {
+    storage::SetEdgeStateRecord record = edit_record({{1, 62}, 1}, action);
+    EXPECT_TRUE(check_edge_record(record).ok()) << static_cast<int>(action);
+    EXPECT_EQ(removes_all(record), action == EdgeAction::kRemove) << static_cast<int>(action);
+    record.shown = 1;
+    EXPECT_EQ(check_edge_record(record).reason(), action == EdgeAction::kRemove ? Reason::OK : Reason::INVALID_ARGUMENT)
+        << static_cast<int>(action);
+  }
+  storage::SetEdgeStateRecord decided = edit_record({{1, 62}, 1}, EdgeAction::kRemove);
+  decided.decided = true;
+  decided.shown = 1;
+  EXPECT_TRUE(check_edge_record(decided).ok()) << "what is wrong with it is that it describes no action";
+  EXPECT_EQ(action_of(decided).reason(), Reason::UNSUPPORTED);
+}
+
 TEST_F(EdgeEdit, AClosureRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {
   for (const std::uint32_t query : {62, 64, 66, 68}) propose(query);
   const auto before = standings();

@@ -51,4 +51,10 @@ std::optional<std::vector<EdgeChange>> changes_of_proposal(const Mapper& mapper,
   return combined(*std::move(changes), mapper.edge_changes(sequence).value_or(std::vector<EdgeChange>()));
 }
 
+Result<std::optional<std::vector<EdgeChange>>> changes_of_edit(const Mapper& mapper, std::uint64_t sequence) {
+  auto changes = mapper.edge_changes(sequence);
+  if (changes && changes->empty()) return overtaken();
+  return changes;
+}
+
 }  // namespace relmap::map

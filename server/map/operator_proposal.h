@@ -1,4 +1,5 @@
-// Puts a closure between two frames that an operator names into the running map, and finds it there again.
+// Puts a closure between two frames that an operator names into the running map, and finds it there again. Tells what
+// that, or an edit of a closure, has changed.
 #pragma once
 
 #include <chrono>
@@ -34,5 +35,9 @@ std::optional<storage::Edge> closure_of_record(const storage::Graph& graph, Fram
 // is another. nullopt if the mapper does not remember them any more.
 std::optional<std::vector<EdgeChange>> changes_of_proposal(const Mapper& mapper, const storage::Edge& closure,
                                                            std::uint64_t sequence);
+
+// The changes of edges by the edit of a closure with this sequence, which must be applied; nullopt if the mapper does
+// not remember them any more. overtaken() if it changed nothing.
+Result<std::optional<std::vector<EdgeChange>>> changes_of_edit(const Mapper& mapper, std::uint64_t sequence);
 
 }  // namespace relmap::map

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/map/edge_edit.h"
 #include "server/map/testing/points_drive.h"
 #include "server/place/testing/random_vocabulary.h"
 #include "storage/engine/memory_engine.h"
@@ -92,6 +93,22 @@ TEST_F(OperatorProposals, AnAcceptanceFollowsTheProposalAndBothAreOneChange) {
   ASSERT_EQ(changes->size(), 1u);
   EXPECT_FALSE(changes->front().before);
   EXPECT_EQ(changes->front().after->state, storage::EdgeState::kAccepted);
+}
+
+TEST_F(OperatorProposals, AnEditThatChangedNothingWasOvertaken) {
+  const std::uint64_t proposed = write({kLate, kEarly, false, ""});
+  const EdgeId id = closure_of_record(*mapper_->view(), kEarly, kLate, proposed)->id;
+  const auto take_out = [&] {
+    const std::uint64_t sequence = mapper_->submit_and_wait(edit_record(id, EdgeAction::kRemove)).or_throw();
+    EXPECT_TRUE(mapper_->wait_applied(sequence, soon()).ok());
+    return changes_of_edit(*mapper_, sequence);
+  };
+  const auto first = take_out().or_throw();
+  ASSERT_TRUE(first.has_value());
+  ASSERT_EQ(first->size(), 1u);
+  EXPECT_EQ(first->front().id, id);
+  EXPECT_EQ(take_out().status().to_string(), overtaken().to_string()) << "it was removed already";
+  EXPECT_FALSE(changes_of_edit(*mapper_, durable() + 1).or_throw().has_value()) << "of no record that is remembered";
 }
 
 TEST_F(OperatorProposals, FramesOfDifferentPlacesAreRefusedAndNothingIsWritten) {

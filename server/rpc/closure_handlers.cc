@@ -5,7 +5,6 @@
 #include "server/map/operator_proposal.h"
 #include "server/map/propose.h"
 #include "server/rpc/charge.h"
-#include "server/rpc/edge_effect.h"
 #include "server/rpc/edit_log.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
@@ -16,10 +15,7 @@ namespace {
 
 void add_effect(EdgeId edited, const std::vector<map::EdgeChange>& changes, v1::SetEdgeStateReply& reply) {
   *reply.mutable_effect() = effect_message(changes);
-  for (const map::EdgeChange& change : changes)
-    if (change.kind == storage::EdgeKind::kLoop && change.id != edited && change.before && change.after &&
-        change.before->state != change.after->state)
-      *reply.add_also_changed() = to_wire(change.id);
+  for (const EdgeId other : map::also_changed(changes, edited)) *reply.add_also_changed() = to_wire(other);
 }
 
 Result<v1::ProposeEdgeReply> propose_dry(map::Mapper& mapper, const RpcLimits& limits, FrameId a, FrameId b,
@@ -55,16 +51,14 @@ Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& requ
   record.decided = request.decided();
   record.alone = request.alone();
   record.shown = request.shown();
-  const bool removes_all = *state == storage::EdgeState::kRemoved && !record.alone;
-  if (record.shown != 0 && !removes_all)
-    return {Reason::INVALID_ARGUMENT, "shown is only allowed in the removal of a closure and all that agree with it"};
+  if (Status valid = map::check_edge_record(record); !valid.ok()) return valid;
 
   v1::SetEdgeStateReply reply;
   if (request.dry_run()) {
     const auto view = mapper.view();
     SearchWork work(mapper.budget(), limits.max_search_frames, deadline);
     map::DryRun run(*view, view->state(), work.limit().proceed);
-    if (removes_all) reply.set_shown(run.removal(*id));
+    reply.set_shown(run.removal(record));
     if (Status status = run.edit(record); !status.ok()) return status;
     *reply.mutable_edge() = edge_message(run.edge(*id));
     add_effect(*id, run.changes(), reply);
@@ -84,10 +78,9 @@ Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& requ
   const auto view = mapper.view();
   const auto edge = storage::find_edge(*view, *id);
   if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + id->to_string()};
-  if (const auto changes = mapper.edge_changes(sequence)) {
-    if (changes->empty()) return map::overtaken();
-    add_effect(*id, *changes, reply);
-  }
+  const auto changes = map::changes_of_edit(mapper, sequence);
+  if (!changes.ok()) return changes.status();
+  if (*changes) add_effect(*id, **changes, reply);
   *reply.mutable_edge() = edge_message(*edge);
   reply.set_journal_sequence(sequence);
   reply.set_map_version(view->version());

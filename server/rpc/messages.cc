@@ -144,6 +144,42 @@ v1::CarriedStretch carried_message(const route::CarriedStretch& stretch) {
 
 namespace {
 
+v1::ClosureChange closure_change_message(const map::EdgeChange& change) {
+  v1::ClosureChange message;
+  *message.mutable_id() = to_wire(change.id);
+  *message.mutable_a() = to_wire(change.a);
+  *message.mutable_b() = to_wire(change.b);
+  if (change.before) {
+    message.set_before(to_wire(change.before->state));
+    message.set_reason_before(to_wire(change.before->reason));
+    message.set_edge_before(change.before->in_graph);
+  }
+  if (change.after) {
+    message.set_after(to_wire(change.after->state));
+    message.set_reason_after(to_wire(change.after->reason));
+    message.set_edge_after(change.after->in_graph);
+  }
+  message.set_bound(change.bound);
+  message.set_bound_frames(change.bound_frames);
+  return message;
+}
+
+}  // namespace
+
+v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes) {
+  v1::EditEffect message;
+  for (const map::EdgeChange& change : changes)
+    if (change.kind == storage::EdgeKind::kLoop) *message.add_closures() = closure_change_message(change);
+  const map::CarryingChanges stretches = map::carrying_changes(changes);
+  for (const route::CarriedStretch& stretch : stretches.carried.list())
+    *message.add_carried() = carried_message(stretch);
+  for (const route::CarriedStretch& stretch : stretches.not_carried.list())
+    *message.add_not_carried() = carried_message(stretch);
+  return message;
+}
+
+namespace {
+
 void add_landmarks(FrameId id, const storage::FrameHot& hot, v1::Frame& message) {
   for (std::size_t slot = 0; slot < hot.landmarks.size(); ++slot) {
     const storage::Landmark& landmark = hot.landmarks[slot];

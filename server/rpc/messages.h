@@ -1,10 +1,13 @@
-// Converts values of the map and of its paths to relmap.v1 messages. Internal to server/rpc, since it exposes generated
-// code.
+// Converts values of the map, of its paths and of its edits to relmap.v1 messages. Internal to server/rpc, since it
+// exposes generated code.
 #pragma once
+
+#include <vector>
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
+#include "server/map/edge_changes.h"
 #include "server/route/stretches.h"
 #include "storage/graph/graph.h"
 
@@ -13,6 +16,7 @@ namespace relmap::rpc {
 v1::Edge edge_message(const storage::Edge& edge);
 v1::Session session_message(const storage::Session& session);
 v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
+v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);
 
 // The functions of proto/wire/convert.h, which those below would hide.
 using relmap::from_wire;
