@@ -36,8 +36,11 @@ TEST(SimulatedStreet, DrivenMoreThanOnceRoundBecomesAMapThatAnswers) {
       published_figure("README.md", "error of revisiting positions, closures off and on \\| [0-9.]+ cm, ([0-9.]+) mm");
   EXPECT_LE(1e3 * judged.revisit_error_m, 1.5 * published_mm);
   std::printf("%u revisits, %u bound, %.3f m off\n", judged.revisits, judged.revisits_bound, judged.revisit_error_m);
-  // Of segments this short 0.13 % (odometry) and 0.21 % (map); docs/frontend.md has 0.07 % of 30 and 50 m.
-  expect_drift_below(drive, 0.0032, {8}, 20);
+  const auto published_percent = published(
+      "docs/frontend.md", "over segments of 8 m its odometry drifts by ([0-9.]+) %, and the map by ([0-9.]+) %");
+  expect_drift_below(
+      drive, {.odometry = kFactor * published_percent.at(0) / 100, .map = kFactor * published_percent.at(1) / 100}, {8},
+      20);
 }
 
 }  // namespace

@@ -16,14 +16,14 @@ void expect_every_pair_processed(const StreamedDrive& drive, double pairs) {
   EXPECT_EQ(drive.session().refused, 0u);
 }
 
-void expect_drift_below(const StreamedDrive& drive, double limit, const std::vector<double>& lengths,
+void expect_drift_below(const StreamedDrive& drive, const DriftLimits& limits, const std::vector<double>& lengths,
                         std::size_t segments) {
   for (const double length : lengths) {
     const tracking::Drift odometry = tracking::measure_drift(drive.odometry_chain(), length);
     const tracking::Drift map = tracking::measure_drift(drive.map_chain(), length);
     EXPECT_GE(map.segments, segments);
-    EXPECT_LE(odometry.translation, limit) << "odometry over " << length << " m";
-    EXPECT_LE(map.translation, limit) << "map over " << length << " m";
+    EXPECT_LE(odometry.translation, limits.odometry) << "odometry over " << length << " m";
+    EXPECT_LE(map.translation, limits.map) << "map over " << length << " m";
     std::printf("drift over %.0f m: odometry %.2f %%, map %.2f %% (%zu segments)\n", length, 100 * odometry.translation,
                 100 * map.translation, map.segments);
   }

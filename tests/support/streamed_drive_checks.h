@@ -8,8 +8,12 @@
 namespace relmap::testing {
 
 void expect_every_pair_processed(const StreamedDrive& drive, double pairs);
+// As shares of the way.
+struct DriftLimits {
+  double odometry, map;
+};
 // Checks the drift of the front-end's odometry and of the map's chain. The daemon must have stopped.
-void expect_drift_below(const StreamedDrive& drive, double limit, const std::vector<double>& lengths,
+void expect_drift_below(const StreamedDrive& drive, const DriftLimits& limits, const std::vector<double>& lengths,
                         std::size_t segments);
 // The pairs are localised within `metres` of the truth.
 void expect_localised(StreamedDrive& drive, const std::vector<std::size_t>& pairs, double metres);
