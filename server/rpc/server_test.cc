@@ -25,8 +25,8 @@ v1::Error error_of(const grpc::Status& status) {
   return error;
 }
 
-// Long, so that even a busy machine ends well before it where nothing is waited for.
-constexpr std::chrono::minutes kStopPatience{10};
+// No test lives to see its end: where stop() waited for its deadline, it would not return.
+constexpr std::chrono::hours kStopPatience{24 * 365};
 
 class Server : public testing::Test {
  protected:
@@ -263,23 +263,21 @@ TEST_F(Server, StoppingRefusesNewCallsAndEndsRunningOnes) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     server_->stop(kStopPatience);
   });
-  const auto begun = std::chrono::steady_clock::now();
   v1::GetFrameReply reply;
   grpc::Status status;
   while ((status = get_frame({1, 1}, &reply)).ok()) {
   }
   // The call is refused by us or, a moment later, by gRPC itself.
   EXPECT_THAT(status.error_code(), testing::AnyOf(grpc::StatusCode::UNAVAILABLE, grpc::StatusCode::CANCELLED));
-  stopper.join();
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, kStopPatience) << "it waited for its deadline";
+  stopper.join();  // stop() has not waited for its deadline
 }
 
 TEST_F(Server, StoppingDoesNotWaitForIdleConnections) {
   v1::GetFrameReply reply;
-  ASSERT_TRUE(get_frame({1, 1}, &reply).ok());  // and the connection stays
-  const auto begun = std::chrono::steady_clock::now();
-  server_->stop(kStopPatience);
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, kStopPatience) << "it waited for its deadline";
+  ASSERT_TRUE(get_frame({1, 1}, &reply).ok());
+  ASSERT_EQ(channel_->GetState(false), GRPC_CHANNEL_READY) << "the connection stays";
+  server_->stop(kStopPatience);  // returns, although its deadline is far away
+  EXPECT_FALSE(get_frame({1, 1}, &reply).ok()) << "it has not stopped";
 }
 
 TEST(Roles, EveryMethodHasOne) {
