@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <unordered_map>
 
 #include "proto/geometry/covariance.h"
+#include "server/place/descriptor_sketch.h"
 
 namespace relmap::place {
 namespace {
@@ -17,12 +19,43 @@ bool one_point(const MapPoint& p, const MapPoint& q) {
   return mahalanobis_squared(apart, covariance) < 16;
 }
 
-std::uint32_t nearest(const std::uint32_t* distances, std::size_t count, std::size_t step) {
-  std::uint32_t best = 0;
-  for (std::uint32_t i = 1; i < count; ++i)
-    if (distances[i * step] < distances[best * step]) best = i;
-  return best;
-}
+// The points that are expected near a feature.
+class PossiblePoints {
+ public:
+  explicit PossiblePoints(const ExpectedPoints& expected) : expected_(expected) {
+    for (std::uint32_t p = 0; p < expected.at.size(); ++p)
+      if (expected.at[p].allFinite()) order_.push_back(p);
+    std::sort(order_.begin(), order_.end(), [&](std::uint32_t p, std::uint32_t q) { return y(p) < y(q); });
+  }
+
+  // In ascending order; valid until the next call.
+  std::span<const std::uint32_t> of(const AppearanceFeature& feature) {
+    near_.clear();
+    const Vector2 seen(feature.u, feature.v);
+    auto p = std::partition_point(order_.begin(), order_.end(),
+                                  [&](std::uint32_t q) { return y(q) < seen.y() - expected_.radius; });
+    for (; p != order_.end() && y(*p) <= seen.y() + expected_.radius; ++p)
+      if ((seen - expected_.at[*p]).squaredNorm() < expected_.radius * expected_.radius) near_.push_back(*p);
+    std::sort(near_.begin(), near_.end());
+    return near_;
+  }
+
+ private:
+  double y(std::uint32_t point) const { return expected_.at[point].y(); }
+
+  const ExpectedPoints& expected_;
+  std::vector<std::uint32_t> order_;  // ascending by where they are expected
+  std::vector<std::uint32_t> near_;
+};
+
+struct Nearest {
+  std::uint32_t index = 0, distance = std::numeric_limits<std::uint32_t>::max();
+
+  // Of equally near ones the first that was offered is kept.
+  void offer(std::uint32_t other, std::uint32_t its_distance) {
+    if (its_distance < distance) *this = {other, its_distance};
+  }
+};
 
 // Keeps the best match of each landmark, since two features may have matched two views of it.
 std::vector<DescriptorMatch> nearest_of_each_landmark(const std::vector<DescriptorMatch>& matches,
@@ -45,37 +78,53 @@ std::vector<DescriptorMatch> nearest_of_each_landmark(const std::vector<Descript
 std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature> features,
                                                std::span<const Descriptor* const> points,
                                                const std::function<bool(std::uint32_t, std::uint32_t)>& same,
-                                               const PossiblePairs& possible) {
-  if (features.empty() || points.empty()) return {};
-  constexpr std::uint32_t kImpossible = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> distances(features.size() * points.size(), kImpossible);
+                                               const ExpectedPoints* expected) {
+  const DescriptorSketches of_points(points);
+  std::vector<DescriptorSketch> of_features;
+  for (const AppearanceFeature& feature : features) of_features.push_back(sketch(feature.descriptor));
+  std::optional<PossiblePoints> possible;
+  if (expected) possible.emplace(*expected);
+  // Calls visit(p, squared distance) for each possible point within `max` of feature f, in ascending order.
+  std::vector<std::uint32_t> near;
+  const auto points_within = [&](std::uint32_t max, std::uint32_t f, const auto& visit) {
+    near.clear();
+    if (possible) {
+      for (const std::uint32_t p : possible->of(features[f]))
+        if (!of_points.rules_out(of_features[f], max, p)) near.push_back(p);
+    } else {
+      of_points.find_near(of_features[f], max, near);
+    }
+    for (const std::uint32_t p : near)
+      if (const std::uint32_t d = squared_distance(features[f].descriptor, *points[p]); d <= max) visit(p, d);
+  };
+
+  std::vector<Nearest> point_of(features.size()), feature_of(points.size());
   for (std::uint32_t f = 0; f < features.size(); ++f)
-    for (std::uint32_t p = 0; p < points.size(); ++p)
-      if (!possible || possible(f, p))
-        distances[f * points.size() + p] = squared_distance(features[f].descriptor, *points[p]);
+    points_within(kMaxDescriptorDistance, f, [&](std::uint32_t p, std::uint32_t distance) {
+      point_of[f].offer(p, distance);
+      feature_of[p].offer(f, distance);
+    });
 
   std::vector<DescriptorMatch> matches;
   for (std::uint32_t f = 0; f < features.size(); ++f) {
-    const std::uint32_t* row = &distances[f * points.size()];
-    const std::uint32_t p = nearest(row, points.size(), 1);
-    if (row[p] > kMaxDescriptorDistance) continue;
-    if (nearest(&distances[p], features.size(), points.size()) != f) continue;
-    const double rival = row[p] / (kDescriptorRatio * kDescriptorRatio);
+    const auto [p, distance] = point_of[f];
+    if (distance > kMaxDescriptorDistance || feature_of[p].index != f) continue;
+    const auto rival = static_cast<std::uint32_t>(distance / (kDescriptorRatio * kDescriptorRatio));
     bool clear = true;
-    for (std::uint32_t other = 0; clear && other < points.size(); ++other)
-      clear = row[other] > rival || other == p || same(p, other);
-    if (clear) matches.push_back({f, p, row[p]});
+    points_within(rival, f,
+                  [&](std::uint32_t other, std::uint32_t) { clear = clear && (other == p || same(p, other)); });
+    if (clear) matches.push_back({f, p, distance});
   }
   return matches;
 }
 
 std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
-                                          const PossiblePairs& possible) {
+                                          const ExpectedPoints* expected) {
   std::vector<const Descriptor*> descriptors;
   for (const MapPoint& point : points) descriptors.push_back(point.descriptor);
   const auto matches = match_descriptors(
       features, descriptors, [&](std::uint32_t p, std::uint32_t q) { return one_point(points[p], points[q]); },
-      possible);
+      expected);
   return nearest_of_each_landmark(matches, points);
 }
 

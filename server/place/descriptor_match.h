@@ -26,18 +26,24 @@ inline constexpr std::uint32_t kMaxDescriptorDistance = 270 * 270;  // squared; 
 // picture's width.
 inline constexpr double kNearRadius = 0.02;
 
+// Where a model of the pictures, such as a pose, expects the points: a feature may be a point if it is less than
+// `radius` from there (pixels).
+struct ExpectedPoints {
+  std::vector<Vector2> at;  // by point
+  double radius = 0;
+};
+
 // Returns mutual nearest neighbours that pass the ratio test, ascending by feature. `same(p, q)` says that points p and
-// q are one point of the world, so that they do not compete in the ratio test. `possible(f, p)` says that feature f may
-// be point p; if empty, every pair is possible.
-using PossiblePairs = std::function<bool(std::uint32_t, std::uint32_t)>;
+// q are one point of the world, so that they do not compete in the ratio test. If `expected` is null, every feature may
+// be every point.
 std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature> features,
                                                std::span<const Descriptor* const> points,
                                                const std::function<bool(std::uint32_t, std::uint32_t)>& same,
-                                               const PossiblePairs& possible = {});
+                                               const ExpectedPoints* expected = nullptr);
 
 // The same for map points. A point of the world is in the map once for each frame that saw it, so points that share a
 // landmark, or that coincide within their covariances, count as one. A landmark is matched at most once.
 std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
-                                          const PossiblePairs& possible = {});
+                                          const ExpectedPoints* expected = nullptr);
 
 }  // namespace relmap::place

@@ -48,9 +48,9 @@ class Views {
     for (const AppearanceFeature& feature : map) descriptors_.push_back(&feature.descriptor);
   }
 
-  std::vector<DescriptorMatch> match(const PossiblePairs& possible = {}) const {
+  std::vector<DescriptorMatch> match(const ExpectedPoints* expected = nullptr) const {
     return match_descriptors(
-        query_, descriptors_, [](std::uint32_t, std::uint32_t) { return false; }, possible);
+        query_, descriptors_, [](std::uint32_t, std::uint32_t) { return false; }, expected);
   }
 
   Geometry geometry_of(const std::vector<DescriptorMatch>& matches) const {
@@ -75,7 +75,6 @@ class Views {
   std::vector<DescriptorMatch> match_near(const std::vector<DescriptorMatch>& inliers) const {
     const auto [left_most, right_most] =
         std::minmax_element(query_.begin(), query_.end(), [](const auto& l, const auto& r) { return l.u < r.u; });
-    const double radius = kSearchRadius * (right_most->u - left_most->u);
     const auto from = [&](const DescriptorMatch& match) { return at(map_[match.point]); };
     Eigen::MatrixXd A(inliers.size(), 3), B(inliers.size(), 2);  // a rough affine map, and below its residuals
     for (std::size_t i = 0; i < inliers.size(); ++i) {
@@ -83,7 +82,7 @@ class Views {
       B.row(static_cast<Eigen::Index>(i)) = at(query_[inliers[i].feature]).transpose();
     }
     const Eigen::MatrixXd affine = A.colPivHouseholderQr().solve(B), left = B - A * affine;
-    std::vector<Vector2> expected;
+    ExpectedPoints expected{{}, kSearchRadius * (right_most->u - left_most->u)};
     std::vector<std::pair<double, Eigen::Index>> nearest(inliers.size());
     const std::size_t around = std::min<std::size_t>(kAround, inliers.size());
     for (const AppearanceFeature& feature : map_) {
@@ -97,11 +96,9 @@ class Views {
         mean += weight * left.row(nearest[i].second).transpose();
         weights += weight;
       }
-      expected.push_back((at(feature).homogeneous().transpose() * affine).transpose() + mean / weights);
+      expected.at.push_back((at(feature).homogeneous().transpose() * affine).transpose() + mean / weights);
     }
-    return match([&](std::uint32_t f, std::uint32_t p) {
-      return (at(query_[f]) - expected[p]).squaredNorm() < radius * radius;
-    });
+    return match(&expected);
   }
 
  private:

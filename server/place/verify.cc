@@ -165,16 +165,12 @@ std::vector<vision::Correspondence> correspond(const QueryPicture& query, const 
 // alike.
 std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query) {
   const SE3 T_query_match = T_match_query.inverse();
-  std::vector<Vector2> expected;
+  ExpectedPoints expected{{}, kNearRadius * query.camera.width};
   for (const MapPoint& point : map.points) {
     const Vector3 p = T_query_match * point.point;
-    expected.push_back(p.z() > 0 ? query.camera.project(p).head<2>() : Vector2(Vector2::Constant(kOutOfSight)));
+    expected.at.push_back(p.z() > 0 ? query.camera.project(p).head<2>() : Vector2(Vector2::Constant(kOutOfSight)));
   }
-  const double radius = kNearRadius * query.camera.width;
-  return match_points(query.features, map.points, [&](std::uint32_t f, std::uint32_t p) {
-    const Vector2 seen(query.features[f].u, query.features[f].v);
-    return (seen - expected[p]).squaredNorm() < radius * radius;
-  });
+  return match_points(query.features, map.points, &expected);
 }
 
 // Estimates the pose of the query, and its lens if that is not known.
