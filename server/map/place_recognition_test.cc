@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <future>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,7 +17,6 @@
 namespace relmap::map {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 // A map of a session of six frames with features, none of which is a place yet.
@@ -122,30 +119,6 @@ TEST_F(PlaceRecognitionTest, ALookupMakesItsFrameAPlaceUnlessTheSessionIsBeingDe
   map_->publish();
   (void)recognition_.look_up(*map_->view(), frame(1));
   EXPECT_FALSE(recognition_.places().contains(frame(1)));
-}
-
-TEST_F(PlaceRecognitionTest, OpenFramesAndThoseOfTheJournalAreLookedUpByTheThread) {
-  find_open_lookups({frame(1), frame(2)}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, false,
-                    lookups_);
-  std::vector<FrameId> looked_up;
-  std::promise<void> third;
-  lookups_.start(
-      [&](FrameId id) {
-        looked_up.push_back(id);
-        if (looked_up.size() == 3) third.set_value();
-        return std::vector<storage::JournalRecord>{};
-      },
-      [](const storage::JournalRecord&) { return true; }, [] {});
-  EXPECT_EQ(third.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
-  lookups_.stop();
-  EXPECT_THAT(looked_up, ElementsAre(frame(1), frame(2), frame(3))) << "each once";
-}
-
-TEST_F(PlaceRecognitionTest, InDeterministicModeOnlyTheLastFrameOfTheJournalMayLackItsLookup) {
-  find_open_lookups({}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, true, lookups_);
-  EXPECT_THAT(lookups_.open_frames(), IsEmpty());
-  find_open_lookups({frame(1)}, {.frames = {frame(2), frame(3)}, .looked_up = false, .trouble = {}}, true, lookups_);
-  EXPECT_THAT(lookups_.open_frames(), ElementsAre(frame(1), frame(3)));
 }
 
 }  // namespace

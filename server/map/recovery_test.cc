@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -50,6 +52,8 @@ class AlteredJournal final : public storage::ForwardingEngine {
   std::uint64_t cut_off_ = 0, unreadable_ = 0;  // sequences; 0: none
 };
 
+FrameId frame(std::uint32_t i) { return {kDriveSession, i}; }
+
 // A journal of a session with six keyframes, of which nothing was committed.
 class RecoveryTest : public ::testing::Test {
  protected:
@@ -62,7 +66,6 @@ class RecoveryTest : public ::testing::Test {
     engine_->append(epoch_, std::span(&bytes, 1)).or_throw();
   }
   std::uint64_t last() const { return engine_->last_journal_sequence(); }
-  static FrameId frame(std::uint32_t i) { return {kDriveSession, i}; }
 
   // Opens the map as it was committed and re-applies the journal. Words of a keyframe are computed by words_.
   Replayed replay_all(std::uint64_t from = 1) {
@@ -173,6 +176,32 @@ TEST_F(RecoveryTest, AnOwnerWhoseEpochHasExpiredReplaysButCannotCommit) {
   const auto of_newer_owner = storage::Map::open(engine_, newer, budget_).or_throw();
   MapBuilder builder(*of_newer_owner, {}, rba::RbaOptions{});
   EXPECT_EQ(replay(*engine_, of_newer_owner->state().applied_sequence + 1, builder).frames.size(), 6u);
+}
+
+TEST(OpenLookups, OpenFramesAndThoseOfTheJournalAreLookedUpByTheThread) {
+  LookupQueue lookups(std::make_shared<storage::Budget>(std::size_t{1} << 20));
+  find_open_lookups({frame(1), frame(2)}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, false,
+                    lookups);
+  std::vector<FrameId> looked_up;
+  std::promise<void> third;
+  lookups.start(
+      [&](FrameId id) {
+        looked_up.push_back(id);
+        if (looked_up.size() == 3) third.set_value();
+        return std::vector<storage::JournalRecord>{};
+      },
+      [](const storage::JournalRecord&) { return true; }, [] {});
+  EXPECT_EQ(third.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  lookups.stop();
+  EXPECT_THAT(looked_up, ElementsAre(frame(1), frame(2), frame(3))) << "each once";
+}
+
+TEST(OpenLookups, InDeterministicModeOnlyTheLastFrameOfTheJournalMayLackItsLookup) {
+  LookupQueue lookups(std::make_shared<storage::Budget>(std::size_t{1} << 20));
+  find_open_lookups({}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, true, lookups);
+  EXPECT_THAT(lookups.open_frames(), IsEmpty());
+  find_open_lookups({frame(1)}, {.frames = {frame(2), frame(3)}, .looked_up = false, .trouble = {}}, true, lookups);
+  EXPECT_THAT(lookups.open_frames(), ElementsAre(frame(1), frame(3)));
 }
 
 }  // namespace
