@@ -51,7 +51,7 @@ class Iidc1394Test : public IidcFixture {
     options.usb_too = true;
     return iidc::open_dc1394_bus(options).or_throw();
   }
-  std::unique_ptr<iidc::LiveCamera> open_live(iidc::LiveOptions options = {}) {
+  std::unique_ptr<iidc::LiveCamera> open_live(const iidc::LiveOptions& options = patient()) {
     auto live = iidc::LiveCamera::open({bus()}, options, stop_);
     EXPECT_TRUE(live.ok()) << live.status().to_string();
     return live.ok() ? std::move(*live) : nullptr;
@@ -234,7 +234,7 @@ TEST_F(Iidc1394Test, ACrashCostsOneCamera) {
   plug(other);
   const auto there = bus();
   ASSERT_EQ(2u, there->cameras().or_throw().size());
-  iidc::LiveOptions first, second;
+  iidc::LiveOptions first = patient(), second = patient();
   first.serial = "12345678";
   second.serial = "87654321";
   auto one = iidc::LiveCamera::open({there}, first, stop_).or_throw();

@@ -168,6 +168,7 @@ int UsbPort::submit_control(UsbTransfer transfer, const std::uint8_t setup[8], c
   ++counters_.control_transfers;
   if (outcome == SimulatedCamera::Answer::kNone) {
     transfer.actual = 0;
+    ++counters_.unanswered;
     unanswered_.push_back(std::move(transfer));
   } else if (outcome == SimulatedCamera::Answer::kRefused) {
     transfer.actual = 0;

@@ -23,7 +23,8 @@ struct UsbCounters {
   std::uint64_t lost = 0;       // of these, no transfer was pending, or the endpoint was halted
   std::uint64_t cut = 0;        // of these, transfers ran out in the middle, or the camera was unplugged
   std::uint64_t bulk_transfers = 0, control_transfers = 0, discarded = 0;
-  std::size_t max_waiting = 0;  // bulk transfers at once
+  std::uint64_t unanswered = 0;  // control transfers to mute registers
+  std::size_t max_waiting = 0;   // bulk transfers at once
 };
 
 // Who opened the device.

@@ -255,8 +255,8 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
     ++counts_.frames;
     counts_.lost += missing;
   }
-  // Frames lost while the stream was restarted have been reported.
-  if (missing > std::exchange(told_, 0) && !fresh_)
+  // The report of a restart or a halt covers all frames that were lost until the stream went on.
+  if (missing > std::exchange(told_, 0) && !std::exchange(halted_, false) && !fresh_)
     gap = {Reason::CAPTURE_FAILED, std::to_string(missing) + " frames before frame " + std::to_string(frame.index) +
                                        (not_taken ? " were not taken in time" : " did not come")};
   fresh_ = false;
@@ -329,6 +329,7 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
     const bool silent = status.reason() == Reason::CAMERA_SILENT;
     if (!silent) {
       ++told_;
+      halted_ |= status.reason() == Reason::CAMERA_STALLED;
       if (!embeds_) {  // otherwise its counter shows the gap
         ++index_;
         const MutexLock lock(mutex_);

@@ -113,6 +113,7 @@ class LiveCamera {
   std::optional<std::uint32_t> last_counter_;
   std::uint64_t index_ = 0;
   std::uint64_t told_ = 0;         // frames lost since the last one that arrived, each reported as a fault of its own
+  bool halted_ = false;            // the stream was halted, and no frame has arrived since
   std::optional<LiveFrame> kept_;  // the frame after a gap that was just reported
   Reason obstacle_ = Reason::OK;   // what prevents opening the camera now
   bool obstacle_told_ = false;
