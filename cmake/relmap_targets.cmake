@@ -16,9 +16,6 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   if(NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)  # the same bug, told within system headers once they are precompiled
     target_compile_options(relmap_flags INTERFACE -Wno-stringop-overflow -Wno-array-bounds)
   endif()
-  if(CMAKE_BUILD_TYPE STREQUAL "Debug")  # false on GCC's own intrinsics for AVX-512 at -Og (GCC bug 105593)
-    target_compile_options(relmap_flags INTERFACE -Wno-uninitialized)
-  endif()
   target_compile_options(relmap_flags INTERFACE -fpch-preprocess)  # ccache needs it where headers are precompiled
 else()
   target_compile_options(relmap_flags INTERFACE -Wthread-safety)  # what a mutex guards (proto/base/mutex.h)
