@@ -17,12 +17,10 @@ struct ColourPicture {
 
 // Draws the left picture (small ones are enlarged) with
 // - the pair's index in the source, the left picture's file name, and its time in seconds;
-// - the landmarks that were found: discs for those that agree with the motion, from blue (young) to red (16 keyframes
-// and
-//   more), and small crosses for those that do not;
-// - the rotation since the pair before: an arrow that reaches the ring at 5 degrees, and a horizon that tilts ten times
-// as
-//   much as the camera.
+// - the landmarks that were found: discs for those that agree with the motion, from blue (young) to red (16
+//   keyframes and more), and small crosses for those that do not;
+// - the rotation since the pair before: an arrow that reaches the ring at 5 degrees, and a horizon that tilts ten
+//   times as much as the camera.
 // Below it are the pair's figures. A coloured frame marks a keyframe or a lost pair.
 ColourPicture draw_tracks(const tracking::TrackedPair& pair);
 

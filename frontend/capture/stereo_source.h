@@ -112,8 +112,8 @@ Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& folder, cons
 // - lists of times and file names: left.txt and right.txt, cam0.txt and cam1.txt, or rgb.txt (TUM; its depth is not
 //   read). Times are seconds, or stamps as below; pictures at most 1 ms apart are a pair;
 // - left/ and right/, image_0/ and image_1/, cam0/ and cam1/ (or their data/), or mav0/ with cam0/ and cam1/: pairs
-// have
-//   the same names, or both sides have the same number of pictures, which are paired in the order of their names;
+//   have the same names, or both sides have the same number of pictures, which are paired in the order of their
+//   names;
 // - the left one of these alone, or pictures directly in the folder.
 // Times of folders come from times.txt as above, otherwise from names that are time stamps (19 digits for nanoseconds,
 // 16 for microseconds, 13 for milliseconds, UTC), otherwise from the rate.

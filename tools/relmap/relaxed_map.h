@@ -4,13 +4,11 @@
 // Edges count in the relaxation as follows:
 //   - A measured edge counts with its covariance.
 //   - A guess of where a robot went while it could not see (dead reckoning, a gap) counts with its own large
-//   covariance,
-//     and only if no measured edges connect its ends.
+//     covariance, and only if no measured edges connect its ends.
 //   - A step of which nothing is known (the robot may have been carried) does not count. Frames that only such steps
 //     connect are in different parts, between which no transform is known.
-//   - A step along which closures say that the robot was carried counts next to nothing, whatever its odometry says:
-//   the
-//     closures place what follows it.
+//   - A step along which closures say that the robot was carried counts next to nothing, whatever its odometry
+//     says: the closures place what follows it.
 #pragma once
 
 #include <cstdint>
