@@ -393,6 +393,23 @@ TEST_F(IidcUsb, AHaltedStreamGoesOnSoon) {
   EXPECT_LE(lost, 6u);
 }
 
+// The report of a halt covers what was lost by it, and nothing later.
+TEST_F(IidcUsb, ALossAfterAHaltIsReported) {
+  const auto camera = plug();
+  const auto live = open(LiveOptions());
+  ASSERT_TRUE(live);
+  Watched seen;
+  watch(*live, seen, [&] { return seen.frames() >= 5; });
+  camera->fail([](CameraFaults& faults) { faults.stalls = 1; });
+  watch(*live, seen, [&] { return seen.gaps[Reason::CAMERA_STALLED] > 0; });
+  const std::uint64_t sent = testbed_.counters(camera).frames, losses = seen.gaps[Reason::CAPTURE_FAILED];
+  watch(*live, seen, [&] { return testbed_.counters(camera).frames >= sent + 5; });
+  EXPECT_TRUE(eventually([&] { return testbed_.counters(camera).frames >= sent + 60; }));
+  const std::uint64_t frames = seen.frames();
+  watch(*live, seen, [&] { return seen.frames() >= frames + 30; });
+  EXPECT_GT(seen.gaps[Reason::CAPTURE_FAILED], losses);
+}
+
 TEST_F(IidcUsb, FramesThatNobodyTakesAreGivenUpAndCounted) {
   const auto camera = plug();
   const auto live = open(LiveOptions());

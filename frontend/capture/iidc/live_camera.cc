@@ -256,7 +256,8 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
     counts_.lost += missing;
   }
   // The report of a restart or a halt covers all frames that were lost until the stream went on.
-  if (missing > std::exchange(told_, 0) && !std::exchange(halted_, false) && !fresh_)
+  const bool all_told = std::exchange(halted_, false) || fresh_;
+  if (missing > std::exchange(told_, 0) && !all_told)
     gap = {Reason::CAPTURE_FAILED, std::to_string(missing) + " frames before frame " + std::to_string(frame.index) +
                                        (not_taken ? " were not taken in time" : " did not come")};
   fresh_ = false;
