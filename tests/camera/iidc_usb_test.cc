@@ -456,21 +456,29 @@ TEST_F(IidcUsb, AnEyeThatIsDeadIsMissingFromPairsAndNamed) {
   EXPECT_EQ(without, 10);
 }
 
+// How many frames are lost meanwhile depends on when this process gets a processor, so that one of three runs has to
+// lose no more than come in two seconds.
 TEST_F(IidcUsb, AClockThatDoesNotAnswerHoldsNoFramesUpForLong) {
-  auto camera = plug();
   const std::uint64_t clock = iidc::kRegisterSpace + SimulatedCamera::kCommandRegisters + iidc::pgr::kCycleTime;
-  camera->fail([&](CameraFaults& faults) { faults.mute_registers.insert(clock); });
-  const auto start = std::chrono::steady_clock::now();
-  const auto live = open(LiveOptions());
-  ASSERT_TRUE(live);
-  Watched seen;
-  watch(*live, seen, [&] { return seen.frames() >= 150; });
-  // Each answer that does not come is waited for, and the pause before the next question doubles from two seconds on.
-  const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  EXPECT_GE(testbed_.counters(camera).unanswered, 1u);
-  EXPECT_LE(testbed_.counters(camera).unanswered, std::log2(passed_s + 2));
-  EXPECT_EQ(seen.torn, 0u);
-  EXPECT_EQ(seen.frames() + live->counts().lost, seen.numbers.back() + 1) << "each came, or is counted";
+  std::uint64_t lost = ~0ull;
+  for (int run = 0; run < 3 && lost > 2 * 48u; ++run) {
+    auto camera = plug();
+    camera->fail([&](CameraFaults& faults) { faults.mute_registers.insert(clock); });
+    const auto start = std::chrono::steady_clock::now();
+    const auto live = open(LiveOptions());
+    ASSERT_TRUE(live);
+    Watched seen;
+    watch(*live, seen, [&] { return seen.frames() >= 150; });
+    // Each answer that does not come is waited for, and the pause before the next question doubles from two seconds on.
+    const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    EXPECT_GE(testbed_.counters(camera).unanswered, 1u);
+    EXPECT_LE(testbed_.counters(camera).unanswered, std::log2(passed_s + 2));
+    EXPECT_EQ(seen.torn, 0u);
+    lost = live->counts().lost;
+    EXPECT_EQ(seen.frames() + lost, seen.numbers.back() + 1) << "each came, or is counted";
+    testbed_.unplug(camera);
+  }
+  EXPECT_LE(lost, 2 * 48u);
 }
 
 TEST_F(IidcUsb, ASecondProgramDoesNotDisturbTheFirst) {
