@@ -6,12 +6,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 
 #include "frontend/vision/robust_refinement.h"
+#include "frontend/vision/three_point.h"
 
 namespace relmap::vision {
 
@@ -71,7 +70,8 @@ class Problem {
     std::size_t inliers = 0;
     double share = 0;  // weight of the inliers / weight of all
   };
-  Score score(const SE3& T_reference_camera) const {
+  // Ends early, with an infinite cost, once the cost is `too_much`.
+  Score score(const SE3& T_reference_camera, double too_much) const {
     const SE3 inverse = T_reference_camera.inverse();
     const double max_cost = options_.gate_sigmas * options_.gate_sigmas;
     Score result{0, 0, 0};
@@ -80,13 +80,16 @@ class Problem {
       const Residual r = residual(inverse, c, false);
       const double w = weight(r, c.sigma);
       all_weight += w;
-      result.cost += max_cost;
-      if (!passes(r)) continue;
-      double worst = 0;
-      for (int k = 0; k < r.rows; ++k) worst = std::max(worst, r.value[k] * r.value[k] / r.covariance(k, k));
-      result.cost -= w * (max_cost - worst);
-      inlier_weight += w;
-      ++result.inliers;
+      if (!passes(r)) {
+        result.cost += max_cost;
+      } else {
+        double worst = 0;
+        for (int k = 0; k < r.rows; ++k) worst = std::max(worst, r.value[k] * r.value[k] / r.covariance(k, k));
+        result.cost += max_cost - w * (max_cost - worst);
+        inlier_weight += w;
+        ++result.inliers;
+      }
+      if (!(result.cost < too_much)) return {};
     }
     if (all_weight > 0) result.share = inlier_weight / all_weight;
     return result;
@@ -205,32 +208,16 @@ class ProgressiveSampler {
   double expected_, allowed_ = 1, trial_ = 0;
 };
 
-// Up to four poses from three points and their left pixels (Ke and Roumeliotis, CVPR 2017).
-std::vector<SE3> three_point(const Problem& problem, const std::array<std::size_t, 3>& sample) {
-  std::vector<SE3> poses;
-  std::array<cv::Point3d, 3> points;
-  std::array<cv::Point2d, 3> rays;
+// Up to four poses, from three points and their left pixels.
+ThreePointPoses poses_of(const Problem& problem, const std::array<std::size_t, 3>& sample) {
+  const StereoCamera& camera = problem.camera();
+  std::array<Vector3, 3> points, rays;
   for (std::size_t k = 0; k < 3; ++k) {
     const Correspondence& c = problem[sample[k]];
-    points[k] = {c.point.x(), c.point.y(), c.point.z()};
-    rays[k] = {(c.pixel.x() - problem.camera().cx) / problem.camera().f,
-               (c.pixel.y() - problem.camera().cy) / problem.camera().f};
+    points[k] = c.point;
+    rays[k] = {(c.pixel.x() - camera.cx) / camera.f, (c.pixel.y() - camera.cy) / camera.f, 1};
   }
-  try {
-    std::vector<cv::Mat> rotations, translations;
-    static const cv::Matx33d kIdentity = cv::Matx33d::eye();
-    cv::solveP3P(points, rays, kIdentity, cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
-    for (std::size_t k = 0; k < rotations.size(); ++k) {
-      const cv::Mat &r = rotations[k], &t = translations[k];
-      const SE3 T_camera_reference{so3_exp({r.at<double>(0), r.at<double>(1), r.at<double>(2)}),
-                                   {t.at<double>(0), t.at<double>(1), t.at<double>(2)}};
-      if (T_camera_reference.R.allFinite() && T_camera_reference.t.allFinite())
-        poses.push_back(T_camera_reference.inverse());
-    }
-  } catch (const cv::Exception&) {
-    poses.clear();  // a degenerate sample
-  }
-  return poses;
+  return three_point_poses(points, rays);
 }
 
 std::size_t trials_needed(double inlier_ratio, int max_trials) {
@@ -250,7 +237,7 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
   Best best;
   const auto consider = [&](const SE3& T) {
     if (options.limits && !options.limits->allow(T)) return false;
-    const Problem::Score score = problem.score(T);
+    const Problem::Score score = problem.score(T, best.score.cost);
     if (!(score.cost < best.score.cost)) return false;
     best = {T, score};
     return true;
@@ -269,7 +256,7 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
     if (trial >= trials_needed(best.score.share, options.max_trials)) break;
     const std::array<std::size_t, 3> sample = sampler.next();
     bool better = false;
-    for (const SE3& T : three_point(problem, sample)) better |= consider(T);
+    for (const SE3& T_camera_reference : poses_of(problem, sample)) better |= consider(T_camera_reference.inverse());
     if (better) polish();
   }
   return best;
