@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <set>
+#include <unordered_set>
 
 #include "server/map/beyond_doubt.h"
 #include "server/map/carried_stretch.h"
@@ -53,14 +54,21 @@ bool store_claim(storage::EditableGraph& map, FrameId frame, std::size_t index, 
   return true;
 }
 
+using Landmarks = std::unordered_set<LandmarkId>;
+
+// What the frame's observations mean.
+Landmarks meanings_seen(const storage::Graph& graph, FrameId frame) {
+  Landmarks seen;
+  for (const storage::Observation& observation : graph.warm(frame)->observations)
+    seen.insert(storage::meaning_of(graph, observation.landmark).landmark);
+  return seen;
+}
+
 // Stores that `frame` sees `binding.landmark` at a keypoint without a track, unless it has an observation of it
-// already.
+// already. `seen` is what its observations mean.
 bool store_observation(storage::EditableGraph& map, FrameId frame, const storage::ProposedBinding& binding,
-                       ClosureId closure) {
-  const auto warm = map.warm(frame);
-  const LandmarkId landmark = storage::meaning_of(map, binding.landmark).landmark;
-  for (const storage::Observation& observation : warm->observations)
-    if (storage::meaning_of(map, observation.landmark).landmark == landmark) return false;
+                       ClosureId closure, Landmarks& seen) {
+  if (!seen.insert(storage::meaning_of(map, binding.landmark).landmark).second) return false;
   map.edit_warm(frame).observations.push_back(
       {binding.landmark, closure, binding.u_left, binding.v, binding.u_right, binding.level, binding.aligned});
   return true;
@@ -70,11 +78,17 @@ bool store_observation(storage::EditableGraph& map, FrameId frame, const storage
 std::size_t store_bindings(storage::EditableGraph& map, FrameId frame, ClosureId closure,
                            const std::vector<storage::ProposedBinding>& bindings) {
   std::size_t stored = 0;
+  std::optional<Landmarks> seen;  // a claim may change it
   for (const storage::ProposedBinding& binding : bindings) {
     if (binding.landmark.valid() ? !can_be_bound(map, binding.landmark) : binding.track < 0) continue;
-    stored += binding.track >= 0
-                  ? store_claim(map, frame, static_cast<std::size_t>(binding.track), binding.landmark, closure)
-                  : store_observation(map, frame, binding, closure);
+    if (binding.track >= 0) {
+      if (!store_claim(map, frame, static_cast<std::size_t>(binding.track), binding.landmark, closure)) continue;
+      seen.reset();
+    } else {
+      if (!seen) seen = meanings_seen(map, frame);
+      if (!store_observation(map, frame, binding, closure, *seen)) continue;
+    }
+    ++stored;
   }
   if (stored == 0) return 0;
   storage::Edge& edge = *map.edit_hot(closure.frame).edge(closure);

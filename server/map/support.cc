@@ -60,16 +60,22 @@ Sightings sightings(const storage::Graph& graph, const std::set<FrameId>& frames
       all.push_back({landmark, frame});
     for (const LandmarkId landmark : not_needed) found.unreached.push_back({landmark, frame});
   }
-  std::sort(all.begin(), all.end());  // by base, so that the walk up from each base is made once
+  // The walk up from each base is made once, and the path from it to each frame.
+  const auto ends = [](const Sighting& sighting) { return std::pair(sighting.landmark.base, sighting.frame); };
+  std::ranges::sort(all, {}, ends);
   storage::LocalGraph local(graph);
   std::vector<storage::LocalStep> steps;
   std::map<std::int32_t, int> uses;  // by local edge
-  for (const Sighting& sighting : all) {
-    const bool reached = local.path(local.frame(sighting.landmark.base), local.frame(sighting.frame), &steps);
-    for (const storage::LocalStep& step : steps) uses[step.edge] += sign;
-    (reached ? found.reached : found.unreached).push_back(sighting);
+  for (auto begin = all.begin(); begin != all.end();) {
+    const auto end = std::ranges::upper_bound(begin, all.end(), ends(*begin), {}, ends);
+    const bool reached = local.path(local.frame(begin->landmark.base), local.frame(begin->frame), &steps);
+    for (const storage::LocalStep& step : steps) uses[step.edge] += sign * static_cast<int>(end - begin);
+    auto& list = reached ? found.reached : found.unreached;
+    list.insert(list.end(), begin, end);
+    begin = end;
   }
   for (const auto& [edge, count] : uses) delta.add(local.edges[static_cast<std::size_t>(edge)].id, count);
+  std::sort(found.reached.begin(), found.reached.end());
   std::sort(found.unreached.begin(), found.unreached.end());
   return found;
 }
