@@ -22,12 +22,12 @@ constexpr std::array<std::uint8_t, kSketched> kCoefficients{22, 6,   4,  2,  3, 
 std::int32_t scaled(std::uint32_t max_squared) { return static_cast<std::int32_t>(max_squared * kDescriptorBytes); }
 
 constexpr std::size_t kOrientations = 8, kCells = kDescriptorBytes / kOrientations;
-using OfCell [[gnu::vector_size(2 * kOrientations)]] = std::int16_t;
-using OfOrientation [[gnu::vector_size(2 * kCells)]] = std::int16_t;
+using Bytes8 [[gnu::vector_size(8)]] = std::uint8_t;
+using Row [[gnu::vector_size(16)]] = std::int16_t;  // eight numbers
 
 // Replaces each two rows whose numbers differ in one bit by their sum and difference, bit by bit.
-template <typename Row, std::size_t Rows>
-void transform_rows(Row (&rows)[Rows]) {
+template <std::size_t Rows>
+void transform_rows(Row* rows) {
   for (std::size_t bit = 1; bit < Rows; bit *= 2)
     for (std::size_t begin = 0; begin < Rows; begin += 2 * bit)
       for (std::size_t row = begin; row < begin + bit; ++row) {
@@ -37,20 +37,38 @@ void transform_rows(Row (&rows)[Rows]) {
       }
 }
 
+// Exchanges rows and columns of eight rows: three perfect shuffles of the 64 numbers.
+void transpose(Row* rows) {
+  for (int shuffle = 0; shuffle < 3; ++shuffle) {
+    Row mixed[8];
+    for (int i = 0; i < 4; ++i) {
+      mixed[2 * i] = __builtin_shufflevector(rows[i], rows[i + 4], 0, 8, 1, 9, 2, 10, 3, 11);
+      mixed[2 * i + 1] = __builtin_shufflevector(rows[i], rows[i + 4], 4, 12, 5, 13, 6, 14, 7, 15);
+    }
+    std::copy_n(mixed, 8, rows);
+  }
+}
+
 }  // namespace
 
 // A coefficient is at most 128 * 255, and two of them differ by no more: both fit into 16 bits.
 RELMAP_READS_DESCRIPTORS DescriptorSketch sketch(const Descriptor& descriptor) {
-  OfCell by_cell[kCells];
-  for (std::size_t i = 0; i < kDescriptorBytes; ++i) by_cell[i / kOrientations][i % kOrientations] = descriptor[i];
-  transform_rows(by_cell);
-  OfOrientation by_orientation[kOrientations];
-  for (std::size_t i = 0; i < kDescriptorBytes; ++i)
-    by_orientation[i % kOrientations][i / kOrientations] = by_cell[i / kOrientations][i % kOrientations];
-  transform_rows(by_orientation);
+  Row rows[kCells];  // of a cell's orientations
+  for (std::size_t cell = 0; cell < kCells; ++cell) {
+    Bytes8 bytes;
+    std::memcpy(&bytes, &descriptor[cell * kOrientations], sizeof bytes);
+    rows[cell] = __builtin_convertvector(bytes, Row);
+  }
+  transform_rows<kCells>(rows);
+  for (Row* half : {&rows[0], &rows[8]}) {  // of an orientation's cells, from now on
+    transpose(half);
+    transform_rows<kOrientations>(half);
+  }
   DescriptorSketch sketch;
-  for (std::size_t i = 0; i < kSketched; ++i)
-    sketch[i] = by_orientation[kCoefficients[i] % kOrientations][kCoefficients[i] / kOrientations];
+  for (std::size_t i = 0; i < kSketched; ++i) {
+    const std::size_t orientation = kCoefficients[i] % kOrientations, cell = kCoefficients[i] / kOrientations;
+    sketch[i] = rows[cell / 8 * 8 + orientation][cell % 8];
+  }
   return sketch;
 }
 
@@ -81,9 +99,8 @@ void DescriptorSketches::find_near_portably(const DescriptorSketch& from, std::u
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void DescriptorSketches::find_near_avx2(const DescriptorSketch& from,
-                                                                        std::uint32_t max_squared,
-                                                                        std::vector<std::uint32_t>& near) const {
+[[gnu::target("avx2")]] void DescriptorSketches::find_near_avx2(const DescriptorSketch& from, std::uint32_t max_squared,
+                                                                std::vector<std::uint32_t>& near) const {
   __m256i asked[kSketched / 2];
   for (std::size_t pair = 0; pair < kSketched / 2; ++pair) {
     std::int32_t both;

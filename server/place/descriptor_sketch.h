@@ -27,8 +27,6 @@ class DescriptorSketches {
   // Appends to `near`, in ascending order, the numbers of the descriptors that the sketches do not rule out to be
   // within `max_squared` (0 to 128 * 255^2, the largest squared distance) of the one that `from` is of.
   void find_near(const DescriptorSketch& from, std::uint32_t max_squared, std::vector<std::uint32_t>& near) const;
-  // Whether the sketches rule that out of descriptor `number`.
-  bool rules_out(const DescriptorSketch& from, std::uint32_t max_squared, std::uint32_t number) const;
 
  private:
   // Eight sketches, by pairs of coefficients.
@@ -37,6 +35,7 @@ class DescriptorSketches {
     std::int16_t coefficients[kSketched / 2][kLanes][2] = {};
   };
 
+  bool rules_out(const DescriptorSketch& from, std::uint32_t max_squared, std::uint32_t number) const;
   void find_near_portably(const DescriptorSketch& from, std::uint32_t max_squared,
                           std::vector<std::uint32_t>& near) const;
 #if defined(__x86_64__)

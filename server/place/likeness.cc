@@ -1,9 +1,12 @@
 #include "server/place/likeness.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <tuple>
+#include <utility>
 
 #include "server/place/descriptor.h"
 
@@ -14,16 +17,29 @@ constexpr double kSigma = 170;  // of the distance between two descriptors of on
 // log_likelihood_ratio(): its value at likeness 0, and its slope over the square root of the likeness.
 constexpr double kUnlike = -0.4, kPerRoot = 2.6;
 
-using WordOrder = std::vector<std::uint32_t>;
+// Finds the features of a word: a hash table with chains, made once for many places.
+class FeaturesByWord {
+ public:
+  explicit FeaturesByWord(std::span<const std::uint32_t> words) : words_(words), next_(words.size(), -1) {
+    first_.fill(-1);
+    for (std::size_t f = words.size(); f-- > 0;)
+      next_[f] = std::exchange(first_[words[f] % kChains], static_cast<std::int32_t>(f));
+  }
 
-WordOrder by_word(const DescribedWords& picture) {
-  WordOrder order(picture.words.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t x, std::uint32_t y) {
-    return std::pair(picture.words[x], x) < std::pair(picture.words[y], y);
-  });
-  return order;
-}
+  // Calls visit(feature) in ascending order.
+  template <typename Visit>
+  void of(std::uint32_t word, const Visit& visit) const {
+    for (std::int32_t f = first_[word % kChains]; f >= 0; f = next_[f])
+      if (words_[f] == word) visit(static_cast<std::uint32_t>(f));
+  }
+
+ private:
+  static constexpr std::size_t kChains = 1024;
+
+  std::span<const std::uint32_t> words_;
+  std::array<std::int32_t, kChains> first_;
+  std::vector<std::int32_t> next_;
+};
 
 struct Pair {
   std::uint32_t distance, feature, of_place;
@@ -33,29 +49,25 @@ struct Pair {
 };
 
 // Pairs each feature of the query with the place's nearest feature of the same word.
-std::vector<Pair> nearest_of_word(const DescribedWords& query, const WordOrder& query_order,
+std::vector<Pair> nearest_of_word(const DescribedWords& query, const FeaturesByWord& by_word,
                                   const DescribedWords& place) {
-  const WordOrder order = by_word(place);
-  std::vector<Pair> pairs;
-  auto begin = order.begin();
-  for (const std::uint32_t feature : query_order) {
-    const std::uint32_t word = query.words[feature];
-    while (begin != order.end() && place.words[*begin] < word) ++begin;
-    Pair nearest{~0u, feature, 0};
-    for (auto other = begin; other != order.end() && place.words[*other] == word; ++other)
-      nearest = std::min(
-          nearest,
-          {squared_distance(query.features[feature].descriptor, place.features[*other].descriptor), feature, *other});
-    if (nearest.distance != ~0u) pairs.push_back(nearest);
-  }
-  return pairs;
+  constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::vector<Pair> nearest(query.words.size(), Pair{kNone, 0, 0});
+  for (std::uint32_t other = 0; other < place.words.size(); ++other)
+    by_word.of(place.words[other], [&](std::uint32_t feature) {
+      const std::uint32_t distance =
+          squared_distance(query.features[feature].descriptor, place.features[other].descriptor);
+      nearest[feature] = std::min(nearest[feature], {distance, feature, other});
+    });
+  std::erase_if(nearest, [](const Pair& pair) { return pair.distance == kNone; });
+  return nearest;
 }
 
 // How well the place agrees with each feature of the query, 0 .. 1.
-std::vector<double> agreement(const DescribedWords& query, const WordOrder& query_order, const DescribedWords& place) {
+std::vector<double> agreement(const DescribedWords& query, const FeaturesByWord& by_word, const DescribedWords& place) {
   std::vector<double> agrees(query.words.size());
   std::vector<bool> taken(place.words.size());
-  std::vector<Pair> pairs = nearest_of_word(query, query_order, place);
+  std::vector<Pair> pairs = nearest_of_word(query, by_word, place);
   std::sort(pairs.begin(), pairs.end());
   for (const Pair& pair : pairs) {
     if (taken[pair.of_place]) continue;
@@ -81,9 +93,9 @@ std::vector<double> above_other_groups(std::vector<double> sums, std::span<const
 
 std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
                              std::span<const std::uint32_t> groups) {
-  const WordOrder query_order = by_word(query);
+  const FeaturesByWord by_word(query.words);
   std::vector<std::vector<double>> agrees;
-  for (const DescribedWords& place : places) agrees.push_back(agreement(query, query_order, place));
+  for (const DescribedWords& place : places) agrees.push_back(agreement(query, by_word, place));
 
   const std::size_t group_count = groups.empty() ? 0 : *std::max_element(groups.begin(), groups.end()) + std::size_t{1};
   std::vector<double> sums(places.size()), of_group(group_count);

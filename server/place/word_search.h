@@ -1,5 +1,5 @@
 // Finds the nearest word of a descriptor in two levels: words are sorted by branch, and only those of the nearest
-// branches are searched.
+// branches are searched. Of these, sketches rule out most.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "server/place/descriptor.h"
+#include "server/place/descriptor_sketch.h"
+#include "server/place/descriptor_table.h"
 
 namespace relmap::place {
 
@@ -23,13 +25,10 @@ class WordSearch {
   std::uint32_t nearest(const Descriptor& descriptor) const;
 
  private:
-  // Centres and their squared lengths: |c|^2 - 2 d.c has the same order as |d - c|^2 and costs half as much.
-  struct Centres {
-    std::span<const Descriptor> at;
-    std::vector<std::int32_t> squared_length;
-  };
-  Centres branches_, words_;
+  DescriptorTable branches_;
+  std::span<const Descriptor> centroids_;
   std::span<const std::uint32_t> branch_begin_;
+  std::vector<DescriptorSketches> of_words_;  // by branch
 };
 
 }  // namespace relmap::place

@@ -1,0 +1,35 @@
+#include "server/place/descriptor_table.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+namespace relmap::place {
+namespace {
+
+TEST(DescriptorTable, DistancesDifferFromThoseOfPairsByTheSquaredLength) {
+  std::mt19937 random(1);
+  for (const std::size_t size : {0u, 1u, 7u, 8u, 9u, 100u}) {
+    std::vector<Descriptor> descriptors(size);
+    for (Descriptor& descriptor : descriptors)
+      for (auto& byte : descriptor) byte = static_cast<std::uint8_t>(random() % 256);
+    if (size > 0) descriptors.back().fill(255);
+    const DescriptorTable table(descriptors);
+    ASSERT_EQ(table.size(), size);
+    Descriptor d, zero;
+    d.fill(255);
+    zero.fill(0);
+    for (int query = 0; query < 3; ++query) {
+      std::vector<std::int32_t> distances(size);
+      table.compare(d, distances);
+      for (std::size_t i = 0; i < size; ++i)
+        EXPECT_EQ(distances[i] + static_cast<std::int64_t>(squared_distance(d, zero)),
+                  static_cast<std::int64_t>(squared_distance(d, descriptors[i])));
+      for (auto& byte : d) byte = static_cast<std::uint8_t>(random() % 256);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace relmap::place
