@@ -408,6 +408,7 @@ struct DaemonStatus {
 
   std::uint64_t durable_sequence = 0, applied_sequence = 0;
   std::uint64_t queued = 0, lookup_lag = 0, pending_frames = 0;
+  double lookup_lag_s = 0;
   double relaxation_p50_us = 0, relaxation_p99_us = 0, relaxation_max_us = 0;
   double active_frames_mean = 0;
   std::uint64_t solves = 0, numerical_failures = 0;

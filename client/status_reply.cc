@@ -58,6 +58,7 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.applied_sequence = m.applied_sequence();
   s.queued = m.queued();
   s.lookup_lag = m.lookup_lag();
+  s.lookup_lag_s = m.lookup_lag_s();
   s.pending_frames = m.pending_frames();
   s.relaxation_p50_us = m.relaxation().p50_us();
   s.relaxation_p99_us = m.relaxation().p99_us();

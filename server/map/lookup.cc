@@ -41,11 +41,13 @@ std::optional<OldNeighbour> nearest_old_frame(const storage::Graph& view, FrameI
     return *local.edges[static_cast<std::size_t>(walk[n].edge)].record;
   };
   const std::vector<SE3> T_frame_node = local.poses_up(root);
+  const storage::TakenIn own = storage::taken_in(*local.frames[static_cast<std::size_t>(root)].hot);
   std::size_t best = 0;
   double best_distance = place::kMaxViewDistance;
   for (std::size_t n = 1; n < walk.size(); ++n) {
     const FrameId id = local.frames[static_cast<std::size_t>(walk[n].frame)].id;
     if (id.session == frame.session && id.index >= recent) continue;
+    if (storage::taken_in(*local.frames[static_cast<std::size_t>(walk[n].frame)].hot) > own) continue;
     const double distance = T_frame_node[n].t.norm();
     if (distance < best_distance && rotation_angle(T_frame_node[n].R) < place::kMaxViewAngle) {
       best = n;
@@ -161,18 +163,30 @@ storage::FrameRange recent_past(const storage::Graph& graph, FrameId query) {
 }
 
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
-               FrameId frame) {
+               FrameId frame, const LaterFrames& later) {
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
   const storage::Session session = *view.session(frame.session);
   if (!session.header.camera.is_stereo()) return {};
   const storage::FrameRange own_past = recent_past(view, frame);
   const std::uint32_t recent = own_past.first;
-  const place::QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
-
-  const place::PlaceAnswer answer =
-      place::metric_answer(places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance), places, cold->words,
-                           view, {&own_past, 1}, cold->appearance);
+  const auto not_asked = [&] {
+    std::vector<storage::FrameRange> ranges = later ? later() : std::vector<storage::FrameRange>();
+    ranges.push_back(own_past);
+    return ranges;
+  };
+  const std::vector<storage::FrameRange> masked = not_asked();
+  place::PlaceAnswer answer = place::metric_answer(places.query(cold->words, view, masked, {}, cold->appearance),
+                                                   places, cold->words, view, masked, cold->appearance);
+  place::QueryPicture query = place::query_of(*cold, session.header.camera);
+  query.masked = masked;
+  query.taken_in = storage::taken_in(*view.hot(frame));
+  const auto drop_later = [&](std::vector<place::PlaceCandidate>& candidates) {
+    std::erase_if(candidates, [&](const place::PlaceCandidate& candidate) {
+      return !place::may_answer(view, query, candidate.frame);
+    });
+  };
+  drop_later(answer.candidates);
   const place::Proceed proceed = [] { return Status(); };
   place::Trials trials(view, query, ransac_seed(view, frame), proceed);
   // A mono session is a place, but gives no transform.
@@ -182,7 +196,9 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
   // Also tries places that look like the best one: they are no answer, but tell whether the best one is unique.
   if (const auto best = trials.best()) {
     limits.min_probability = 0;
-    (void)trials.run(place::look_alikes(view, places, trials.all()[*best].frame, {&own_past, 1}), limits);
+    std::vector<place::PlaceCandidate> alike = place::look_alikes(view, places, trials.all()[*best].frame, masked);
+    drop_later(alike);
+    (void)trials.run(alike, limits);
   }
   if (const place::PlaceTrial* trial = place::contradiction(std::span(trials.all()).first(answers)))
     return {{}, CameraContradiction{trial->frame.session, trial->verified.status()}};

@@ -2,6 +2,7 @@
 // re-observations. The outcome is journal records; the map itself is not changed.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -36,11 +37,16 @@ struct Lookup {
   std::optional<CameraContradiction> contradiction;  // then there are no records
 };
 
+// Tells the frames of other sessions that have come into the map after the one that is looked up, until it is called.
+using LaterFrames = std::function<std::vector<storage::FrameRange>()>;
+
 // Looks up a frame: a function of the view, the index and the frame, with `pictures` as cache of decoded pictures.
 // Returns nothing for a frame of a mono session, since its closures would have no metres and could not be edges
 // (Map.MatchImage tells what such a frame recognises).
+// What is `later` is left out of the question to the index, where it would count as a part of the known world, and what
+// the map took in later of the answers: of two frames that show one place, the later finds the earlier.
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
-               FrameId frame);
+               FrameId frame, const LaterFrames& later = {});
 
 // verify_place() for what `frame` saw, with a random seed that depends on the frame alone.
 Result<place::VerifiedPlace> verify_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,

@@ -2,8 +2,12 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
+#include <iterator>
+#include <limits>
+#include <system_error>
 #include <utility>
 
 #include "proto/base/mutex.h"
@@ -12,7 +16,8 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::size_t kBytesPerFrame = 128;      // of an open frame, here and in the map's state
+constexpr std::size_t kBytesPerFrame = 256;      // of an open frame, here and in the map's state
+constexpr std::size_t kBytesPushed = 32;         // of a frame in pushed_, which may be closed already
 constexpr int kViews = 3;                        // attempts in a row, each on a new view
 constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memory
 
@@ -21,9 +26,17 @@ constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memor
 LookupQueue::LookupQueue(std::shared_ptr<storage::Budget> budget) : budget_(std::move(budget)) {}
 LookupQueue::~LookupQueue() { stop(); }
 
-void LookupQueue::start(LookUp look_up, Journal journal, std::function<void()> on_change) {
-  thread_ = std::thread([this, look_up = std::move(look_up), journal = std::move(journal),
-                         on_change = std::move(on_change)] { run(look_up, journal, on_change); });
+void LookupQueue::start(std::size_t threads, LookUp look_up, Journal journal, std::function<void()> on_change) {
+  look_up_ = std::move(look_up);
+  journal_ = std::move(journal);
+  on_change_ = std::move(on_change);
+  for (std::size_t i = 0; i < threads; ++i) try {
+      threads_.emplace_back([this] { run(); });
+    } catch (const std::system_error& error) {
+      if (threads_.empty()) throw;
+      spdlog::warn("{} of {} threads recognise places: {}", i, threads, error.what());
+      return;
+    }
 }
 
 void LookupQueue::stop() {
@@ -32,13 +45,17 @@ void LookupQueue::stop() {
     stopping_ = true;
     changed_.notify_all();
   }
-  if (thread_.joinable()) thread_.join();
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
 }
 
 void LookupQueue::push(FrameId frame) {
   const MutexLock lock(mutex_);
   open_locked(frame);
-  queue_.push_back(frame);
+  queue_.push_back({frame, ++last_ticket_});
+  tickets_.emplace(last_ticket_, std::chrono::steady_clock::now());
+  pushed_[frame.session].push_back(queue_.back());
+  budget_->charge(storage::Share::kQueues, kBytesPushed);
   changed_.notify_all();
 }
 
@@ -96,37 +113,69 @@ bool LookupQueue::is_waiting(SessionNumber session) const {
   return false;
 }
 
-bool LookupQueue::is_full() const {
-  return waiting() * kBytesPerFrame > budget_->allowance(storage::Share::kQueues) / 2;
+double LookupQueue::lag_s() const {
+  const MutexLock lock(mutex_);
+  if (tickets_.empty()) return 0;
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - tickets_.begin()->second).count();
 }
 
-void LookupQueue::run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change) {
+bool LookupQueue::is_full() const { return waiting() >= kMaxWaiting; }
+
+std::vector<storage::FrameRange> LookupQueue::later_than(const Pushed& pushed) const {
+  const MutexLock lock(mutex_);
+  std::vector<storage::FrameRange> later;
+  for (const auto& [session, frames] : pushed_) {
+    if (session == pushed.frame.session) continue;
+    const auto first = std::partition_point(frames.begin(), frames.end(),
+                                            [&](const Pushed& other) { return other.ticket < pushed.ticket; });
+    if (first != frames.end())
+      later.push_back({session, first->frame.index, std::numeric_limits<std::uint32_t>::max()});
+  }
+  return later;
+}
+
+void LookupQueue::forget_pushed(std::uint64_t ticket) {
+  tickets_.erase(ticket);
+  const std::uint64_t oldest = tickets_.empty() ? last_ticket_ + 1 : tickets_.begin()->first;
+  for (auto of_session = pushed_.begin(); of_session != pushed_.end();) {
+    std::deque<Pushed>& frames = of_session->second;
+    for (; !frames.empty() && frames.front().ticket < oldest; frames.pop_front())
+      budget_->release(storage::Share::kQueues, kBytesPushed);
+    of_session = frames.empty() ? pushed_.erase(of_session) : std::next(of_session);
+  }
+}
+
+void LookupQueue::run() {
   MutexLock lock(mutex_);
   for (;;) {
     changed_.wait(mutex_, [&]() RELMAP_REQUIRES(mutex_) { return stopping_ || !queue_.empty(); });
     if (stopping_) return;
-    const FrameId frame = queue_.front();
+    const Pushed pushed = queue_.front();
+    const FrameId frame = pushed.frame;
     queue_.pop_front();
     lock.unlock();
-    const End end = look_up_and_journal(frame, look_up, journal);
+    const End end = look_up_and_journal(pushed);
     lock.lock();
+    if (end != End::kAgain) forget_pushed(pushed.ticket);
     if (end == End::kDone) close_locked(frame);
     if (end == End::kFailed) failed_.insert(frame);
     if (end == End::kAgain) {
-      queue_.push_back(frame);
+      queue_.push_back(pushed);
       changed_.wait_for(mutex_, kRetry, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; });
     }
     lock.unlock();
-    on_change();
+    on_change_();
     lock.lock();
   }
 }
 
-LookupQueue::End LookupQueue::look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal) {
+LookupQueue::End LookupQueue::look_up_and_journal(const Pushed& pushed) const {
+  const FrameId frame = pushed.frame;
+  const LaterFrames later = [&] { return later_than(pushed); };
   for (int attempt = 0; attempt < kViews; ++attempt) {
     try {
-      for (const storage::JournalRecord& record : look_up(frame))
-        if (!journal(record)) return End::kStopped;
+      for (const storage::JournalRecord& record : look_up_(frame, later))
+        if (!journal_(record)) return End::kStopped;
       return End::kDone;
     } catch (const std::exception& error) {
       const auto* status = dynamic_cast<const StatusError*>(&error);

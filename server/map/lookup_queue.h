@@ -1,13 +1,15 @@
-// Frames that wait to be looked up (lookup.h), and the thread that looks them up.
+// Frames that wait to be looked up (lookup.h), and the threads that look them up.
 //
 // A frame is open from when it is applied until everything that its lookup found is durable. Frames that are open when
 // the map is committed, or when the daemon is killed, are looked up after the next start. A proposal made twice changes
 // nothing.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <thread>
@@ -15,18 +17,25 @@
 
 #include "proto/base/ids.h"
 #include "proto/base/mutex.h"
+#include "server/map/lookup.h"
+#include "storage/graph/frame_range.h"
 #include "storage/journal/journal_record.h"
 #include "storage/memory/budget.h"
 
 namespace relmap::map {
 
+// Frames that wait at once. At the 150 keyframes a second that two cores take in, the last of them waits for 7 s.
+inline constexpr std::size_t kMaxWaiting = 1024;
+
 // Thread-safe.
 class LookupQueue {
  public:
-  // Returns what the lookup of the frame found. Throws StatusError VIEW_EXPIRED if its view was cut off under memory
-  // pressure: the lookup is tried again. After any other exception the frame stays open until the next start.
-  using LookUp = std::function<std::vector<storage::JournalRecord>(FrameId)>;
-  // Waits until the record is durable. False if the daemon stops before.
+  // Returns what the lookup of the frame found. `later` tells the frames of other sessions that have been pushed after
+  // this one until it is called; each range goes on to the end of its session. Called by several threads at a time.
+  // Throws StatusError VIEW_EXPIRED if its view was cut off under memory pressure: the lookup is tried again. After any
+  // other exception the frame stays open until the next start.
+  using LookUp = std::function<std::vector<storage::JournalRecord>(FrameId, const LaterFrames& later)>;
+  // Waits until the record is durable. False if the daemon stops before. Called by several threads at a time.
   using Journal = std::function<bool(const storage::JournalRecord&)>;
 
   explicit LookupQueue(std::shared_ptr<storage::Budget> budget);
@@ -35,12 +44,14 @@ class LookupQueue {
   LookupQueue(const LookupQueue&) = delete;
   LookupQueue& operator=(const LookupQueue&) = delete;
 
-  // Starts the thread. `on_change` is called by it, without a lock held, whenever waiting() has changed.
-  void start(LookUp look_up, Journal journal, std::function<void()> on_change);
-  // Ends the thread after the present lookup. Open frames stay open.
+  // Starts the threads, or as many as can be started; throws std::system_error if none can. They take the frames in the
+  // order in which these were pushed. `on_change` is called by them, without a lock held, whenever waiting() has
+  // changed.
+  void start(std::size_t threads, LookUp look_up, Journal journal, std::function<void()> on_change);
+  // Ends each thread after its present lookup. Open frames stay open.
   void stop();
 
-  // Opens the frame and lets the thread look it up.
+  // Opens the frame and lets a thread look it up.
   void push(FrameId frame);
   // Opens and closes a frame that the caller looks up itself (deterministic mode).
   void open(FrameId frame);
@@ -55,25 +66,44 @@ class LookupQueue {
   // Open frames whose lookup has not failed since the start.
   std::size_t waiting() const;
   bool is_waiting(SessionNumber session) const;
-  // Whether waiting frames take half of the queues' share of memory, so that no more keyframes should be taken in.
+  // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
+  double lag_s() const;
+  // Whether kMaxWaiting frames wait, so that no more keyframes should be taken in before some have been looked up.
+  // Robots then send later, instead of learning later where they are.
   bool is_full() const;
 
  private:
   enum class End : std::uint8_t { kDone, kAgain, kFailed, kStopped };
 
-  void run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change);
-  static End look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal);
+  // A pushed frame. Tickets count up from push to push.
+  struct Pushed {
+    FrameId frame;
+    std::uint64_t ticket;
+  };
+
+  void run();
+  End look_up_and_journal(const Pushed& pushed) const;
+  std::vector<storage::FrameRange> later_than(const Pushed& pushed) const;
+  void forget_pushed(std::uint64_t ticket) RELMAP_REQUIRES(mutex_);
   void open_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
   void close_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<storage::Budget> budget_;
   mutable Mutex mutex_;
   ConditionVariable changed_;
-  std::deque<FrameId> queue_ RELMAP_GUARDED_BY(mutex_);  // for the thread
-  std::set<FrameId> open_ RELMAP_GUARDED_BY(mutex_);     // those queued, the one being looked up, and those that failed
+  std::deque<Pushed> queue_ RELMAP_GUARDED_BY(mutex_);  // for the threads
+  std::uint64_t last_ticket_ RELMAP_GUARDED_BY(mutex_) = 0;
+  // When frames that are in the queue or being looked up were pushed, by ticket.
+  std::map<std::uint64_t, std::chrono::steady_clock::time_point> tickets_ RELMAP_GUARDED_BY(mutex_);
+  // By session, the frames pushed since the oldest of these.
+  std::map<SessionNumber, std::deque<Pushed>> pushed_ RELMAP_GUARDED_BY(mutex_);
+  std::set<FrameId> open_ RELMAP_GUARDED_BY(mutex_);  // those queued, those being looked up, and those that failed
   std::set<FrameId> failed_ RELMAP_GUARDED_BY(mutex_);
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
-  std::thread thread_;
+  LookUp look_up_;
+  Journal journal_;
+  std::function<void()> on_change_;
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace relmap::map

@@ -17,12 +17,14 @@ constexpr std::uint64_t kBudget = 64 << 20;
 // A thread that looks frames up as `look_up` says, and a journal that takes everything.
 class LookupQueueTest : public ::testing::Test {
  protected:
-  void start() {
+  void start(std::size_t threads = 1) {
     queue_.start(
-        [this](FrameId frame) {
+        threads,
+        [this](FrameId frame, const LaterFrames& later) {
           {
             const std::lock_guard lock(mutex_);
             ++lookups_[frame];
+            later_[frame] = later();
           }
           look_up_(frame);
           return std::vector<storage::JournalRecord>{storage::SetLabelRecord{frame, "found", true}};
@@ -52,6 +54,7 @@ class LookupQueueTest : public ::testing::Test {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<FrameId, int> lookups_;
+  std::map<FrameId, std::vector<storage::FrameRange>> later_;  // as the last lookup of the frame was told
   std::vector<FrameId> journalled_;
   LookupQueue queue_{budget_};
 };
@@ -66,6 +69,42 @@ TEST_F(LookupQueueTest, FramesAreLookedUpInOrderAndClosedOnceWhatWasFoundIsDurab
   EXPECT_THAT(journalled_, ::testing::ElementsAre(FrameId{1, 0}, FrameId{1, 1}, FrameId{1, 2}));
   EXPECT_TRUE(queue_.open_frames().empty());
   EXPECT_EQ(budget_->used(storage::Share::kQueues), 0u);
+}
+
+TEST_F(LookupQueueTest, SeveralThreadsLookUpAtTheSameTimeAndEachFrameOnce) {
+  constexpr int kThreads = 3;
+  std::atomic<int> inside = 0;
+  look_up_ = [&](FrameId) {  // ends once all threads are in it
+    ++inside;
+    while (inside < kThreads) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  for (std::uint32_t i = 0; i < 40; ++i) queue_.push({1, i});
+  start(kThreads);
+  wait();
+  EXPECT_EQ(journalled_.size(), 40u);
+  for (std::uint32_t i = 0; i < 40; ++i) EXPECT_EQ(lookups_of({1, i}), 1) << i;
+  EXPECT_TRUE(queue_.open_frames().empty());
+  EXPECT_EQ(budget_->used(storage::Share::kQueues), 0u);
+}
+
+TEST_F(LookupQueueTest, ALookupIsToldWhichFramesOfOthersCameLater) {
+  for (const FrameId frame : {FrameId{1, 5}, FrameId{2, 7}, FrameId{1, 6}, FrameId{2, 8}, FrameId{3, 0}})
+    queue_.push(frame);
+  start();
+  wait();
+  const auto firsts = [&](FrameId frame) {
+    std::map<SessionNumber, std::uint32_t> first;
+    for (const storage::FrameRange& range : later_.at(frame)) first[range.session] = range.first;
+    return first;
+  };
+  using Firsts = std::map<SessionNumber, std::uint32_t>;
+  EXPECT_EQ(firsts({1, 5}), (Firsts{{2, 7}, {3, 0}}));
+  EXPECT_EQ(firsts({2, 7}), (Firsts{{1, 6}, {3, 0}}));
+  EXPECT_EQ(firsts({1, 6}), (Firsts{{2, 8}, {3, 0}}));
+  EXPECT_EQ(firsts({3, 0}), Firsts());
+  queue_.push({1, 7});
+  wait();
+  EXPECT_EQ(firsts({1, 7}), Firsts()) << "all others were done";
 }
 
 TEST_F(LookupQueueTest, ALookupWhoseViewExpiresIsRepeatedUntilItSucceeds) {
@@ -107,6 +146,22 @@ TEST_F(LookupQueueTest, FramesThatFailedDoNotFillTheQueue) {
   start();
   wait();
   EXPECT_FALSE(queue_.is_full());
+}
+
+TEST_F(LookupQueueTest, TheLagIsThatOfTheFrameThatWaitsLongest) {
+  EXPECT_EQ(queue_.lag_s(), 0);
+  std::atomic<bool> ends = false;
+  look_up_ = [&](FrameId frame) {  // the first outlasts the others
+    while (frame.index == 0 && !ends) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  for (std::uint32_t i = 0; i < 3; ++i) queue_.push({1, i});
+  start(2);
+  while (queue_.waiting() > 1) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_GE(queue_.lag_s(), 0.05);
+  ends = true;
+  wait();
+  EXPECT_EQ(queue_.lag_s(), 0);
 }
 
 TEST_F(LookupQueueTest, AFrameStaysOpenIfItsRecordsAreNotDurableWhenTheQueueStops) {

@@ -68,7 +68,7 @@ class LookUpAs : public ::testing::Test {
     }
   }
   // What a robot sees that is said to have this camera, as frame 0 of the next session.
-  Lookup look_up_as(const StereoCamera& camera) {
+  Lookup look_up_as(const StereoCamera& camera, const LaterFrames& later = {}) {
     street_.graph.add_session(++session_, camera);
     storage::FrameCold cold;
     std::vector<std::size_t> points;
@@ -76,7 +76,7 @@ class LookUpAs : public ::testing::Test {
     cold.words = vocabulary_->words(cold.appearance);
     street_.graph.add_frame({session_, 0}, {}, {}, std::move(cold));
     place::PictureCache pictures;
-    return look_up(street_.graph, places_, pictures, {session_, 0});
+    return look_up(street_.graph, places_, pictures, {session_, 0}, later);
   }
 
   std::shared_ptr<const place::Vocabulary> vocabulary_ = place::random_vocabulary(200, 50, 1);
@@ -92,6 +92,20 @@ TEST_F(LookUpAs, AMonoFrameProposesNothing) {
   StereoCamera one_eye = place::kStreetCamera;
   one_eye.baseline = 0;
   EXPECT_TRUE(look_up_as(one_eye).records.empty());
+}
+
+// Such a frame is a place already if the lookup of the older one comes late.
+TEST_F(LookUpAs, WhatTheMapTookInLaterIsNoAnswer) {
+  for (std::uint32_t i = 0; i < kFrames; ++i) street_.graph.edit_hot({1, i}).journal_sequence = i + 1;
+  EXPECT_TRUE(look_up_as(place::kStreetCamera).records.empty()) << "the query was the first";
+  for (std::uint32_t i = 0; i < kFrames; ++i) street_.graph.edit_hot({1, i}).journal_sequence = 0;
+  EXPECT_EQ(look_up_as(place::kStreetCamera).records.size(), 1u);
+}
+
+TEST_F(LookUpAs, WhatIsToldToBeLaterIsNotAskedFor) {
+  EXPECT_TRUE(look_up_as(place::kStreetCamera, [] {
+                return std::vector<storage::FrameRange>{{1, 0, kFrames}};
+              }).records.empty());
 }
 
 // Photographs of the street, though they are more alike than what a robot saw, take no closure away.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <type_traits>
 
 #include "server/map/deletion.h"
 #include "server/map/edge_edit.h"
@@ -44,14 +45,6 @@ storage::Observation observe(LandmarkId landmark, const TrackMeasurement& z) {
   return {landmark, {}, z.u_left, z.v, z.u_right, z.level};
 }
 
-storage::FrameCold cold_part(Keyframe& keyframe, const storage::WordFunction& words) {
-  storage::FrameCold cold;
-  cold.words = words ? words(keyframe.appearance) : std::vector<std::uint32_t>{};
-  cold.appearance = std::move(keyframe.appearance);
-  cold.picture = std::move(keyframe.picture);
-  return cold;
-}
-
 }  // namespace
 
 MapBuilder::MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaOptions rba,
@@ -68,8 +61,16 @@ void MapBuilder::freeze_sessions() {
   relaxer_.freeze(std::move(frozen));
 }
 
-Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& record) {
-  Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
+Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& record,
+                          std::optional<PreparedKeyframe> prepared) {
+  Applied applied = std::visit(
+      [&](const auto& r) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(r)>, storage::KeyframeRecord>)
+          return apply_keyframe(sequence, r, prepared ? *std::move(prepared) : prepare(r, words_));
+        else
+          return apply_record(sequence, r);
+      },
+      record);
   storage::MapState& state = map_.state();
   if (std::holds_alternative<storage::IdleWorkRecord>(record))
     ++state.idle_records;
@@ -98,11 +99,11 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::SessionRecord& re
   return {};
 }
 
-Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::KeyframeRecord& record) {
-  auto decoded = decode_keyframe(record.payload);
+Applied MapBuilder::apply_keyframe(std::uint64_t sequence, const storage::KeyframeRecord& record,
+                                   PreparedKeyframe prepared) {
   const auto session = map_.session(record.session);
-  if (!decoded.ok() || !session) return {};
-  Keyframe& keyframe = *decoded;
+  if (!prepared.keyframe.ok() || !session) return {};
+  Keyframe& keyframe = *prepared.keyframe;
   const FrameId id{record.session, keyframe.sequence};
   if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // taken in or skipped before
   if (storage::is_going(*session))  // deletion began while the record was queued
@@ -124,7 +125,14 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
     hot.edges.push_back(motion_edge(*previous, *map_.hot(*previous), id, keyframe));
   }
   const auto tracks = previous ? live_tracks(map_, *previous) : std::unordered_map<TrackId, LandmarkId>{};
-  map_.add_frame(id, std::move(hot), {}, cold_part(keyframe, words_));
+  Applied applied;
+  applied.frame = id;
+  applied.words = prepared.words;
+  storage::FrameCold cold;
+  cold.words = std::move(prepared.words);
+  cold.appearance = std::move(keyframe.appearance);
+  cold.picture = std::move(keyframe.picture);
+  map_.add_frame(id, std::move(hot), {}, std::move(cold));
   if (previous) insert_sorted(map_.edit_hot(*previous).incoming, EdgeId{id, 0});
 
   // A track continues its landmark while a path leads to it; after that it starts a new one.
@@ -157,8 +165,6 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::Keyframe
   ++edited.frames;
   ++map_.state().keyframes;
 
-  Applied applied;
-  applied.frame = id;
   const FrameId seeds[] = {id};
   timed(applied, [&] { return relaxer_.relax(seeds); });
   return applied;

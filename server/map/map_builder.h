@@ -8,6 +8,7 @@
 
 #include "server/map/closures.h"
 #include "server/map/edge_changes.h"
+#include "server/map/prepared_keyframe.h"
 #include "server/rba/rba.h"
 #include "storage/graph/frame.h"
 #include "storage/journal/journal_record.h"
@@ -16,7 +17,8 @@
 namespace relmap::map {
 
 struct Applied {
-  std::optional<FrameId> frame;  // the frame that a keyframe became
+  std::optional<FrameId> frame;      // the frame that a keyframe became
+  std::vector<std::uint32_t> words;  // of that frame
   ClosureChange closures;
   std::vector<EdgeChange> edges;  // only of closure proposals and an operator's edits
   rba::RbaSummary relaxation;
@@ -33,11 +35,13 @@ class MapBuilder {
   // Applies the record and publishes the map. Publishing rounds the estimates, so the next record finds the same map
   // whether it follows at once or after a restart. A record that no longer fits the map (for example a proposal for a
   // frame that has been deleted) changes nothing.
-  Applied apply(std::uint64_t sequence, const storage::JournalRecord& record);
+  // `prepared`: what prepare() made of a keyframe's record; without it, it is made here.
+  Applied apply(std::uint64_t sequence, const storage::JournalRecord& record,
+                std::optional<PreparedKeyframe> prepared = {});
 
  private:
   Applied apply_record(std::uint64_t sequence, const storage::SessionRecord& record);
-  Applied apply_record(std::uint64_t sequence, const storage::KeyframeRecord& record);
+  Applied apply_keyframe(std::uint64_t sequence, const storage::KeyframeRecord& record, PreparedKeyframe prepared);
   Applied apply_record(std::uint64_t sequence, const storage::GapRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::RefusalRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::ClosureProposalRecord& record);

@@ -21,6 +21,7 @@
 #include "server/map/map_builder.h"
 #include "server/map/place_recognition.h"
 #include "server/map/record_log.h"
+#include "server/map/record_queue.h"
 #include "server/map/recovery.h"
 #include "server/map/session_registry.h"
 #include "server/map/timings.h"
@@ -50,7 +51,9 @@ struct Mapper::Impl {
         budget(std::move(budget_in)),
         vocabulary(std::move(vocabulary_in)),
         options(std::move(options_in)),
-        recognition(vocabulary ? std::make_unique<PlaceRecognition>(vocabulary, budget, options.folder) : nullptr) {}
+        recognition(vocabulary
+                        ? std::make_unique<PlaceRecognition>(vocabulary, budget, options.folder, lookup_threads())
+                        : nullptr) {}
 
   CommitScheduler::Hooks commit_hooks();
   BackgroundWork::Hooks background_hooks();
@@ -67,8 +70,9 @@ struct Mapper::Impl {
 
   // Worker thread.
   void work();
-  void apply_one(DurableRecord record);
-  void apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record);
+  void apply_one(RecordQueue::Next next);
+  void apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record,
+                         std::optional<PreparedKeyframe> prepared);
   void note_applied(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result);
   void catch_up();
   void follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int slices = DeterministicDriver::kSlices);
@@ -76,7 +80,7 @@ struct Mapper::Impl {
   void fail(const std::string& what, const Status& why);
   std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
 
-  // Lookup thread.
+  // Lookup threads.
   bool journal_patiently(const storage::JournalRecord& record);
 
   void tell_waiting() const {
@@ -89,6 +93,10 @@ struct Mapper::Impl {
     return storage;
   }
   bool all_done() const RELMAP_REQUIRES(mutex);
+  std::size_t lookup_threads() const {
+    const std::size_t all_but_one = std::max(2u, std::thread::hardware_concurrency()) - 1;
+    return options.lookup_threads == 0 ? all_but_one : options.lookup_threads;
+  }
   bool recognises_places() const { return options.closures && recognition; }
 
   const std::shared_ptr<storage::Engine> engine;
@@ -103,7 +111,6 @@ struct Mapper::Impl {
   // tell_waiting() until they are destroyed.
   mutable Mutex mutex;
   mutable ConditionVariable changed;
-  std::deque<DurableRecord> durable RELMAP_GUARDED_BY(mutex);  // waiting for the worker
   std::uint64_t applied RELMAP_GUARDED_BY(mutex) = 0;
   bool applying RELMAP_GUARDED_BY(mutex) = false;
   bool stopping RELMAP_GUARDED_BY(mutex) = false;       // the worker ends when `durable` is empty
@@ -122,7 +129,8 @@ struct Mapper::Impl {
 
   std::unique_ptr<storage::Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
-  const std::unique_ptr<PlaceRecognition> recognition;  // null without a vocabulary
+  const std::unique_ptr<PlaceRecognition> recognition;                               // null without a vocabulary
+  RecordQueue durable{words_of(vocabulary), budget, one_in_four(lookup_threads())};  // waits for the worker
   LookupQueue lookups{budget};
   BackgroundWork background{options.idle_slice, background_hooks()};
   DeterministicDriver in_step{options.idle_slice, lookups, driver_hooks()};
@@ -249,29 +257,29 @@ void Mapper::Impl::recover() {
     fail("the journal could not be re-applied beyond record " + std::to_string(through), replayed.trouble);
   } else {
     background.resume(view->pending_frames() > 0);
-    if (recognises_places()) find_open_lookups(map->state().lookups, replayed, options.deterministic, lookups);
+    if (recognises_places()) find_open_lookups(*view, map->state().lookups, replayed, options.deterministic, lookups);
   }
   // With some words missing, places would silently not be recognised.
   if (recognises_places())
-    if (Status loaded = recognition->load(*view, lookups); !loaded.ok()) fail("the words of the map's places", loaded);
+    if (Status loaded = recognition->load(*view); !loaded.ok()) fail("the words of the map's places", loaded);
 }
 
 void Mapper::Impl::start() {
   writer = std::make_unique<JournalWriter>(
       engine, epoch, budget, options.deterministic,
       [this](std::vector<DurableRecord> group) {
-        const MutexLock lock(mutex);
-        for (DurableRecord& record : group) durable.push_back(std::move(record));
-        changed.notify_all();
+        durable.push(std::move(group));
+        tell_waiting();
       },
       [this] { tell_waiting(); });
   if (options.deterministic) catch_up();
   patient = true;
   worker = std::thread([this] { work(); });
   if (recognises_places() && !options.deterministic)
-    lookups.start([this](FrameId frame) { return recognition->look_up(*map->view(), frame); },
-                  [this](const storage::JournalRecord& record) { return journal_patiently(record); },
-                  [this] { tell_waiting(); });
+    lookups.start(
+        lookup_threads(),
+        [this](FrameId frame, const LaterFrames& later) { return recognition->look_up(*map->view(), frame, later); },
+        [this](const storage::JournalRecord& record) { return journal_patiently(record); }, [this] { tell_waiting(); });
 }
 
 // Deterministic mode: does what an interruption may have left undone.
@@ -291,11 +299,9 @@ void Mapper::Impl::work() {
                        [&]() RELMAP_REQUIRES(mutex) { return !durable.empty() || stopping || commits.wants_worker(); });
     if (durable.empty() && stopping) break;
     if (!durable.empty()) {
-      DurableRecord record = std::move(durable.front());
-      durable.pop_front();
       applying = true;
       lock.unlock();
-      apply_one(std::move(record));
+      apply_one(durable.take());
       lock.lock();
       applying = false;
     }
@@ -309,16 +315,18 @@ void Mapper::Impl::work() {
   commits.commit();
 }
 
-void Mapper::Impl::apply_one(DurableRecord record) {
-  if (!failed) apply_and_publish(record.sequence, record.record);
+void Mapper::Impl::apply_one(RecordQueue::Next next) {
+  const DurableRecord& record = next.durable;
+  if (!failed) apply_and_publish(record.sequence, record.record, std::move(next.prepared));
   if (failed) writer->finished(record.sequence);
   budget->release(storage::Share::kQueues, record.bytes);
 }
 
-void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record) {
+void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record,
+                                     std::optional<PreparedKeyframe> prepared) {
   Applied result;
   try {
-    result = builder->apply(sequence, record);
+    result = builder->apply(sequence, record, std::move(prepared));
   } catch (const StatusError& error) {
     return fail("journal record " + std::to_string(sequence) + " could not be applied", error.status());
   } catch (const std::exception& error) {
@@ -340,6 +348,11 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::Jour
 // Notes the outcome of an applied record and wakes the threads that wait for it.
 void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result) {
   background.applied(record, !map->state().pending.empty());
+  if (result.frame && recognises_places()) {
+    // It is pushed first, so that a lookup knows that it is later before the index has it.
+    if (!options.deterministic) lookups.push(*result.frame);
+    recognition->add(*result.frame, result.words);
+  }
   const MutexLock lock(mutex);
   applied = sequence;
   if (std::holds_alternative<storage::ClosureProposalRecord>(record) ||
@@ -351,7 +364,6 @@ void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRe
     timings.add(result.relax_seconds);
     ++relaxations;
     active_frames += result.relaxation.active_frames;
-    if (recognises_places() && !options.deterministic) lookups.push(*result.frame);
   }
   changed.notify_all();
 }
@@ -580,6 +592,7 @@ MapperStats Mapper::stats() const {
   stats.applied_sequence = impl_->applied;
   stats.queued = impl_->durable.size();
   stats.lookup_lag = impl_->lookups.waiting();
+  stats.lookup_lag_s = impl_->lookups.lag_s();
   stats.rba_p50_us = impl_->timings.quantile(0.5);
   stats.rba_p99_us = impl_->timings.quantile(0.99);
   stats.rba_max_us = impl_->timings.quantile(1);

@@ -1,8 +1,8 @@
-// The running map: journal, worker and lookup. Ingest and RPC handlers use this class.
+// The running map: journal, worker and lookups. Ingest and RPC handlers use this class.
 //
-//   submit() -> journal thread: group commit -> durable, `done` called -> worker thread: applied to the map, relaxed,
-//   published -> lookup thread: place recognition and verification on a view -> closure proposals, submitted like
-//   others
+//   submit() -> journal thread: group commit -> durable, `done` called -> preparing threads: keyframes are decoded ->
+//   worker thread: applied to the map, relaxed, published -> lookup threads: place recognition and verification on a
+//   view -> closure proposals, submitted like others
 //
 // All methods are thread-safe.
 #pragma once
@@ -32,7 +32,8 @@ struct MapperOptions {
   // Makes lookups and idle work at fixed points, so that the same input gives the same map. Slower, since records are
   // written one at a time.
   bool deterministic = false;
-  bool closures = true;  // false: no place recognition, to measure what closures improve
+  bool closures = true;            // false: no place recognition, to measure what closures improve
+  std::size_t lookup_threads = 0;  // threads that recognise places; 0: one fewer than there are cores, but at least one
   std::chrono::milliseconds commit_interval{1000};
   std::uint64_t idle_slice = 20000;  // counted work per idle record
   // The data folder. It is named in messages, and holds the files of the place index. Empty: the index is kept in
@@ -45,6 +46,7 @@ struct MapperStats {
   std::uint64_t applied_sequence = 0;
   std::size_t queued = 0;      // records durable but not applied
   std::size_t lookup_lag = 0;  // keyframes applied but not looked up
+  double lookup_lag_s = 0;     // for how long the one that waits longest has been in the map, or since the start
   std::size_t places = 0;
   std::size_t places_left_out = 0;   // for lack of memory; they will not be recognised before the next start
   std::uint64_t pending_frames = 0;  // waiting for relaxation

@@ -8,39 +8,31 @@
 namespace relmap::map {
 
 PlaceRecognition::PlaceRecognition(std::shared_ptr<const place::Vocabulary> vocabulary,
-                                   std::shared_ptr<storage::Budget> budget, std::string folder)
+                                   std::shared_ptr<storage::Budget> budget, std::string folder, std::size_t threads)
     : vocabulary_(std::move(vocabulary)),
       budget_(std::move(budget)),
-      places_(vocabulary_,
-              place::PlaceIndexOptions{budget_->allowance(storage::Share::kPlaceIndex), std::move(folder)}) {}
+      places_(vocabulary_, place::PlaceIndexOptions{budget_->allowance(storage::Share::kPlaceIndex), std::move(folder),
+                                                    one_in_four(threads)}) {}
 
-Status PlaceRecognition::load(const storage::MapView& view, const LookupQueue& lookups) {
+Status PlaceRecognition::load(const storage::MapView& view) {
   if (const Status restored = places_.restore(view); !restored.ok())
     spdlog::warn("the place index is made again from the map, in part or whole: {}", restored.to_string());
   const auto is_known = [&](FrameId frame) { return places_.contains(frame); };
   const Status scanned = view.scan_words(is_known, [&](FrameId frame, std::span<const std::uint32_t> words) {
-    if (lookups.is_open(frame)) return;
-    if (!words.empty()) return add_place(frame, words);
+    if (!words.empty()) return add(frame, words);
     // After a repair a frame may have lost its words. They are computed again from its features, if it has any.
     const auto cold = view.cold(frame);
-    if (cold && !cold->appearance.empty()) add_place(frame, vocabulary_->words(cold->appearance));
+    if (cold && !cold->appearance.empty()) add(frame, vocabulary_->words(cold->appearance));
   });
   budget_->set(storage::Share::kPlaceIndex, places_.memory_bytes());
   return scanned;
 }
 
-std::vector<storage::JournalRecord> PlaceRecognition::look_up(const storage::MapView& view, FrameId frame) {
+std::vector<storage::JournalRecord> PlaceRecognition::look_up(const storage::MapView& view, FrameId frame,
+                                                              const LaterFrames& later) {
   const auto session = view.session(frame.session);
   if (!session || storage::is_going(*session)) return {};  // it is no place any more
-  Lookup found;
-  Status trouble;
-  try {
-    found = map::look_up(view, places_, pictures_, frame);
-  } catch (const StatusError& error) {
-    trouble = error.status();
-  }
-  if (const auto cold = view.cold(frame); !cold->words.empty()) add_place(frame, cold->words);
-  throw_if(trouble);
+  Lookup found = map::look_up(view, places_, pictures_, frame, later);
   count_doubts(frame.session, found);
   return std::move(found.records);
 }
@@ -50,7 +42,7 @@ void PlaceRecognition::forget(SessionNumber session) {
   places_.leave_out(session);
 }
 
-void PlaceRecognition::add_place(FrameId frame, std::span<const std::uint32_t> words) {
+void PlaceRecognition::add(FrameId frame, std::span<const std::uint32_t> words) {
   const Status added = places_.add(frame, words);
   if (!added.ok() && places_.left_out() == 1)
     spdlog::error("frame {} will not be recognised, and others after it: {}", frame.to_string(), added.to_string());

@@ -1,4 +1,4 @@
-// Recognises places in keyframes: looks each frame up among those before it, then makes it a place itself.
+// Recognises places in keyframes: makes each frame a place, and looks it up among the places before it.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,6 @@
 #include "proto/base/status.h"
 #include "server/map/camera_doubts.h"
 #include "server/map/lookup.h"
-#include "server/map/lookup_queue.h"
 #include "server/place/picture_cache.h"
 #include "server/place/place_index.h"
 #include "server/place/vocabulary.h"
@@ -21,21 +20,29 @@
 
 namespace relmap::map {
 
-// Thread-safe, but look_up() is called by one thread at a time.
+// How many threads or memories serve so many lookup threads with what is a few per cent of a lookup, so that they
+// seldom wait for each other: queries of the index, and the preparation of keyframes.
+constexpr std::size_t one_in_four(std::size_t lookup_threads) { return 1 + lookup_threads / 4; }
+
+// One thread may call load(), add() and save() while any number look up.
 class PlaceRecognition {
  public:
-  // `folder`: the map's, in which the place index keeps its file.
+  // `folder`: the map's, in which the place index keeps its file. `threads` that look up at the same time.
   PlaceRecognition(std::shared_ptr<const place::Vocabulary> vocabulary, std::shared_ptr<storage::Budget> budget,
-                   std::string folder);
+                   std::string folder, std::size_t threads);
 
-  // Makes a place of every frame with words: from the index's folder, or else from the map. Frames whose lookup is open
-  // are left out; they become places when they are looked up. IO_ERROR, DATA_LOSS, VIEW_EXPIRED: the words could not
-  // all be read, so some places would silently not be recognised.
-  Status load(const storage::MapView& view, const LookupQueue& lookups);
+  // Makes a place of every frame with words: from the index's folder, or else from the map. IO_ERROR, DATA_LOSS,
+  // VIEW_EXPIRED: the words could not all be read, so some places would silently not be recognised.
+  Status load(const storage::MapView& view);
 
-  // Looks the frame up, notes which calibrations it contradicts or confirms, and makes it a place. Returns the records
-  // of what was found. Throws StatusError; the frame is a place then too.
-  std::vector<storage::JournalRecord> look_up(const storage::MapView& view, FrameId frame);
+  // Makes a frame with words a place. A frame is added when it comes into the map, before it is looked up, so that of
+  // two robots that pass a place at the same time one finds the other.
+  void add(FrameId frame, std::span<const std::uint32_t> words);
+
+  // Looks the frame up among all places but later ones, and notes which calibrations it contradicts or confirms.
+  // Returns the records of what was found. Throws StatusError.
+  std::vector<storage::JournalRecord> look_up(const storage::MapView& view, FrameId frame,
+                                              const LaterFrames& later = {});
 
   // The session is being deleted: its frames are places no more.
   void forget(SessionNumber session);
@@ -47,14 +54,12 @@ class PlaceRecognition {
   std::vector<CameraDoubt> doubts() const { return doubts_.doubts(); }
 
  private:
-  // Charges the index's memory to the budget. The first place for which there is no room is logged.
-  void add_place(FrameId frame, std::span<const std::uint32_t> words);
   void count_doubts(SessionNumber session, const Lookup& found);
 
   const std::shared_ptr<const place::Vocabulary> vocabulary_;
   const std::shared_ptr<storage::Budget> budget_;
   place::PlaceIndex places_;
-  place::PictureCache pictures_;  // of the thread that looks up
+  place::PictureCache pictures_;
   CameraDoubts doubts_;
 };
 

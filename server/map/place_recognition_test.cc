@@ -50,7 +50,7 @@ class PlaceRecognitionTest : public ::testing::Test {
     map_.reset();
     map_ = storage::Map::open(engine_, epoch_, budget_).or_throw();
   }
-  Status load() { return recognition_.load(*map_->view(), lookups_); }
+  Status load() { return recognition_.load(*map_->view()); }
 
   const std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
   const std::uint64_t epoch_ = engine_->acquire().or_throw();
@@ -60,7 +60,7 @@ class PlaceRecognitionTest : public ::testing::Test {
     return vocabulary_->words(features);
   };
   std::unique_ptr<storage::Map> map_;
-  PlaceRecognition recognition_{vocabulary_, budget_, ""};
+  PlaceRecognition recognition_{vocabulary_, budget_, "", 2};
   LookupQueue lookups_{budget_};
 };
 
@@ -77,14 +77,6 @@ TEST_F(PlaceRecognitionTest, CommittedFramesBecomePlacesToo) {
   open_map();
   EXPECT_TRUE(load().ok());
   EXPECT_EQ(recognition_.places().size(), kDriven);
-}
-
-TEST_F(PlaceRecognitionTest, AFrameWhoseLookupIsOpenIsLeftToIt) {
-  drive(words_);
-  lookups_.open(frame(3));
-  EXPECT_TRUE(load().ok());
-  EXPECT_FALSE(recognition_.places().contains(frame(3)));
-  EXPECT_EQ(recognition_.places().size(), kDriven - 1);
 }
 
 TEST_F(PlaceRecognitionTest, WordsThatARepairHasLostAreComputedFromTheFeatures) {
@@ -109,16 +101,15 @@ TEST_F(PlaceRecognitionTest, WordsThatCannotBeReadAreAnError) {
   EXPECT_EQ(load().reason(), Reason::DATA_LOSS);
 }
 
-TEST_F(PlaceRecognitionTest, ALookupMakesItsFrameAPlaceUnlessTheSessionIsBeingDeleted) {
+TEST_F(PlaceRecognitionTest, NothingIsFoundInAMapOfOneStretchOrForASessionThatIsBeingDeleted) {
   drive(words_);
-  EXPECT_THAT(recognition_.look_up(*map_->view(), frame(0)), IsEmpty()) << "there is no other place yet";
-  EXPECT_TRUE(recognition_.places().contains(frame(0)));
+  EXPECT_TRUE(load().ok());
+  EXPECT_THAT(recognition_.look_up(*map_->view(), frame(5)), IsEmpty()) << "all others are its recent past";
   MapBuilder(*map_, words_, rba::RbaOptions{})
       .apply(map_->view()->state().applied_sequence + 1,
              storage::SetSessionStateRecord{kDriveSession, storage::SessionState::kDeleting});
   map_->publish();
-  (void)recognition_.look_up(*map_->view(), frame(1));
-  EXPECT_FALSE(recognition_.places().contains(frame(1)));
+  EXPECT_THAT(recognition_.look_up(*map_->view(), frame(5)), IsEmpty());
 }
 
 }  // namespace

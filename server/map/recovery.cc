@@ -1,6 +1,8 @@
 #include "server/map/recovery.h"
 
+#include <algorithm>
 #include <exception>
+#include <map>
 #include <string>
 
 #include "storage/journal/journal_record.h"
@@ -31,16 +33,20 @@ Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& b
   return replayed;
 }
 
-void find_open_lookups(const std::set<FrameId>& known, const Replayed& replayed, bool deterministic,
-                       LookupQueue& lookups) {
+void find_open_lookups(const storage::Graph& graph, const std::set<FrameId>& known, const Replayed& replayed,
+                       bool deterministic, LookupQueue& lookups) {
   if (deterministic) {  // every lookup was done before the next keyframe was taken in
     for (const FrameId frame : known) lookups.open(frame);
     if (!replayed.frames.empty() && !replayed.looked_up) lookups.open(replayed.frames.back());
     return;
   }
-  std::set<FrameId> open = known;
-  open.insert(replayed.frames.begin(), replayed.frames.end());
-  for (const FrameId frame : open) lookups.push(frame);
+  std::map<storage::TakenIn, FrameId> open;
+  const auto add = [&](FrameId frame) {
+    if (const auto hot = graph.hot(frame)) open.emplace(storage::taken_in(*hot), frame);
+  };
+  std::for_each(known.begin(), known.end(), add);
+  std::for_each(replayed.frames.begin(), replayed.frames.end(), add);
+  for (const auto& [_, frame] : open) lookups.push(frame);
 }
 
 }  // namespace relmap::map

@@ -10,6 +10,7 @@
 #include "server/map/lookup_queue.h"
 #include "server/map/map_builder.h"
 #include "storage/engine/engine.h"
+#include "storage/graph/graph.h"
 
 namespace relmap::map {
 
@@ -29,10 +30,11 @@ struct Replayed {
 Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& builder);
 
 // Opens the frames whose lookup may not have been made, or may not have reached the journal: `known`, which were open
-// at the last commit (MapState::lookups), and those that the journal added since. A proposal made twice changes
+// at the last commit (MapState::lookups), and those that the journal added since. They are pushed in the order in which
+// `graph` took them in: each is then looked up among the same older frames as before, and a proposal made twice changes
 // nothing. `deterministic`: the caller looks them up itself, and had made every lookup before the next keyframe was
 // taken in.
-void find_open_lookups(const std::set<FrameId>& known, const Replayed& replayed, bool deterministic,
-                       LookupQueue& lookups);
+void find_open_lookups(const storage::Graph& graph, const std::set<FrameId>& known, const Replayed& replayed,
+                       bool deterministic, LookupQueue& lookups);
 
 }  // namespace relmap::map

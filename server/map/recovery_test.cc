@@ -18,6 +18,7 @@
 #include "storage/engine/memory_engine.h"
 #include "storage/map/map.h"
 #include "storage/testing/forwarding_engine.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap::map {
 namespace {
@@ -178,29 +179,43 @@ TEST_F(RecoveryTest, AnOwnerWhoseEpochHasExpiredReplaysButCannotCommit) {
   EXPECT_EQ(replay(*engine_, of_newer_owner->state().applied_sequence + 1, builder).frames.size(), 6u);
 }
 
-TEST(OpenLookups, OpenFramesAndThoseOfTheJournalAreLookedUpByTheThread) {
+// Frames of two sessions that drove at once: the map took in the older frame of session 2 last.
+class InTurns final : public storage::PartialGraph {
+ public:
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
+    auto hot = std::make_shared<storage::FrameHot>();
+    hot->present = true;
+    hot->journal_sequence = id == kOther ? 10 : id.index;
+    return hot;
+  }
+  static constexpr FrameId kOther{kDriveSession + 1, 0};
+};
+
+TEST(OpenLookups, OpenFramesAndThoseOfTheJournalAreLookedUpInTheOrderInWhichTheyWereTakenIn) {
   LookupQueue lookups(std::make_shared<storage::Budget>(std::size_t{1} << 20));
-  find_open_lookups({frame(1), frame(2)}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, false,
-                    lookups);
+  find_open_lookups(InTurns(), {InTurns::kOther, frame(1), frame(2)},
+                    {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, false, lookups);
   std::vector<FrameId> looked_up;
-  std::promise<void> third;
+  std::promise<void> fourth;
   lookups.start(
-      [&](FrameId id) {
+      1,
+      [&](FrameId id, const LaterFrames&) {
         looked_up.push_back(id);
-        if (looked_up.size() == 3) third.set_value();
+        if (looked_up.size() == 4) fourth.set_value();
         return std::vector<storage::JournalRecord>{};
       },
       [](const storage::JournalRecord&) { return true; }, [] {});
-  EXPECT_EQ(third.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  EXPECT_EQ(fourth.get_future().wait_for(std::chrono::minutes(10)), std::future_status::ready);
   lookups.stop();
-  EXPECT_THAT(looked_up, ElementsAre(frame(1), frame(2), frame(3))) << "each once";
+  EXPECT_THAT(looked_up, ElementsAre(frame(1), frame(2), frame(3), InTurns::kOther)) << "each once";
 }
 
 TEST(OpenLookups, InDeterministicModeOnlyTheLastFrameOfTheJournalMayLackItsLookup) {
   LookupQueue lookups(std::make_shared<storage::Budget>(std::size_t{1} << 20));
-  find_open_lookups({}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, true, lookups);
+  find_open_lookups(InTurns(), {}, {.frames = {frame(2), frame(3)}, .looked_up = true, .trouble = {}}, true, lookups);
   EXPECT_THAT(lookups.open_frames(), IsEmpty());
-  find_open_lookups({frame(1)}, {.frames = {frame(2), frame(3)}, .looked_up = false, .trouble = {}}, true, lookups);
+  find_open_lookups(InTurns(), {frame(1)}, {.frames = {frame(2), frame(3)}, .looked_up = false, .trouble = {}}, true,
+                    lookups);
   EXPECT_THAT(lookups.open_frames(), ElementsAre(frame(1), frame(3)));
 }
 

@@ -110,6 +110,7 @@ const std::map<std::string, Setter>& settings() {
       {"log_level", text(&Config::log_level)},
       {"deterministic", flag([](Config& c) -> bool& { return c.map.deterministic; })},
       {"closures", flag([](Config& c) -> bool& { return c.map.closures; })},
+      {"lookup_threads", number([](Config& c) -> std::size_t& { return c.map.lookup_threads; }, 0, 256)},
       {"commit_interval_ms",
        [](const YAML::Node& node, Config& config) -> std::string {
          long long ms = 0;

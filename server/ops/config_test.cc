@@ -47,6 +47,14 @@ TEST(Config, ReadsKeysOfTheFileAndKeepsOtherDefaults) {
   EXPECT_TRUE(check_config(config).ok());
 }
 
+TEST(Config, LookupThreadsHaveARange) {
+  Config config;
+  EXPECT_TRUE(parse_config("lookup_threads: 256\n", "relmapd.yaml", config).ok());
+  EXPECT_EQ(config.map.lookup_threads, 256u);
+  EXPECT_NE(refusal("lookup_threads: 257\n").find("lookup_threads"), std::string::npos);
+  EXPECT_NE(refusal("lookup_threads: -1\n").find("lookup_threads"), std::string::npos);
+}
+
 TEST(Config, AnEmptyFileChangesNothing) {
   Config config;
   EXPECT_TRUE(parse_config("# nothing\n", "relmapd.yaml", config).ok());

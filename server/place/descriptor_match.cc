@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <optional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "proto/geometry/covariance.h"
 #include "server/place/descriptor_sketch.h"
@@ -73,34 +73,19 @@ std::vector<DescriptorMatch> nearest_of_each_landmark(const std::vector<Descript
   return result;
 }
 
-}  // namespace
-
-std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature> features,
-                                               std::span<const Descriptor* const> points,
-                                               const std::function<bool(std::uint32_t, std::uint32_t)>& same,
-                                               const ExpectedPoints* expected) {
-  const DescriptorSketches of_points(points);
-  std::vector<DescriptorSketch> of_features;
-  for (const AppearanceFeature& feature : features) of_features.push_back(sketch(feature.descriptor));
-  std::optional<PossiblePoints> possible;
-  if (expected) possible.emplace(*expected);
-  // Calls visit(p, squared distance) for each possible point within `max` of feature f, in ascending order.
-  std::vector<std::uint32_t> near;
-  const auto points_within = [&](std::uint32_t max, std::uint32_t f, const auto& visit) {
-    near.clear();
-    if (possible) {
-      for (const std::uint32_t p : possible->of(features[f]))
-        if (!of_points.rules_out(of_features[f], max, p)) near.push_back(p);
-    } else {
-      of_points.find_near(of_features[f], max, near);
-    }
-    for (const std::uint32_t p : near)
+// Returns mutual nearest neighbours that pass the ratio test. `possible(max, f)` returns the points, ascending, that
+// feature f may be, all of those within the squared distance `max` among them.
+template <typename Same, typename Possible>
+std::vector<DescriptorMatch> match(std::span<const AppearanceFeature> features,
+                                   std::span<const Descriptor* const> points, const Same& same,
+                                   const Possible& possible) {
+  const auto visit_within = [&](std::uint32_t max, std::uint32_t f, const auto& visit) {
+    for (const std::uint32_t p : possible(max, f))
       if (const std::uint32_t d = squared_distance(features[f].descriptor, *points[p]); d <= max) visit(p, d);
   };
-
   std::vector<Nearest> point_of(features.size()), feature_of(points.size());
   for (std::uint32_t f = 0; f < features.size(); ++f)
-    points_within(kMaxDescriptorDistance, f, [&](std::uint32_t p, std::uint32_t distance) {
+    visit_within(kMaxDescriptorDistance, f, [&](std::uint32_t p, std::uint32_t distance) {
       point_of[f].offer(p, distance);
       feature_of[p].offer(f, distance);
     });
@@ -111,21 +96,82 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
     if (distance > kMaxDescriptorDistance || feature_of[p].index != f) continue;
     const auto rival = static_cast<std::uint32_t>(distance / (kDescriptorRatio * kDescriptorRatio));
     bool clear = true;
-    points_within(rival, f,
-                  [&](std::uint32_t other, std::uint32_t) { clear = clear && (other == p || same(p, other)); });
+    visit_within(rival, f,
+                 [&](std::uint32_t other, std::uint32_t) { clear = clear && (other == p || same(p, other)); });
     if (clear) matches.push_back({f, p, distance});
   }
   return matches;
 }
 
-std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
-                                          const ExpectedPoints* expected) {
+std::vector<const Descriptor*> descriptors_of(std::span<const MapPoint> points) {
   std::vector<const Descriptor*> descriptors;
   for (const MapPoint& point : points) descriptors.push_back(point.descriptor);
-  const auto matches = match_descriptors(
-      features, descriptors, [&](std::uint32_t p, std::uint32_t q) { return one_point(points[p], points[q]); },
-      expected);
-  return nearest_of_each_landmark(matches, points);
+  return descriptors;
+}
+
+// Whether two points of the map are one point of the world.
+struct SamePoint {
+  std::span<const MapPoint> points;
+  bool operator()(std::uint32_t p, std::uint32_t q) const { return one_point(points[p], points[q]); }
+};
+
+}  // namespace
+
+std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature> features,
+                                               std::span<const Descriptor* const> points,
+                                               const std::function<bool(std::uint32_t, std::uint32_t)>& same,
+                                               const ExpectedPoints* expected) {
+  // Where few points are possible, their distances cost less than sketches do.
+  if (expected) {
+    PossiblePoints possible(*expected);
+    return match(features, points, same, [&](std::uint32_t, std::uint32_t f) { return possible.of(features[f]); });
+  }
+  const DescriptorSketches of_points(points);
+  std::vector<DescriptorSketch> of_features;
+  for (const AppearanceFeature& feature : features) of_features.push_back(sketch(feature.descriptor));
+  std::vector<std::uint32_t> near;
+  return match(features, points, same, [&](std::uint32_t max, std::uint32_t f) {
+    near.clear();
+    of_points.find_near(of_features[f], max, near);
+    return std::span<const std::uint32_t>(near);
+  });
+}
+
+std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
+                                          const ExpectedPoints* expected) {
+  return nearest_of_each_landmark(match_descriptors(features, descriptors_of(points), SamePoint{points}, expected),
+                                  points);
+}
+
+std::vector<DescriptorMatch> match_points_by_word(std::span<const AppearanceFeature> features,
+                                                  std::span<const std::uint32_t> words,
+                                                  std::span<const MapPoint> points) {
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t p = 0; p < points.size(); ++p)
+    if (points[p].word != kNoWord) order.push_back(p);
+  const auto word = [&](std::uint32_t p) { return points[p].word; };
+  std::ranges::stable_sort(order, {}, word);
+  const auto of_word = [&](std::uint32_t, std::uint32_t f) {
+    const auto found = std::ranges::equal_range(order, words[f], {}, word);
+    return std::span<const std::uint32_t>(found.begin(), found.end());
+  };
+  return nearest_of_each_landmark(match(features, descriptors_of(points), SamePoint{points}, of_word), points);
+}
+
+std::vector<DescriptorMatch> nearest_of_all(std::vector<DescriptorMatch> matches, std::span<const MapPoint> points) {
+  std::ranges::stable_sort(matches, {}, &DescriptorMatch::distance);
+  std::unordered_set<std::uint32_t> features, taken;
+  std::unordered_set<LandmarkId> landmarks;
+  std::erase_if(matches, [&](const DescriptorMatch& match) {
+    const LandmarkId landmark = points[match.point].landmark;
+    if (features.contains(match.feature) || taken.contains(match.point) || landmarks.contains(landmark)) return true;
+    features.insert(match.feature);
+    taken.insert(match.point);
+    if (landmark.valid()) landmarks.insert(landmark);
+    return false;
+  });
+  std::ranges::sort(matches, {}, &DescriptorMatch::feature);
+  return matches;
 }
 
 }  // namespace relmap::place

@@ -46,4 +46,14 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
 std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
                                           const ExpectedPoints* expected = nullptr);
 
+// Of matches of the same features with the same points, found in several ways, keeps the nearest of each feature, point
+// and landmark. Ascending by feature.
+std::vector<DescriptorMatch> nearest_of_all(std::vector<DescriptorMatch> matches, std::span<const MapPoint> points);
+
+// match_points() among pairs of one word, which cost a hundredth of all pairs and hold a tenth to a quarter of the
+// matches. `words` are those of the features, one each.
+std::vector<DescriptorMatch> match_points_by_word(std::span<const AppearanceFeature> features,
+                                                  std::span<const std::uint32_t> words,
+                                                  std::span<const MapPoint> points);
+
 }  // namespace relmap::place

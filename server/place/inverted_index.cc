@@ -40,7 +40,7 @@ std::vector<PlaceRange> places_of(const FrameTable& frames, std::span<const stor
 }
 
 std::size_t bytes_of(const PlaceWords& place) {
-  return sizeof place + sizeof(LogLikelihood) + place.words.capacity() * sizeof(place.words[0]) + 2 * sizeof(void*);
+  return sizeof place + sizeof(LogLikelihood) + place.words.capacity() * sizeof(place.words[0]) + 6 * sizeof(void*);
 }
 
 }  // namespace
@@ -62,9 +62,9 @@ InvertedIndex::InvertedIndex(const FabMapModel& model, Options options) : model_
 }
 
 bool InvertedIndex::contains(FrameId frame) const {
-  const std::vector<PlaceWords>& tail = writers_tail();
+  const auto& tail = writers_tail();
   return writers_packed().frames.find(frame) != FrameTable::kNone ||
-         std::any_of(tail.begin(), tail.end(), [&](const PlaceWords& place) { return place.frame == frame; });
+         std::any_of(tail.begin(), tail.end(), [&](const auto& one) { return one->place.frame == frame; });
 }
 
 Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
@@ -72,12 +72,14 @@ Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
     ++refused_;
     return room;
   }
+  const LogLikelihood constant = model_.place(words);
+  auto added = std::make_shared<const TailPlace>(TailPlace{{frame, std::move(words)}, constant});
+  const std::size_t bytes = bytes_of(added->place);
   {
     const ExclusiveLock lock(mutex_);
-    tail_constants_.push_back(model_.place(words));
-    tail_.push_back({frame, std::move(words)});
+    tail_.push_back(std::move(added));
   }
-  tail_bytes_ += bytes_of(writers_tail().back());
+  tail_bytes_ += bytes;
   memory_ = memory_now();
   if (writers_tail().size() >= std::min(kTail, kPlacesPerBlock - unfilled())) pack();
   return {};
@@ -85,7 +87,8 @@ Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
 
 // Moves the tail into the last block, and writes the block to the file once it is full.
 void InvertedIndex::pack() {
-  const std::vector<PlaceWords>& tail = writers_tail();
+  std::vector<PlaceWords> tail;
+  for (const auto& one : writers_tail()) tail.push_back(one->place);
   if (tail.empty()) return;
   PackedPlaces packed = writers_packed();
   Bytes bytes;
@@ -108,7 +111,6 @@ void InvertedIndex::pack() {
     const ExclusiveLock lock(mutex_);
     packed_.swap(shared);
     tail_.clear();
-    tail_constants_.clear();
   }
   tail_bytes_ = 0;
   memory_ = memory_now();
@@ -228,16 +230,18 @@ Status InvertedIndex::make_room() {
 }
 
 void InvertedIndex::score(BlockScores& query, std::span<const storage::FrameRange> masked, PlaceScores& scores) const {
-  scores.tail.clear();
-  std::vector<LogLikelihood> of_tail;
+  std::vector<std::shared_ptr<const TailPlace>> tail;
   {
     const SharedLock lock(mutex_);
     scores.packed = packed_;
-    for (std::size_t i = 0; i < tail_.size(); ++i) {
-      scores.tail.push_back(tail_[i].frame);
-      of_tail.push_back(storage::within(tail_[i].frame, masked) ? kLeftOut
-                                                                : query.of_words(tail_constants_[i], tail_[i].words));
-    }
+    tail = tail_;
+  }
+  scores.tail.clear();
+  std::vector<LogLikelihood> of_tail;
+  for (const auto& one : tail) {
+    scores.tail.push_back(one->place.frame);
+    of_tail.push_back(storage::within(one->place.frame, masked) ? kLeftOut
+                                                                : query.of_words(one->constant, one->place.words));
   }
   const std::uint32_t packed = scores.packed->frames.places();
   const std::size_t size = packed + of_tail.size();
@@ -278,13 +282,13 @@ std::uint32_t InvertedIndex::size() const {
 
 std::size_t InvertedIndex::memory_bytes() const { return memory_; }
 
-// Memory in use, plus what may be needed besides: the scores of a query, a block that is being made from the tail, and
-// a block that a query reads.
+// Memory in use, plus what may be needed besides: a block that is being made from the tail, and of each query the
+// scores and a block that it reads.
 std::size_t InvertedIndex::memory_now() const {
   const PackedPlaces& packed = writers_packed();
   const std::size_t places = packed.frames.places() + writers_tail().size();
-  return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * max_block_ + 2 * packed.frames.memory_bytes() +
-         2 * packed.blocks.size() * sizeof(PackedPlaces::Block);
+  return resident_bytes_ + tail_bytes_ + options_.queries * (places * kQueryBytes + max_block_) + max_block_ +
+         2 * packed.frames.memory_bytes() + 2 * packed.blocks.size() * sizeof(PackedPlaces::Block);
 }
 
 std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words) {

@@ -39,6 +39,11 @@ inline constexpr LogLikelihood kLeftOut = std::numeric_limits<LogLikelihood>::mi
 // The log-likelihoods of one query at the places that the index held when it was asked. An object is reused from query
 // to query, which saves allocations.
 struct PlaceScores {
+  // Lets go of the index's places, whose older versions would stay in memory otherwise.
+  void end() {
+    packed.reset();
+    tail.clear();
+  }
   std::uint32_t find(FrameId frame) const;  // FrameTable::kNone if the frame has no place
   FrameId frame(std::uint32_t place) const;
   std::span<const LogLikelihood> of_block(std::size_t block) const {
@@ -59,7 +64,8 @@ struct PlaceScores {
 class InvertedIndex {
  public:
   struct Options {
-    std::size_t allowance = std::numeric_limits<std::size_t>::max();  // bytes of memory, including a query's scores
+    std::size_t allowance = std::numeric_limits<std::size_t>::max();  // bytes of memory, including queries' scores
+    std::size_t queries = 1;                                          // at the same time, at most
     std::string folder;                                               // the data folder; empty: in memory only
     std::uint32_t vocabulary_crc = 0;
   };
@@ -81,9 +87,15 @@ class InvertedIndex {
   void score(BlockScores& query, std::span<const storage::FrameRange> masked, PlaceScores& scores) const;
 
   std::uint32_t size() const;
-  std::size_t memory_bytes() const;  // including that of a running query
+  std::size_t memory_bytes() const;  // including that of as many queries as may run
 
  private:
+  // A place that is in no block yet. Immutable, so that queries score it without holding up the writer.
+  struct TailPlace {
+    PlaceWords place;
+    LogLikelihood constant;  // FabMapModel::place()
+  };
+
   Status make_room();
   Status write_blocks();
   Status open_file(Status* emptied);
@@ -96,7 +108,9 @@ class InvertedIndex {
   // What the writer reads without mutex_, since nobody else changes it. Clang cannot be told that only one thread
   // writes, so it does not check these two.
   const PackedPlaces& writers_packed() const RELMAP_NO_THREAD_SAFETY_ANALYSIS { return *packed_; }
-  const std::vector<PlaceWords>& writers_tail() const RELMAP_NO_THREAD_SAFETY_ANALYSIS { return tail_; }
+  const std::vector<std::shared_ptr<const TailPlace>>& writers_tail() const RELMAP_NO_THREAD_SAFETY_ANALYSIS {
+    return tail_;
+  }
 
   const FabMapModel& model_;
   const Options options_;
@@ -104,8 +118,7 @@ class InvertedIndex {
 
   mutable SharedMutex mutex_;
   std::shared_ptr<const PackedPlaces> packed_ RELMAP_GUARDED_BY(mutex_) = std::make_shared<const PackedPlaces>();
-  std::vector<PlaceWords> tail_ RELMAP_GUARDED_BY(mutex_);
-  std::vector<LogLikelihood> tail_constants_ RELMAP_GUARDED_BY(mutex_);
+  std::vector<std::shared_ptr<const TailPlace>> tail_ RELMAP_GUARDED_BY(mutex_);
 
   std::atomic<std::size_t> memory_ = 0;
   // The writer's own.

@@ -32,7 +32,9 @@ struct PlaceQuestion {
   CameraKnown known = CameraKnown::kMeasuredWith;
   Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
 
-  QueryPicture picture() const { return {features, *camera, masked, pair, known, eye_turn}; }  // needs a camera
+  QueryPicture picture() const {
+    return {features, *camera, masked, {}, {std::numeric_limits<std::uint64_t>::max()}, pair, known, eye_turn};
+  }  // needs a camera
 };
 
 struct Localisation {

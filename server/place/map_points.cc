@@ -125,6 +125,41 @@ class FramePoints {
   const StereoCamera& camera_;
 };
 
+// The frames around the centre, without points; no frames if the session is not stereo.
+MapPoints place_frames(const storage::Graph& graph, FrameId centre, std::uint32_t reach) {
+  MapPoints map;
+  const auto session = graph.session(centre.session);
+  if (!session || !session->header.camera.is_stereo()) return map;
+  std::uint32_t back = 0;
+  for (const PlacedFrame& placed : along_odometry(graph, centre, reach + kBaseReach, reach)) {
+    map.T_centre_base.emplace(placed.frame, placed.T_centre_frame);
+    if (placed.frame.index >= centre.index || ++back <= reach) map.frames.push_back(placed);
+  }
+  return map;
+}
+
+// Adds the points of frames `begin` to `end` of the map.
+void add_points(const storage::Graph& graph, std::size_t begin, std::size_t end,
+                const std::function<bool(FrameId)>& left_out, MapPoints& map) {
+  if (begin >= end) return;
+  const auto session = graph.session(map.frames[begin].frame.session);
+  for (std::size_t i = begin; session && i < end; ++i) {
+    const PlacedFrame& placed = map.frames[i];
+    if ((left_out && left_out(placed.frame)) || !well_known(placed)) continue;
+    const auto warm = graph.warm(placed.frame);
+    auto cold = graph.cold(placed.frame);
+    if (!warm || !cold) continue;
+    const FramePoints frame(graph, map.T_centre_base, placed, session->header.camera);
+    for (std::size_t f = 0; f < cold->appearance.size(); ++f)
+      if (auto point = frame.point_of(cold->appearance[f], *warm)) {
+        point->placed = static_cast<std::uint32_t>(i);
+        if (f < cold->words.size()) point->word = cold->words[f];
+        map.points.push_back(*point);
+      }
+    map.held.push_back(std::move(cold));
+  }
+}
+
 }  // namespace
 
 bool well_known(const PlacedFrame& placed) {
@@ -155,32 +190,18 @@ std::optional<PlacedFrame> back_along_odometry(const storage::Graph& graph, Fram
 
 MapPoints gather_points(const storage::Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out) {
-  MapPoints result;
-  const auto session = graph.session(centre.session);
-  if (!session || !session->header.camera.is_stereo()) return result;
-  const StereoCamera& camera = session->header.camera;
-
-  result.frames = along_odometry(graph, centre, reach, reach);
-  std::unordered_map<FrameId, SE3> T_centre_base;
-  for (const PlacedFrame& placed : along_odometry(graph, centre, reach + kBaseReach, reach))
-    T_centre_base.emplace(placed.frame, placed.T_centre_frame);
-
-  for (std::uint32_t i = 0; i < result.frames.size(); ++i) {
-    const PlacedFrame& placed = result.frames[i];
-    if ((left_out && left_out(placed.frame)) || !well_known(placed)) continue;
-    const auto warm = graph.warm(placed.frame);
-    auto cold = graph.cold(placed.frame);
-    if (!warm || !cold) continue;
-    const FramePoints frame(graph, T_centre_base, placed, camera);
-    for (const AppearanceFeature& feature : cold->appearance)
-      if (auto point = frame.point_of(feature, *warm)) {
-        point->placed = i;
-        result.points.push_back(*point);
-      }
-    result.held.push_back(std::move(cold));
-  }
-  return result;
+  MapPoints map = place_frames(graph, centre, reach);
+  add_points(graph, 0, map.frames.size(), left_out, map);
+  return map;
 }
+
+MapPoints gather_centre(const storage::Graph& graph, FrameId centre, std::uint32_t reach) {
+  MapPoints map = place_frames(graph, centre, reach);
+  add_points(graph, 0, std::min<std::size_t>(map.frames.size(), 1), {}, map);
+  return map;
+}
+
+void gather_rest(const storage::Graph& graph, MapPoints& map) { add_points(graph, 1, map.frames.size(), {}, map); }
 
 Matrix3 estimate_covariance(const StereoCamera& camera, const Vector3& p, double sigma, std::size_t observers) {
   return stereo_covariance(camera, p, sigma) /

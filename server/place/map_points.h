@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "proto/geometry/camera.h"
@@ -45,17 +47,22 @@ std::vector<PlacedFrame> along_odometry(const storage::Graph& graph, FrameId cen
 std::optional<PlacedFrame> back_along_odometry(const storage::Graph& graph, FrameId centre, FrameId earlier,
                                                const AcrossCarried& across = {});
 
+inline constexpr std::uint32_t kNoWord = std::numeric_limits<std::uint32_t>::max();
+
 struct MapPoint {
   Vector3 point;                           // metres, in the centre's frame
   Matrix3 covariance;                      // in the centre's frame; of the measurement, without that of T_centre_frame
   LandmarkId landmark;                     // in force; invalid for a feature that belongs to no landmark
   const Descriptor* descriptor = nullptr;  // owned by MapPoints::held
   std::uint32_t placed = 0;                // index into MapPoints::frames
+  std::uint32_t word = kNoWord;
 };
 
 struct MapPoints {
-  std::vector<PlacedFrame> frames;
-  std::vector<MapPoint> points;
+  std::vector<PlacedFrame> frames;  // the centre first
+  // Of the frames in which landmarks seen from `frames` may be based: these, and kBaseReach steps further back.
+  std::unordered_map<FrameId, SE3> T_centre_base;
+  std::vector<MapPoint> points;                                 // in the order of their frames
   std::vector<std::shared_ptr<const storage::FrameCold>> held;  // owns the descriptors
 };
 
@@ -65,6 +72,10 @@ struct MapPoints {
 // the points of frames that are not well_known() and of those for which `left_out(frame)` is true.
 MapPoints gather_points(const storage::Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out = {});
+
+// The same in two steps: the centre's points first, which cost a fraction, and then those of the other frames.
+MapPoints gather_centre(const storage::Graph& graph, FrameId centre, std::uint32_t reach);
+void gather_rest(const storage::Graph& graph, MapPoints& map);
 
 // Base frames of landmarks are searched this many steps further back than their observers.
 inline constexpr std::uint32_t kBaseReach = 15;

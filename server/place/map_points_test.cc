@@ -110,5 +110,23 @@ TEST(MatchPoints, ViewsOfOnePointDoNotCompete) {
   EXPECT_EQ(match_points({&feature, 1}, points).size(), 1u) << "one point by position";
 }
 
+TEST(GatherPoints, InTwoStepsGivesTheSamePointsAndTheCentresFirst) {
+  const SyntheticStreet street(5, 12, 0.3);
+  const MapPoints all = gather_points(street.graph, kStreetFrame, 3);
+  MapPoints map = gather_centre(street.graph, kStreetFrame, 3);
+  ASSERT_FALSE(map.points.empty());
+  ASSERT_LT(map.points.size(), all.points.size());
+  for (const MapPoint& point : map.points) EXPECT_EQ(map.frames[point.placed].frame, kStreetFrame);
+  gather_rest(street.graph, map);
+  ASSERT_EQ(map.points.size(), all.points.size());
+  for (std::size_t p = 0; p < all.points.size(); ++p) {
+    EXPECT_EQ(map.points[p].point, all.points[p].point);
+    EXPECT_EQ(map.points[p].covariance, all.points[p].covariance);
+    EXPECT_EQ(map.points[p].landmark, all.points[p].landmark);
+    EXPECT_EQ(map.points[p].descriptor, all.points[p].descriptor);
+    EXPECT_EQ(map.points[p].placed, all.points[p].placed);
+  }
+}
+
 }  // namespace
 }  // namespace relmap::place

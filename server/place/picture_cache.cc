@@ -40,20 +40,45 @@ std::shared_ptr<const FramePicture> decode(const storage::Graph& graph, FrameId 
 
 }  // namespace
 
-std::shared_ptr<const FramePicture> PictureCache::find(const storage::Graph& graph, FrameId frame) {
-  const auto known =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.frame == frame; });
-  if (known != entries_.end()) {
-    entries_.splice(entries_.begin(), entries_, known);
-  } else {
-    entries_.push_front({frame, decode(graph, frame)});
-    bytes_ += bytes_of(entries_.front().picture.get());
-    while (entries_.size() > 1 && (bytes_ > kMaxCachedBytes || entries_.size() > kMaxEntries)) {
-      bytes_ -= bytes_of(entries_.back().picture.get());
-      entries_.pop_back();
-    }
+void PictureCache::drop_oldest() {
+  while (entries_.size() > 1 && (bytes_ > kMaxCachedBytes || entries_.size() > kMaxEntries)) {
+    bytes_ -= entries_.back()->bytes;
+    entries_.pop_back();
   }
-  return entries_.front().picture;
+}
+
+std::shared_ptr<const FramePicture> PictureCache::find(const storage::Graph& graph, FrameId frame) {
+  MutexLock lock(mutex_);
+  const auto known = std::find_if(entries_.begin(), entries_.end(), [&](const auto& e) { return e->frame == frame; });
+  if (known != entries_.end())
+    entries_.splice(entries_.begin(), entries_, known);
+  else
+    entries_.push_front(std::make_shared<Entry>(Entry{frame}));
+  const std::shared_ptr<Entry> entry = entries_.front();
+  drop_oldest();
+  decoded_.wait(mutex_, [&]() RELMAP_REQUIRES(mutex_) { return entry->stage != Stage::kInWork; });
+  if (entry->stage == Stage::kDecoded) return entry->picture;
+  entry->stage = Stage::kInWork;
+  std::shared_ptr<const FramePicture> picture;
+  lock.unlock();
+  try {
+    picture = decode(graph, frame);
+  } catch (...) {
+    lock.lock();
+    entry->stage = Stage::kNew;  // for the next who wants it
+    decoded_.notify_all();
+    throw;
+  }
+  lock.lock();
+  entry->picture = picture;
+  entry->stage = Stage::kDecoded;
+  decoded_.notify_all();
+  if (std::find(entries_.begin(), entries_.end(), entry) != entries_.end()) {
+    entry->bytes = bytes_of(picture.get());
+    bytes_ += entry->bytes;
+    drop_oldest();
+  }
+  return picture;
 }
 
 }  // namespace relmap::place

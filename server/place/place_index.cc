@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
+#include <new>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "proto/base/mutex.h"
 #include "server/place/block_scores.h"
@@ -43,6 +45,12 @@ std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel
     places.clear();
   }
   return blocks;
+}
+
+std::size_t bytes_of(const std::vector<Bytes>& blocks) {
+  std::size_t bytes = 0;
+  for (const Bytes& block : blocks) bytes += block.capacity();
+  return bytes;
 }
 
 // The posterior of each place of the map.
@@ -159,50 +167,32 @@ double total(const Group& group, const PlaceMasses& masses) {
 
 }  // namespace
 
-struct PlaceIndex::Impl {
-  Impl(std::shared_ptr<const Vocabulary> v, const PlaceIndexOptions& options)
-      : vocabulary(std::move(v)),
-        model(*vocabulary),
-        samples(sample_blocks(*vocabulary, model)),
-        places(model,
-               {options.allowance - std::min(options.allowance, fixed_bytes()), options.folder, vocabulary->crc()}) {}
+// The memory of one query, reused from query to query.
+struct QueryMemory {
+  explicit QueryMemory(const FabMapModel& model) : blocks(model) {}
 
-  std::size_t fixed_bytes() {
-    const MutexLock lock(query_mutex);
-    std::size_t bytes = sizeof(Impl) + model.memory_bytes() + query.memory_bytes();
-    for (const Bytes& block : samples) bytes += block.capacity();
-    return bytes;
-  }
-  std::vector<LogLikelihood> at_samples() RELMAP_REQUIRES(query_mutex);
-  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph)
-      RELMAP_REQUIRES(query_mutex);
-
-  const std::shared_ptr<const Vocabulary> vocabulary;
-  const FabMapModel model;
-  const std::vector<Bytes> samples;
-
-  Mutex query_mutex;  // one query at a time; guards its memory
-  BlockScores query RELMAP_GUARDED_BY(query_mutex){model};
-  PlaceScores scores RELMAP_GUARDED_BY(query_mutex);
-  std::vector<storage::FrameRange> sessions_left_out RELMAP_GUARDED_BY(query_mutex);
-
-  InvertedIndex places;
-  std::atomic<std::size_t> left_out = 0;
+  BlockScores blocks;
+  PlaceScores scores;
 };
 
-std::vector<LogLikelihood> PlaceIndex::Impl::at_samples() {
+namespace {
+
+// Likelihoods of the query that was given to blocks.ask() at the sample places.
+std::vector<LogLikelihood> at_samples(std::span<const Bytes> samples, BlockScores& blocks) {
   std::vector<LogLikelihood> values;
   for (const Bytes& bytes : samples) {
     const PlaceBlock block = PlaceBlock::trusted(bytes);
     values.resize(values.size() + block.places());
-    query.of_block(block, values.data() + values.size() - block.places());
+    blocks.of_block(block, values.data() + values.size() - block.places());
   }
   return values;
 }
 
-// Answers the query that was given to query.ask() by its words alone.
-PlaceAnswer PlaceIndex::Impl::by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph) {
-  const Posterior posterior(scores, at_samples(), places_near_the_best(scores, graph), expected);
+// Answers a query by its words alone, once `memory` has its scores.
+PlaceAnswer by_words(QueryMemory& memory, std::span<const Bytes> samples, std::span<const std::uint32_t> expected,
+                     const storage::Graph& graph) {
+  const PlaceScores& scores = memory.scores;
+  const Posterior posterior(scores, at_samples(samples, memory.blocks), places_near_the_best(scores, graph), expected);
   const PlaceMasses masses(scores, posterior, expected);
   PlaceAnswer answer;
   answer.new_place = posterior.new_place();
@@ -212,6 +202,55 @@ PlaceAnswer PlaceIndex::Impl::by_words(std::span<const std::uint32_t> expected, 
   }
   most_probable_first(answer.candidates);
   return answer;
+}
+
+}  // namespace
+
+struct PlaceIndex::Impl {
+  Impl(std::shared_ptr<const Vocabulary> v, const PlaceIndexOptions& options)
+      : vocabulary(std::move(v)),
+        model(*vocabulary),
+        samples(sample_blocks(*vocabulary, model)),
+        queries(std::max<std::size_t>(options.queries, 1)),
+        fixed_bytes(sizeof(Impl) + model.memory_bytes() + queries * BlockScores(model).memory_bytes() +
+                    bytes_of(samples)),
+        places(model, {options.allowance - std::min(options.allowance, fixed_bytes), queries, options.folder,
+                       vocabulary->crc()}) {
+    const MutexLock lock(query_mutex);
+    for (std::size_t i = 0; i < queries; ++i) idle.push_back(std::make_unique<QueryMemory>(model));
+  }
+
+  std::unique_ptr<QueryMemory> take_memory();
+  void give_memory(std::unique_ptr<QueryMemory> memory);
+
+  const std::shared_ptr<const Vocabulary> vocabulary;
+  const FabMapModel model;
+  const std::vector<Bytes> samples;
+  const std::size_t queries;
+  const std::size_t fixed_bytes;  // all but the places and the queries' scores
+
+  Mutex query_mutex;
+  ConditionVariable query_ended;
+  std::vector<std::unique_ptr<QueryMemory>> idle RELMAP_GUARDED_BY(query_mutex);
+  std::vector<storage::FrameRange> sessions_left_out RELMAP_GUARDED_BY(query_mutex);
+
+  InvertedIndex places;  // its memory includes the scores of all queries
+  std::atomic<std::size_t> left_out = 0;
+};
+
+std::unique_ptr<QueryMemory> PlaceIndex::Impl::take_memory() {
+  const MutexLock lock(query_mutex);
+  query_ended.wait(query_mutex, [this]() RELMAP_REQUIRES(query_mutex) { return !idle.empty(); });
+  auto memory = std::move(idle.back());
+  idle.pop_back();
+  return memory;
+}
+
+void PlaceIndex::Impl::give_memory(std::unique_ptr<QueryMemory> memory) {
+  memory->scores.end();
+  const MutexLock lock(query_mutex);
+  idle.push_back(std::move(memory));
+  query_ended.notify_all();
 }
 
 void most_probable_first(std::vector<PlaceCandidate>& candidates) {
@@ -242,15 +281,18 @@ Status PlaceIndex::save() { return impl_->places.save(); }
 
 Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
   if (words.empty() || contains(frame)) return {};
-  if (Status added = impl_->places.add(frame, sorted_unique(words)); !added.ok()) {
-    ++impl_->left_out;
-    return added;
+  Status added;
+  try {
+    added = impl_->places.add(frame, sorted_unique(words));
+  } catch (const std::bad_alloc&) {
+    added = {Reason::BUDGET_EXCEEDED, "no memory for another place"};
   }
-  return {};
+  if (!added.ok()) ++impl_->left_out;
+  return added;
 }
 
 void PlaceIndex::leave_out(SessionNumber session) {
-  const MutexLock one_at_a_time(impl_->query_mutex);
+  const MutexLock lock(impl_->query_mutex);
   impl_->sessions_left_out.push_back({session, 0, std::numeric_limits<std::uint32_t>::max()});
 }
 
@@ -264,15 +306,18 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const storag
 
   Shortlist likeliest;
   {
-    const MutexLock one_at_a_time(impl_->query_mutex);
-    PlaceScores& scores = impl_->scores;
-    impl_->query.ask(unique);
+    const auto give = [this](QueryMemory* memory) { impl_->give_memory(std::unique_ptr<QueryMemory>(memory)); };
+    const std::unique_ptr<QueryMemory, decltype(give)> memory(impl_->take_memory().release(), give);
     std::vector<storage::FrameRange> all_masked(masked.begin(), masked.end());
-    all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
-    impl_->places.score(impl_->query, all_masked, scores);
-    const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
-    if (features.size() == words.size()) likeliest = shortlist(scores, expected, graph);
-    if (likeliest.groups < kMinGroups) return impl_->by_words(expected, graph);
+    {
+      const MutexLock lock(impl_->query_mutex);
+      all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
+    }
+    memory->blocks.ask(unique);
+    impl_->places.score(memory->blocks, all_masked, memory->scores);
+    const std::vector<std::uint32_t> expected = expected_places(memory->scores, graph, near);
+    if (features.size() == words.size()) likeliest = shortlist(memory->scores, expected, graph);
+    if (likeliest.groups < kMinGroups) return by_words(*memory, impl_->samples, expected, graph);
   }
   return compare_places({features, words}, likeliest, graph);
 }
@@ -281,7 +326,7 @@ std::size_t PlaceIndex::size() const { return impl_->places.size(); }
 
 std::size_t PlaceIndex::left_out() const { return impl_->left_out; }
 
-std::size_t PlaceIndex::memory_bytes() const { return impl_->fixed_bytes() + impl_->places.memory_bytes(); }
+std::size_t PlaceIndex::memory_bytes() const { return impl_->fixed_bytes + impl_->places.memory_bytes(); }
 
 PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
                           const storage::Graph& graph, std::span<const storage::FrameRange> masked,

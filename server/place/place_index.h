@@ -41,13 +41,15 @@ struct PlaceIndexOptions {
   std::size_t allowance = std::numeric_limits<std::size_t>::max();
   // The data folder, where DIR/places keeps the index from one start to the next. Empty: the index is in memory only.
   std::string folder;
+  // Queries at the same time, at most; others wait. The allowance keeps room for all of them: each needs memory in
+  // proportion to the number of places.
+  std::size_t queries = 1;
 };
 
 // Sorts by descending probability (equal ones by frame) and keeps the first kMaxCandidates.
 void most_probable_first(std::vector<PlaceCandidate>& candidates);
 
-// Thread-safe for one writer and any number of readers. Queries are answered one at a time, while the writer goes on,
-// since a query needs memory in proportion to the number of places.
+// Thread-safe for one writer and any number of readers.
 class PlaceIndex {
  public:
   explicit PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options = {});
@@ -86,7 +88,7 @@ class PlaceIndex {
 
   std::size_t size() const;          // places
   std::size_t left_out() const;      // places for which there was no room
-  std::size_t memory_bytes() const;  // including that of a running query
+  std::size_t memory_bytes() const;  // including that of as many queries as may run
 
  private:
   struct Impl;

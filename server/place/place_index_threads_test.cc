@@ -1,4 +1,4 @@
-// One thread adds to a place index while others ask it.
+// One thread adds to a place index while others ask it, more of them than the index answers at a time.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -25,12 +25,12 @@ TEST(PlaceIndexThreads, ReadersAndTheWriterMayWorkAtOnce) {
     for (std::uint32_t word = 0; word < vocabulary->size(); ++word)
       if (std::bernoulli_distribution(vocabulary->marginal()[word])(random)) words_of[i].push_back(word);
   }
-  PlaceIndex index(vocabulary);
+  PlaceIndex index(vocabulary, {.folder = {}, .queries = 3});
   for (std::uint32_t i = 0; i < kBefore; ++i) (void)index.add({1, i}, words_of[i]);
   std::atomic<bool> stop{false};
   std::atomic<int> asked{0}, wrong{0};
   std::vector<std::thread> readers;
-  for (int r = 0; r < 2; ++r)
+  for (int r = 0; r < 4; ++r)
     readers.emplace_back([&] {
       while (!stop) {
         const PlaceAnswer answer = index.query(words_of[kAsked], graph);

@@ -64,11 +64,11 @@ class Reobserve : public testing::Test {
   }
   std::vector<storage::ProposedBinding> find(const SE3& T_match_frame, std::uint32_t first_maskable = 0) {
     const Standpoint standpoint{kMatch, T_match_frame, covariance()};
-    return reobserve(graph_, pictures_, kFrame, {&standpoint, 1}, first_maskable).bindings;
+    return reobserve(graph_, *pictures_, kFrame, {&standpoint, 1}, first_maskable).bindings;
   }
   Changes changes_seen() {
     const Standpoint standpoint{kMatch, T_match_frame(), covariance()};
-    return changes(reobserve(graph_, pictures_, kFrame, {&standpoint, 1}, 0).sought, kCamera);
+    return changes(reobserve(graph_, *pictures_, kFrame, {&standpoint, 1}, 0).sought, kCamera);
   }
   static Matrix6 covariance() {  // 1 cm, 3 mrad
     return (Vector6() << 1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5).finished().asDiagonal();
@@ -83,7 +83,7 @@ class Reobserve : public testing::Test {
   std::mt19937 random_{1};
   std::normal_distribution<double> noise_{0, 1.5};
   HandMadeGraph graph_;
-  PictureCache pictures_;
+  std::optional<PictureCache> pictures_{std::in_place};  // emplaced anew after a picture has changed
 };
 
 TEST_F(Reobserve, MeasuresLandmarksToAFractionOfAPixelInOtherLight) {
@@ -109,11 +109,11 @@ TEST_F(Reobserve, FindsNothingWithoutFullPicturesOfBothFrames) {
   graph_.edit_cold(kFrame).picture = vision::thumbnail_of(picture);
   EXPECT_TRUE(find(T_match_frame()).empty());
   graph_.edit_cold(kFrame).picture = Bytes(6000, 0xff);
-  pictures_ = {};
+  pictures_.emplace();
   EXPECT_TRUE(find(T_match_frame()).empty());
   graph_.edit_cold(kFrame).picture = picture;
   for (std::uint32_t i = 0; i < 3; ++i) graph_.edit_cold({1, i}).picture.clear();
-  pictures_ = {};
+  pictures_.emplace();
   EXPECT_TRUE(find(T_match_frame()).empty());
 }
 
@@ -126,7 +126,7 @@ TEST_F(Reobserve, ANewObjectIsAChangeAndOtherLightIsNot) {
     for (int u = 64; u < 192; ++u)
       picture.row(v)[u] = static_cast<std::uint8_t>(std::clamp(poster.at(u, v), 0.0, 255.0));
   graph_.edit_cold(kFrame).picture = vision::encode_picture(picture);
-  pictures_ = {};
+  pictures_.emplace();
   const Changes hung = changes_seen();
   EXPECT_GE(hung.changed, 4);
   EXPECT_LE(hung.changed, 10) << "of 8 cells that it covers";
@@ -225,7 +225,7 @@ TEST_F(Reobserve, UsesPicturesInWhichLandmarksWereOnlyAligned) {
   const FrameId third{3, 0};
   add_frame(third, T_wall_frame_ * SE3{Matrix3::Identity(), {0.1, 0, 0}}, {}, {}, -10, 1.1);
   const Standpoint standpoint{kFrame, SE3{Matrix3::Identity(), {0.1, 0, 0}}, covariance()};
-  const auto bindings = reobserve(graph_, pictures_, third, {&standpoint, 1}, 0).bindings;
+  const auto bindings = reobserve(graph_, *pictures_, third, {&standpoint, 1}, 0).bindings;
   EXPECT_GT(bindings.size(), 80u);
   for (const storage::ProposedBinding& binding : bindings) EXPECT_EQ(binding.landmark.base.session, 1u);
 }

@@ -21,7 +21,7 @@ bool seen_twice(const storage::Graph& graph, const PlaceTrial& known, const Plac
   const auto cold = graph.cold(other.frame);
   const auto session = graph.session(other.frame.session);
   if (!cold || !session) return false;
-  const QueryPicture from_other{cold->appearance, session->header.camera, {}};
+  const QueryPicture from_other = query_of(*cold, session->header.camera);
   const auto seen = verify_place(graph, from_other, known.frame, seed);
   if (seen.reason() == Reason::WRONG_CALIBRATION) return true;  // the same place, seen by different cameras
   if (!seen.ok() || 2 * seen->inliers < known.verified->inliers) return false;

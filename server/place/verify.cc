@@ -27,6 +27,12 @@ constexpr double kOutOfSight = -1e9;
 // again near where the pose predicts them; otherwise kMinInliers are needed.
 constexpr int kMinToGrow = 15;
 constexpr std::size_t kGrown = 2 * kMinToGrow;
+// Fewer matches with the candidate alone, without the frames around it: it is no place. (At places that geometry
+// confirmed there were 9 and more, at four of five others fewer.)
+constexpr std::size_t kMinAlike = 8;
+// Poses that RANSAC tries: of a candidate that shows the place, about half of the matches with the centre and by words
+// agree.
+constexpr int kTrials = 1000, kQuickTrials = 200;
 // An unknown lens adapts to chance matches: 26 to 37 inliers agreed on poses up to a metre off.
 constexpr int kMinOfUnknownLens = 2 * kMinInliers;
 constexpr int kMinOfAView = 16;  // inliers in a frame of a mono session; fewer agree by chance
@@ -182,6 +188,71 @@ Result<vision::MotionAndLens> estimate_pose(const std::vector<vision::Correspond
   return vision::MotionAndLens{std::move(*motion), {camera.f, camera.cx, camera.cy}, 0};
 }
 
+// A pose of the query among the points around a candidate.
+struct Fit {
+  vision::MotionAndLens pose;
+  std::vector<DescriptorMatch> matches;  // among which the pose was found
+  // `matches`, and those by descriptors alone.
+  std::vector<vision::Correspondence> matched, alike;
+};
+
+// Estimates the pose from `alike`, matches by descriptors alone. With fewer than `sure_inliers`, kGrown must be found
+// when features are matched again near where the pose predicts them.
+Result<Fit> fit(const QueryPicture& query, const MapPoints& map, std::vector<DescriptorMatch> alike,
+                std::size_t sure_inliers, int max_trials, std::uint64_t seed) {
+  std::vector<vision::Correspondence> correspondences = correspond(query, map, alike);
+  vision::MotionOptions options;
+  options.seed = seed;
+  options.max_trials = max_trials;
+  options.min_inliers = query.camera.f > 0 ? kMinToGrow : kMinOfUnknownLens;
+  auto pose = estimate_pose(correspondences, query.camera, options);
+  if (!pose.ok()) return pose.status();
+  Fit found{*std::move(pose), std::move(alike), correspondences, correspondences};
+  if (query.camera.f == 0) return found;
+  // With the right pose, matching again near the predicted positions gains inliers; with a chance pose it does not.
+  vision::Motion& motion = found.pose.motion;
+  const bool few = motion.inliers.size() < sure_inliers;
+  auto near = match_near(query, map, motion.T_reference_camera);
+  auto closer = correspond(query, map, near);
+  options.enough = 1;  // a large share of inliers is no evidence here, since the pose selected the matches
+  auto again = vision::estimate_motion(closer, query.camera, options, &motion.T_reference_camera);
+  if (again.ok() && again->inliers.size() > motion.inliers.size()) {
+    motion = std::move(*again);
+    found.matches = std::move(near);
+    found.matched = std::move(closer);
+  }
+  if (few && motion.inliers.size() < kGrown)
+    return Status(Reason::TOO_FEW_INLIERS,
+                  std::to_string(motion.inliers.size()) +
+                      " matches near the positions that a few inliers predict agree; at least " +
+                      std::to_string(kGrown) + " must");
+  return found;
+}
+
+// Finds the pose among the points around the candidate, and gathers these into `map`. If the words of the features are
+// known, most candidates that do not show the place are told by the centre alone, and most that do by the centre and
+// the words; only the rest needs all pairs of features and points.
+Result<Fit> fit_around(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed,
+                       MapPoints& map) {
+  map = gather_centre(graph, candidate, kViewReach);
+  std::vector<DescriptorMatch> at_centre;
+  if (!query.words.empty()) {
+    at_centre = match_points(query.features, map.points);
+    if (at_centre.size() < kMinAlike)
+      return Status(Reason::TOO_FEW_INLIERS, std::to_string(at_centre.size()) + " features look like that frame's");
+  }
+  gather_rest(graph, map);
+  if (map.points.size() < static_cast<std::size_t>(kMinInliers))
+    return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
+  if (!query.words.empty()) {
+    std::vector<DescriptorMatch> alike = match_points_by_word(query.features, query.words, map.points);
+    alike.insert(alike.end(), at_centre.begin(), at_centre.end());
+    auto found = fit(query, map, nearest_of_all(std::move(alike), map.points), kGrown, kQuickTrials, seed);
+    if (found.ok() || at_centre.size() < static_cast<std::size_t>(kMinToGrow)) return found;
+  }
+  return fit(query, map, match_points(query.features, map.points), kMinInliers, kTrials, seed);
+}
+
 struct StereoPlace {
   VerifiedPlace place;
   FrameId main_frame;             // the frame from which most of the inliers come
@@ -192,51 +263,24 @@ struct StereoPlace {
 
 Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
                                   std::uint64_t seed) {
-  const MapPoints map = gather_points(graph, candidate, kViewReach);
-  if (map.points.size() < static_cast<std::size_t>(kMinInliers))
-    return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
-  std::vector<DescriptorMatch> matches = match_points(query.features, map.points);
-  std::vector<vision::Correspondence> correspondences = correspond(query, map, matches);
-  std::vector<vision::Correspondence> alike = correspondences;  // by descriptors alone
-  vision::MotionOptions options;
-  options.seed = seed;
-  options.max_trials = 1000;
-  options.min_inliers = query.camera.f > 0 ? kMinToGrow : kMinOfUnknownLens;
-  auto pose = estimate_pose(correspondences, query.camera, options);
-  if (!pose.ok()) return pose.status();
-  // With the right pose, matching again near the predicted positions gains inliers; with a chance pose it does not.
-  if (query.camera.f > 0) {
-    const bool few = pose->motion.inliers.size() < static_cast<std::size_t>(kMinInliers);
-    auto near = match_near(query, map, pose->motion.T_reference_camera);
-    auto closer = correspond(query, map, near);
-    options.enough = 1;  // a large share of inliers is no evidence here, since the pose selected the matches
-    auto motion = vision::estimate_motion(closer, query.camera, options, &pose->motion.T_reference_camera);
-    if (motion.ok() && motion->inliers.size() > pose->motion.inliers.size()) {
-      pose->motion = std::move(*motion);
-      matches = std::move(near);
-      correspondences = std::move(closer);
-    }
-    if (const std::size_t inliers = pose->motion.inliers.size(); few && inliers < kGrown)
-      return Status(Reason::TOO_FEW_INLIERS,
-                    std::to_string(inliers) +
-                        " matches near the positions that a few inliers predict agree; at least " +
-                        std::to_string(kGrown) + " must");
-  }
-  const vision::Motion& motion = pose->motion;
+  MapPoints map;
+  auto found = fit_around(graph, query, candidate, seed, map);
+  if (!found.ok()) return found.status();
+  const vision::Motion& motion = found->pose.motion;
 
   VerifiedPlace place;
   place.match = candidate;
-  place.focal_length = pose->lens.f;
+  place.focal_length = found->pose.lens.f;
   place.T_match_query = motion.T_reference_camera;
   place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;
   std::vector<vision::Correspondence> agree;
   std::size_t with_disparity = 0;
   for (const std::uint32_t i : motion.inliers) {
-    inliers.push_back(matches[i]);
-    agree.push_back(correspondences[i]);
-    place.features.push_back(matches[i].feature);
-    with_disparity += !is_mono(correspondences[i].pixel);
+    inliers.push_back(found->matches[i]);
+    agree.push_back(found->matched[i]);
+    place.features.push_back(found->matches[i].feature);
+    with_disparity += !is_mono(found->matched[i].pixel);
   }
   std::sort(place.features.begin(), place.features.end());
   place.spread = picture_spread(query.features, place.features, query.camera);
@@ -250,8 +294,8 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
   const auto main = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
-  return StereoPlace{std::move(place), map.frames[main].frame,     way,
-                     std::move(alike), std::move(correspondences), std::move(agree)};
+  return StereoPlace{std::move(place),        map.frames[main].frame,    way,
+                     std::move(found->alike), std::move(found->matched), std::move(agree)};
 }
 
 // NOT_STEREO if the right picture does not show what it should of the points in the left one. In good pairs it showed
@@ -316,6 +360,18 @@ Status allow_for_other_eye(const Vector3& turn, VerifiedPlace& place) {
 
 }  // namespace
 
+QueryPicture query_of(const storage::FrameCold& cold, const StereoCamera& camera) {
+  QueryPicture query{cold.appearance, camera};
+  if (cold.words.size() == cold.appearance.size()) query.words = cold.words;  // else some were lost
+  return query;
+}
+
+bool may_answer(const storage::Graph& graph, const QueryPicture& query, FrameId frame) {
+  if (storage::within(frame, query.masked)) return false;
+  const auto hot = graph.hot(frame);
+  return hot && storage::taken_in(*hot) <= query.taken_in;
+}
+
 bool is_contradicted(const PlaceTrial& trial) {
   const Reason reason = trial.verified.reason();
   return reason == Reason::WRONG_CALIBRATION || reason == Reason::NOT_STEREO;
@@ -344,7 +400,7 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
   if (!found.ok()) return {candidate, {}, found.status()};
   // The pose is expressed in the frame that saw most of the inliers, since the transform between the two frames may be
   // uncertain or wrong.
-  if (found->main_frame != candidate && !storage::within(found->main_frame, query.masked))
+  if (found->main_frame != candidate && may_answer(graph, query, found->main_frame))
     if (auto nearer = verify_stereo(graph, query, found->main_frame, seed); nearer.ok()) found = std::move(nearer);
   if (Status status = check_place(*found, query, session->header.camera); !status.ok())
     return {found->place.match, std::move(found->place.features), std::move(status)};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -25,7 +26,10 @@ struct QueryPicture {
   std::span<const AppearanceFeature> features;  // rectified; with disparities if the query is stereo
   // Baseline 0: mono. f 0: only the picture's size is known, and the lens is estimated with the pose.
   StereoCamera camera;
-  std::span<const storage::FrameRange> masked = {};  // frames that are no answers: the query's own recent past
+  std::span<const storage::FrameRange> masked = {};  // frames that are no answers, such as the query's own recent past
+  std::span<const std::uint32_t> words = {};         // of the features, one each; empty: not known
+  // Nor are frames that the map took in later. The default is for a picture that is not in the map.
+  storage::TakenIn taken_in = {std::numeric_limits<std::uint64_t>::max()};
   // Whether the picture is said to be one of a stereo pair; enough of what is recognised must then have a disparity.
   bool pair = false;
   CameraKnown known = CameraKnown::kMeasuredWith;
@@ -33,6 +37,12 @@ struct QueryPicture {
   // (rotation vector, radians), for which the covariance of the pose allows.
   Vector3 eye_turn = Vector3::Zero();
 };
+
+// The question with what a frame of the map saw.
+QueryPicture query_of(const storage::FrameCold& cold, const StereoCamera& camera);
+
+// Whether the frame may answer the query: it is neither masked nor later than the query, nor unknown to the graph.
+bool may_answer(const storage::Graph& graph, const QueryPicture& query, FrameId frame);
 
 inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, in both directions
 inline constexpr int kMinInliers = 20;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <random>
 
@@ -205,6 +206,107 @@ TEST_F(VerifyLookAlikes, FewInliersAreRefusedWhereOnlyAFewMoreAreFound) {
   const auto place = verify(27);
   ASSERT_FALSE(place.ok());
   EXPECT_EQ(place.reason(), Reason::TOO_FEW_INLIERS);
+}
+
+// A quarter of the features have the same word whenever they are seen; the others have another one in each picture. The
+// frame that is tried shows some of them only, so that this or the next step has to tell the place.
+class VerifyByWords : public testing::Test {
+ protected:
+  static constexpr std::size_t kSame = 4;      // one in so many has the same word
+  static constexpr std::size_t kNone = 10000;  // none has
+
+  VerifyByWords() {
+    features_ = street_.picture(street_.pose(6) * kView, true, points_);
+    for (std::uint32_t i = 0; i < 12; ++i) {
+      std::vector<std::size_t> seen;
+      street_.picture(street_.pose(i), true, seen);
+      street_.graph.edit_cold({1, i}).words = words_of(seen, i, kSame);
+    }
+  }
+  static std::vector<std::uint32_t> words_of(const std::vector<std::size_t>& points, std::uint32_t picture,
+                                             std::size_t one_in) {
+    std::vector<std::uint32_t> words;
+    for (const std::size_t point : points) {
+      const auto of_point = static_cast<std::uint32_t>(point);
+      words.push_back(point % one_in == 1 ? of_point : 100000 * (picture + 1) + of_point);
+    }
+    return words;
+  }
+  // Of what the query sees, leaves `shown` features in the frame that is tried. If they are `mixed_up`, each looks like
+  // another one.
+  void show(std::size_t shown, bool mixed_up = false) {
+    std::vector<std::size_t> points;
+    street_.picture(street_.pose(kStreetFrame.index), true, points);
+    auto& there = street_.graph.edit_cold(kStreetFrame).appearance;
+    std::vector<AppearanceFeature*> kept;
+    for (std::size_t f = 0; f < points.size(); ++f) {
+      if (kept.size() < shown && std::ranges::find(points_, points[f]) != points_.end())
+        kept.push_back(&there[f]);
+      else
+        there[f].descriptor.fill(static_cast<std::uint8_t>(200 + f % 50));
+    }
+    ASSERT_EQ(kept.size(), shown);
+    for (std::size_t k = 0; mixed_up && k + 1 < kept.size(); ++k)
+      std::swap(kept[k]->descriptor, kept[k + 1]->descriptor);
+  }
+  Result<VerifiedPlace> verify(std::size_t one_in) const {
+    QueryPicture query = as_query(features_);
+    const auto words = words_of(points_, 99, one_in);
+    query.words = words;
+    return verify_place(street_.graph, query, kStreetFrame, 7);
+  }
+  void expect_found(const Result<VerifiedPlace>& place) const {
+    ASSERT_TRUE(place.ok()) << place.status().to_string();
+    EXPECT_LT((place->T_match_query.inverse() * truth(street_, *place)).log().norm(), 1e-3);
+    EXPECT_EQ(place->inliers, verify_place(street_.graph, as_query(features_), kStreetFrame, 7)->inliers)
+        << "as by all pairs";
+  }
+
+  SyntheticStreet street_{12, 12, 0};
+  std::vector<std::size_t> points_;
+  std::vector<AppearanceFeature> features_;
+};
+
+TEST_F(VerifyByWords, WhatLittleTheFrameShowsIsEnoughWithWords) {
+  show(10);
+  expect_found(verify(kSame));
+  EXPECT_EQ(verify(kNone).reason(), Reason::TOO_FEW_INLIERS) << "without words it is not";
+}
+
+TEST_F(VerifyByWords, AFrameThatLooksTooLittleLikeTheQueryEndsTheTrial) {
+  show(7);
+  EXPECT_EQ(verify(kSame).reason(), Reason::TOO_FEW_INLIERS);
+}
+
+TEST_F(VerifyByWords, AllPairsAreMatchedWhereTheFrameLooksLikeTheQueryButNoPoseIsFound) {
+  show(18, true);
+  expect_found(verify(kNone));
+}
+
+TEST_F(VerifyByWords, APointIsCountedOnceThoughItIsDescribedTwice) {
+  show(10);
+  const auto once = verify(kSame);
+  const std::size_t count = features_.size();
+  for (std::size_t f = 0; f < count; ++f) {  // as SIFT does where it sees two orientations
+    features_.push_back(features_[f]);
+    points_.push_back(points_[f]);
+  }
+  const auto twice = verify(kSame);
+  ASSERT_TRUE(once.ok() && twice.ok());
+  EXPECT_LE(twice->inliers, once->inliers);
+}
+
+TEST_F(VerifyByWords, AnotherStreetIsRefusedByItsFrameAlone) {
+  SyntheticStreet other(4, 12, 0.5);
+  std::vector<std::size_t> points;
+  const auto features = other.picture(other.pose(6) * kView, true, points);
+  QueryPicture query = as_query(features);
+  const auto words = words_of(points, 99, kSame);
+  query.words = words;
+  const auto place = verify_place(street_.graph, query, kStreetFrame, 7);
+  EXPECT_EQ(place.reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_NE(place.status().message().find("features look like that frame's"), std::string::npos)
+      << place.status().message();
 }
 
 TEST(VerifyPlace, AnotherStreetIsRefused) {

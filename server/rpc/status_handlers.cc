@@ -60,6 +60,7 @@ void put_work(const map::MapperStats& stats, v1::GetStatusReply& reply) {
   reply.set_applied_sequence(stats.applied_sequence);
   reply.set_queued(stats.queued);
   reply.set_lookup_lag(stats.lookup_lag);
+  reply.set_lookup_lag_s(stats.lookup_lag_s);
   reply.set_pending_frames(stats.pending_frames);
   reply.mutable_relaxation()->set_p50_us(stats.rba_p50_us);
   reply.mutable_relaxation()->set_p99_us(stats.rba_p99_us);

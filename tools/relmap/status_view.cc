@@ -85,6 +85,13 @@ std::string doubt_text(const client::DoubtfulCamera& camera) {
 
 }  // namespace
 
+std::string waiting_text(const client::DaemonStatus& s) {
+  constexpr double kNoticed = 1;  // seconds
+  return counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") +
+         (s.lookup_lag_s >= kNoticed ? " (" + fixed(s.lookup_lag_s, 0) + " s behind)" : "") + ", " +
+         counted_text(s.pending_frames, "relaxation");
+}
+
 Facts needs_attention(const StatusMoment& now) {
   const client::DaemonStatus& s = now.status;
   Facts facts;
@@ -132,8 +139,7 @@ void print_status(const StatusMoment& now, bool all, terminal::Console& console)
       {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason, "none") : "none"},
       {"given up", s.gaps ? counted_text(s.gaps, "keyframe") : "none"},
       {"not taken", counts_text(s.not_taken, "none")},
-      {"waiting", counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") + ", " +
-                      counted_text(s.pending_frames, "relaxation")},
+      {"waiting", waiting_text(s)},
       {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +
                          ", max " + milliseconds(s.relaxation_max_us)},
       {"routes", routes_text(s)},

@@ -20,6 +20,9 @@ struct StatusMoment {
 // What an operator should look at, most urgent first: pairs of where it is and what is wrong.
 std::vector<std::pair<std::string, std::string>> needs_attention(const StatusMoment& now);
 
+// What waits for the daemon: records, lookups and since when, relaxations.
+std::string waiting_text(const client::DaemonStatus& status);
+
 // `all` adds details: each share of memory, the sequences of the journal, the vocabulary's source and licence.
 void print_status(const StatusMoment& now, bool all, terminal::Console& console);
 

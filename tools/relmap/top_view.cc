@@ -45,8 +45,7 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
                   counted_text(s.places, "place")},
       {"worker", rate(s.frames, before ? before->status.frames : 0, seconds) + " frames/s; relaxation p50 " +
                      fixed(s.relaxation_p50_us * 1e-3, 1) + " ms, p99 " + fixed(s.relaxation_p99_us * 1e-3, 1) + " ms"},
-      {"waiting", counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") + ", " +
-                      counted_text(s.pending_frames, "relaxation")},
+      {"waiting", waiting_text(s)},
       {"memory", terminal::bar_text(s.memory_used, s.memory_budget) + " " + terminal::bytes_text(s.memory_used) +
                      " of " + terminal::bytes_text(s.memory_budget)},
       {"shares", shares},

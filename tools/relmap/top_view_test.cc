@@ -20,6 +20,7 @@ TopMoment moment(int second, std::uint64_t frames) {
   now.status.sessions = 2;
   now.status.relaxation_p50_us = 3200;
   now.status.lookup_lag = 17;
+  now.status.lookup_lag_s = 4.2;
   now.status.memory_budget = 100 << 20;
   now.status.memory_used = 50 << 20;
   now.status.memory_shares = {{"dirty", 5 << 20, 10 << 20}, {"views", 0, 10 << 20}};
@@ -46,7 +47,7 @@ TEST(Top, ShowsTheWorkerSinceTheLastLookAndTheMemory) {
   const std::string text = shown(moment(12, 1500), moment(10, 1300));
   EXPECT_THAT(text, HasSubstr("100.0 frames/s"));
   EXPECT_THAT(text, HasSubstr("p50 3.2 ms"));
-  EXPECT_THAT(text, HasSubstr("17 place lookups"));
+  EXPECT_THAT(text, HasSubstr("17 place lookups (4 s behind)"));
   EXPECT_THAT(text, HasSubstr("dirty 5.2 MB (50 %)"));
   EXPECT_THAT(text, Not(HasSubstr("views")));
   EXPECT_THAT(text, HasSubstr("2, 1 open, 1 frozen"));
