@@ -135,6 +135,25 @@ Result<DriveTruth> read_truth(const std::string& folder) {
   return truth;
 }
 
+ClosuresJudged judge_closures(const storage::Graph& graph, const DriveTruth& truth) {
+  ClosuresJudged judged;
+  const auto truth_of = [&](FrameId frame) -> std::optional<SE3> {
+    const auto session = graph.session(frame.session);
+    const auto hot = graph.hot(frame);
+    return session && hot ? truth_at(truth, hot->time_us - session->first_time_us) : std::nullopt;
+  };
+  for (const storage::Session& session : graph.sessions())
+    for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i) {
+      const auto hot = graph.hot({session.number, i});
+      for (const storage::Edge& edge : hot ? hot->edges : std::vector<storage::Edge>{}) {
+        if (edge.kind != storage::EdgeKind::kLoop || edge.state != storage::EdgeState::kAccepted) continue;
+        const auto a = truth_of(edge.a), b = truth_of(edge.b);
+        if (a && b) ++(is_wrong((a->inverse() * *b).inverse() * edge.T_ab) ? judged.wrong : judged.right);
+      }
+    }
+  return judged;
+}
+
 DriveEvaluation evaluate_drive(const storage::Graph& graph, SessionNumber number, const DriveTruth& truth) {
   DriveEvaluation result;
   const auto session = graph.session(number);

@@ -39,6 +39,12 @@ struct DriveEvaluation {
   std::uint32_t revisits_disconnected = 0;
 };
 
+struct ClosuresJudged {
+  std::uint32_t right = 0, wrong = 0;  // accepted closures
+};
+// Judges the closures of a map all of whose sessions are the recording that `truth` is of; also those between sessions.
+ClosuresJudged judge_closures(const storage::Graph& graph, const DriveTruth& truth);
+
 // Evaluates one session of the map. Truth is assigned to keyframes by the time since the first keyframe.
 DriveEvaluation evaluate_drive(const storage::Graph& graph, SessionNumber session, const DriveTruth& truth);
 

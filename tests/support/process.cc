@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -85,6 +86,17 @@ std::size_t Process::peak_resident_bytes() const {
   for (std::string line; std::getline(status, line);)
     if (line.starts_with("VmHWM:")) return std::stoull(line.substr(6)) * 1024;
   throw std::runtime_error("no VmHWM of process " + std::to_string(pid_));
+}
+
+double Process::cpu_seconds() const {
+  const std::string text = read_text("/proc/" + std::to_string(pid_) + "/stat");
+  // The name, in parentheses, may hold blanks. User and system time are fields 14 and 15, in clock ticks.
+  std::istringstream fields(text.substr(std::min(text.size(), text.rfind(')') + 1)));
+  std::string skipped;
+  for (int field = 3; field < 14; ++field) fields >> skipped;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
 Finished run_program(const std::vector<std::string>& arguments, milliseconds patience) {

@@ -41,6 +41,8 @@ class Process {
   std::optional<int> wait(std::chrono::milliseconds patience);
   // VmHWM: the peak of resident memory, bytes.
   std::size_t peak_resident_bytes() const;
+  // User and system time since the process began, seconds.
+  double cpu_seconds() const;
 
  private:
   pid_t pid_ = -1;

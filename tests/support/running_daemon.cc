@@ -24,7 +24,7 @@ std::string random_lcm_url() {
 }
 
 std::vector<std::string> daemon_arguments(const DaemonOptions& options) {
-  std::vector<std::string> arguments{built_program("relmapd"),
+  std::vector<std::string> arguments{options.program.empty() ? built_program("relmapd") : options.program,
                                      "--data",
                                      options.data,
                                      "--listen",

@@ -20,6 +20,7 @@ struct DaemonOptions {
   std::string lcm;   // empty: off
   std::size_t memory_budget_mb = 256;
   std::vector<std::string> more;              // arguments
+  std::string program = {};                   // relmapd of another build; empty: of this one
   std::optional<Multicast> own_network = {};  // see ProcessOptions
 };
 

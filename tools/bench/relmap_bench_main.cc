@@ -28,6 +28,7 @@ const Subcommand kSubcommands[] = {
     {"fleet-robots", "Internal: a process with some robots of `fleet`", relmap::bench::declare_fleet_robots},
     {"frontend", "Run the stereo front-end alone on pictures with truth: speed, drift, covariances",
      relmap::bench::declare_frontend},
+    {"ingest", "Take in keyframes with pictures: speed, cost, lag of lookups, closures", relmap::bench::declare_ingest},
     {"places", "Measure the place index in memory, and with its lists on disk", relmap::bench::declare_places},
     {"rba", "Measure adaptive relative bundle adjustment: figure of eight, loops, laps, exploration",
      relmap::bench::declare_rba},

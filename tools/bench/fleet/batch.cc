@@ -27,20 +27,20 @@ std::vector<Keyframe> recording(const FleetLap& lap, const FleetRobot& robot, st
   return keyframes;
 }
 
-void publish(const std::string& server, const FleetRobot& robot, const std::vector<Keyframe>& keyframes) {
+}  // namespace
+
+void publish(const std::string& server, const SessionHeader& session, const std::vector<Keyframe>& keyframes) {
   publishing::PublisherOptions options;
   options.in_memory = true;
   options.spool_bytes = std::size_t{16} << 20;
-  auto publisher = publishing::Publisher::start(options, FleetLap::header(robot),
-                                                publishing::GrpcTransport::open(server, robot.name()).or_throw())
-                       .or_throw();
+  auto publisher =
+      publishing::Publisher::start(options, session, publishing::GrpcTransport::open(server, session.robot).or_throw())
+          .or_throw();
   for (const Keyframe& keyframe : keyframes)
     if (Status pushed = publisher->push(keyframe); !pushed.ok()) throw StatusError(pushed);
   if (!publisher->finish(Clock::now() + std::chrono::minutes(10)).all_settled())
-    throw std::runtime_error("not all of a batch was settled in ten minutes");
+    throw std::runtime_error("not all of a session was settled in ten minutes");
 }
-
-}  // namespace
 
 BatchSpeed run_batch(const std::string& folder, const BatchLoad& load) {
   std::filesystem::create_directories(folder);
@@ -72,7 +72,7 @@ BatchSpeed run_batch(const std::string& folder, const BatchLoad& load) {
     for (std::uint32_t i = 0; i < load.recordings; ++i)
       publishing.emplace_back([&, i] {
         try {
-          publish(options.data, robots[i], recordings[i]);
+          publish(options.data, FleetLap::header(robots[i]), recordings[i]);
         } catch (...) {
           failures[i] = std::current_exception();
         }

@@ -5,11 +5,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap::bench {
 
 // Light content: about 44 tracks and 45 features, no picture.
 inline constexpr std::size_t kLightKeyframeBytes = 8'000;
+
+// Publishes the keyframes of one session to the daemon with this data folder or address, and waits until it has settled
+// all. Throws.
+void publish(const std::string& server, const SessionHeader& session, const std::vector<Keyframe>& keyframes);
 
 struct BatchLoad {
   std::uint32_t keyframes = 0;   // of all recordings together

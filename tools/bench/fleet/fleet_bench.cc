@@ -3,7 +3,6 @@
 // daemon stands a relay that loses, holds back and doubles packets.
 #include <signal.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +11,6 @@
 #include <iostream>
 #include <limits>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <thread>
 
@@ -23,6 +21,7 @@
 #include "tests/support/running_daemon.h"
 #include "tools/bench/fleet/batch.h"
 #include "tools/bench/fleet/evaluation.h"
+#include "tools/bench/fleet/killed_daemon.h"
 #include "tools/bench/fleet/relay.h"
 #include "tools/bench/fleet/trouble.h"
 #include "tools/bench/stopwatch.h"
@@ -52,64 +51,12 @@ struct FleetOptions {
   std::string folder;
 };
 
-double cpu_seconds_of(pid_t pid) {
-  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-  std::string text;
-  std::getline(stat, text);
-  std::istringstream fields(text.substr(std::min(text.size(), text.rfind(')') + 1)));
-  std::string skipped;
-  for (int field = 3; field < 14; ++field) fields >> skipped;
-  double user = 0, system = 0;
-  fields >> user >> system;
-  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
-}
-
 double own_cpu_seconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
   const auto s = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
   return s(usage.ru_utime) + s(usage.ru_stime);
 }
-
-// relmapd from start to start: what its processes cost together.
-class FleetDaemon {
- public:
-  explicit FleetDaemon(testing::DaemonOptions options) : options_(std::move(options)) { start(); }
-
-  // kill -9, and up again. When the new process was started.
-  std::int64_t restart() {
-    note();
-    cpu_before_ += cpu_seconds_of(running_->process().pid());
-    running_->process().kill();
-    const std::int64_t at = monotonic_ns();
-    start();
-    return at;
-  }
-  void stop() {
-    note();
-    if (running_->stop() != 0) std::cerr << "relmapd did not stop as it should: " << running_->log() << '\n';
-  }
-  double cpu() const { return cpu_before_ + cpu_seconds_of(running_->process().pid()); }
-  double peak_resident_mb() {
-    note();
-    return static_cast<double>(peak_resident_) / (1 << 20);
-  }
-  RunningDaemon& running() { return *running_; }
-
- private:
-  void start() {
-    running_.reset();
-    const std::int64_t begin_ns = monotonic_ns();
-    running_ = std::make_unique<RunningDaemon>(options_);
-    std::cerr << "relmapd serves after " << 1e-9 * static_cast<double>(monotonic_ns() - begin_ns) << " s\n";
-  }
-  void note() { peak_resident_ = std::max(peak_resident_, running_->process().peak_resident_bytes()); }
-
-  const testing::DaemonOptions options_;
-  std::unique_ptr<RunningDaemon> running_;
-  double cpu_before_ = 0;
-  std::size_t peak_resident_ = 0;
-};
 
 // Robots to be killed are processes of their own; the others share one.
 class FleetProcesses {
@@ -122,7 +69,7 @@ class FleetProcesses {
   }
 
   std::int64_t restart(std::uint32_t robot) {
-    cpu_before_ += cpu_seconds_of(processes_[robot]->pid());
+    cpu_before_ += processes_[robot]->cpu_seconds();
     processes_[robot]->kill();
     const std::int64_t at = monotonic_ns();
     processes_[robot] = start(robot, 1);
@@ -131,7 +78,7 @@ class FleetProcesses {
 
   double cpu() const {
     double cpu = cpu_before_;
-    for (const auto& process : processes_) cpu += cpu_seconds_of(process->pid());
+    for (const auto& process : processes_) cpu += process->cpu_seconds();
     return cpu;
   }
   void check() const {
@@ -387,7 +334,7 @@ class FleetRun {
   const std::pair<std::string, std::string> groups_;  // LCM URLs: of the robots, of the daemon
   Relay relay_;
   const FleetLap lap_;
-  FleetDaemon daemon_;
+  KilledDaemon daemon_;
   FleetProcesses processes_;
   std::unique_ptr<Flooder> flooder_;
   std::unique_ptr<GarbageSender> garbage_;
