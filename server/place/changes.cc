@@ -7,6 +7,7 @@
 
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
+#include "server/place/pixels_by_row.h"
 
 namespace relmap::place {
 namespace {
@@ -64,10 +65,9 @@ float differing_share(const storage::Graph& graph, const QueryPicture& query, co
   std::array<Cell, kPictureCells> cells;
   const auto cell_of = [&](double u, double v) -> Cell& { return cells[picture_cell(query.camera, u, v)]; };
   for (const AppearanceFeature& feature : query.features) ++cell_of(feature.u, feature.v).features;
-  std::vector<const AppearanceFeature*> by_row;
-  for (const AppearanceFeature& feature : query.features) by_row.push_back(&feature);
-  const auto row = [](const AppearanceFeature* feature) { return double{feature->v}; };
-  std::ranges::sort(by_row, {}, row);
+  std::vector<Vector2> pixels;
+  for (const AppearanceFeature& feature : query.features) pixels.emplace_back(feature.u, feature.v);
+  const PixelsByRow by_row(pixels);
 
   const MapPoints map = gather_points(graph, place.match, kViewReach);
   const SE3 T_query_match = place.T_match_query.inverse();
@@ -81,13 +81,10 @@ float differing_share(const storage::Graph& graph, const QueryPicture& query, co
     Cell& cell = cell_of(at.x(), at.y());
     const auto there = [&](const Vector2& other) { return (other - at).norm() < kOnePointPixels; };
     if (std::none_of(cell.expected.begin(), cell.expected.end(), there)) cell.expected.push_back(at);
-    for (auto near = std::ranges::lower_bound(by_row, at.y() - radius, {}, row);
-         near != by_row.end() && row(*near) <= at.y() + radius; ++near) {
-      const Vector2 seen((*near)->u, (*near)->v);
-      if ((seen - at).squaredNorm() < radius * radius &&
-          squared_distance((*near)->descriptor, *point.descriptor) <= kMaxDescriptorDistance)
-        cell.found = cell_of(seen.x(), seen.y()).found = true;
-    }
+    by_row.visit_near(at, radius, [&](std::uint32_t f) {
+      if (squared_distance(query.features[f].descriptor, *point.descriptor) <= kMaxDescriptorDistance)
+        cell.found = cell_of(pixels[f].x(), pixels[f].y()).found = true;
+    });
   }
   int both = 0, differ = 0;
   for (const Cell& cell : cells) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <unordered_map>
 #include <unordered_set>
 
 #include "proto/geometry/covariance.h"
 #include "server/place/descriptor_sketch.h"
+#include "server/place/pixels_by_row.h"
 
 namespace relmap::place {
 namespace {
@@ -19,35 +19,6 @@ bool one_point(const MapPoint& p, const MapPoint& q) {
   return mahalanobis_squared(apart, covariance) < 16;
 }
 
-// The points that are expected near a feature.
-class PossiblePoints {
- public:
-  explicit PossiblePoints(const ExpectedPoints& expected) : expected_(expected) {
-    for (std::uint32_t p = 0; p < expected.at.size(); ++p)
-      if (expected.at[p].allFinite()) order_.push_back(p);
-    std::sort(order_.begin(), order_.end(), [&](std::uint32_t p, std::uint32_t q) { return y(p) < y(q); });
-  }
-
-  // In ascending order; valid until the next call.
-  std::span<const std::uint32_t> of(const AppearanceFeature& feature) {
-    near_.clear();
-    const Vector2 seen(feature.u, feature.v);
-    auto p = std::partition_point(order_.begin(), order_.end(),
-                                  [&](std::uint32_t q) { return y(q) < seen.y() - expected_.radius; });
-    for (; p != order_.end() && y(*p) <= seen.y() + expected_.radius; ++p)
-      if ((seen - expected_.at[*p]).squaredNorm() < expected_.radius * expected_.radius) near_.push_back(*p);
-    std::sort(near_.begin(), near_.end());
-    return near_;
-  }
-
- private:
-  double y(std::uint32_t point) const { return expected_.at[point].y(); }
-
-  const ExpectedPoints& expected_;
-  std::vector<std::uint32_t> order_;  // ascending by where they are expected
-  std::vector<std::uint32_t> near_;
-};
-
 struct Nearest {
   std::uint32_t index = 0, distance = std::numeric_limits<std::uint32_t>::max();
 
@@ -56,22 +27,6 @@ struct Nearest {
     if (its_distance < distance) *this = {other, its_distance};
   }
 };
-
-// Keeps the best match of each landmark, since two features may have matched two views of it.
-std::vector<DescriptorMatch> nearest_of_each_landmark(const std::vector<DescriptorMatch>& matches,
-                                                      std::span<const MapPoint> points) {
-  std::unordered_map<LandmarkId, std::size_t> best;
-  const auto landmark_of = [&](std::size_t i) { return points[matches[i].point].landmark; };
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!landmark_of(i).valid()) continue;
-    const auto [held, fresh] = best.emplace(landmark_of(i), i);
-    if (!fresh && matches[i].distance < matches[held->second].distance) held->second = i;
-  }
-  std::vector<DescriptorMatch> result;
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (!landmark_of(i).valid() || best.at(landmark_of(i)) == i) result.push_back(matches[i]);
-  return result;
-}
 
 // Returns mutual nearest neighbours that pass the ratio test. `possible(max, f)` returns the points, ascending, that
 // feature f may be, all of those within the squared distance `max` among them.
@@ -123,8 +78,15 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
                                                const ExpectedPoints* expected) {
   // Where few points are possible, their distances cost less than sketches do.
   if (expected) {
-    PossiblePoints possible(*expected);
-    return match(features, points, same, [&](std::uint32_t, std::uint32_t f) { return possible.of(features[f]); });
+    const PixelsByRow by_row(expected->at);
+    std::vector<std::uint32_t> near;
+    return match(features, points, same, [&](std::uint32_t, std::uint32_t f) {
+      near.clear();
+      const Vector2 seen(features[f].u, features[f].v);
+      by_row.visit_near(seen, expected->radius, [&](std::uint32_t p) { near.push_back(p); });
+      std::sort(near.begin(), near.end());
+      return std::span<const std::uint32_t>(near);
+    });
   }
   const DescriptorSketches of_points(points);
   std::vector<DescriptorSketch> of_features;
@@ -139,8 +101,7 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
 
 std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
                                           const ExpectedPoints* expected) {
-  return nearest_of_each_landmark(match_descriptors(features, descriptors_of(points), SamePoint{points}, expected),
-                                  points);
+  return nearest_of_all(match_descriptors(features, descriptors_of(points), SamePoint{points}, expected), points);
 }
 
 std::vector<DescriptorMatch> match_points_by_word(std::span<const AppearanceFeature> features,
@@ -155,7 +116,7 @@ std::vector<DescriptorMatch> match_points_by_word(std::span<const AppearanceFeat
     const auto found = std::ranges::equal_range(order, words[f], {}, word);
     return std::span<const std::uint32_t>(found.begin(), found.end());
   };
-  return nearest_of_each_landmark(match(features, descriptors_of(points), SamePoint{points}, of_word), points);
+  return nearest_of_all(match(features, descriptors_of(points), SamePoint{points}, of_word), points);
 }
 
 std::vector<DescriptorMatch> nearest_of_all(std::vector<DescriptorMatch> matches, std::span<const MapPoint> points) {
