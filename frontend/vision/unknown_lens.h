@@ -16,8 +16,9 @@ struct MotionAndLens {
 
 // Like estimate_motion(), for a camera of which only the picture's size is known: nothing else of `camera` is read, and
 // disparities are not used. It tries focal lengths of 0.4 to 4 times the longer side, without distortion and with that
-// of a wide lens. From the one with the most inliers, pose and lens are refined together; the number of inliers grows
-// as the lens becomes known. The covariance is the marginal one of the pose.
+// of a wide lens. From each of the few with the most inliers, pose and lens are refined together; the number of inliers
+// grows as the lens becomes known. What then explains the correspondences best is the answer. The covariance is the
+// marginal one of the pose.
 //
 // The prior of the lens, in standard deviations: k1 moves the picture's corners by a share s of their distance from the
 // centre, and k2 by s / 2, where s is 2 % + tan^2(a) / 5, but at most 20 %, for a corner at the angle a from the
