@@ -53,6 +53,7 @@ class FileVocabulary final : public Vocabulary {
     return result;
   }
 
+  const Descriptor& centroid(std::uint32_t word) const override { return tables_.centroids[word]; }
   std::span<const float> marginal() const override { return tables_.marginal; }
   std::span<const std::uint32_t> parent() const override { return tables_.parent; }
   std::span<const float> given_parent_absent() const override { return tables_.given_parent_absent; }

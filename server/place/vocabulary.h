@@ -2,6 +2,7 @@
 // file that is memory-mapped.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -30,6 +31,9 @@ class Vocabulary {
 
   // The word of each feature: the nearest centroid among the words of the 8 branches nearest to the feature.
   virtual std::vector<std::uint32_t> words(std::span<const AppearanceFeature> features) const = 0;
+
+  // The descriptor that stands for the word.
+  virtual const std::array<std::uint8_t, 128>& centroid(std::uint32_t word) const = 0;
 
   // For each word: p(z = 1), its parent in the tree (the root is its own), and p(z = 1) given that the parent is absent
   // or present.

@@ -38,6 +38,8 @@ const Subcommand kSubcommands[] = {
      relmap::bench::declare_storage},
     {"unpack", "Unpack raw frames of a stereo camera, in comparison with a copy of as many bytes",
      relmap::bench::declare_unpack},
+    {"vast", "A town driven for 150 km by a fleet, through a daemon that is killed and asked meanwhile",
+     relmap::bench::declare_vast},
 };
 
 }  // namespace

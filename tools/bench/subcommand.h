@@ -31,5 +31,6 @@ Run declare_rides(CLI::App& app);
 Run declare_routes(CLI::App& app);
 Run declare_storage(CLI::App& app);
 Run declare_unpack(CLI::App& app);
+Run declare_vast(CLI::App& app);
 
 }  // namespace relmap::bench
