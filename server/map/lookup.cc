@@ -75,6 +75,12 @@ std::optional<FrameId> step_back(const storage::Graph& graph, FrameId frame, con
   return std::nullopt;
 }
 
+// Whether the robot stood still for most of the time since the frame before.
+bool stood_before(const storage::FrameHot& hot) {
+  if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return false;
+  return hot.edges.front().standing_s > hot.edges.front().driven_s;
+}
+
 // Whether the verification with the older view, or a frame next to it, places the query about where the map has it.
 bool stands_at(const storage::Graph& view, const place::OlderView& older, const place::VerifiedPlace& found) {
   const auto T_older_match = place::way_beside(view, older.frame, found.match, place::kViewReach);
@@ -146,16 +152,21 @@ storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::Pi
 }
 
 std::uint32_t first_recent(const storage::Graph& graph, FrameId query) {
-  const std::int64_t now = graph.hot(query)->time_us;
   FrameId frame = query;
-  for (std::uint32_t edges = 0;; ++edges) {
+  std::int64_t time_us = graph.hot(query)->time_us, driving_us = 0;
+  for (std::uint32_t edges = 0, driven = 0; edges <= kMaxRecentEdges; ++edges) {
     const auto hot = graph.hot(frame);
-    const bool recent = edges <= kMaxRecentEdges && now - hot->time_us <= kRecentMicroseconds;
-    if (edges > kRecentEdges && !recent) return frame.index + 1;
+    driving_us += time_us - hot->time_us;
+    time_us = hot->time_us;
+    if (driven > kRecentEdges && driving_us > kRecentMicroseconds) return frame.index + 1;
     const auto previous = step_back(graph, frame, *hot);
     if (!previous) return frame.index;
+    const bool stood = stood_before(*hot);
+    driven += !stood;
+    if (stood) time_us = graph.hot(*previous)->time_us;
     frame = *previous;
   }
+  return frame.index + 1;
 }
 
 storage::FrameRange recent_past(const storage::Graph& graph, FrameId query) {

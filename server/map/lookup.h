@@ -16,8 +16,10 @@
 namespace relmap::map {
 
 // Index of the query's oldest recent frame. It and later frames of the session are too near to the query in its own
-// past to count as recognition. Recent is within 20 odometry edges, or within 10 s but at most 1,000 edges; in a mono
-// session, which has no edges, consecutive frames count instead (docs/method.md, 7).
+// past to count as recognition. Recent is within 20 odometry edges or within 10 s, but at most 1,000 edges. Where the
+// robot stood still counts for neither: what it sees before and after a stop is one view of one place, which may be the
+// cabin of a lift that carries it. In a mono session, which has no edges, consecutive frames count instead
+// (docs/method.md, 7).
 inline constexpr std::uint32_t kRecentEdges = 20;
 inline constexpr std::uint32_t kMaxRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;

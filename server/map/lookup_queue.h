@@ -24,8 +24,9 @@
 
 namespace relmap::map {
 
-// Frames that wait at once. At the 150 keyframes a second that two cores take in, the last of them waits for 7 s.
-inline constexpr std::size_t kMaxWaiting = 1024;
+// Frames that wait at once. While there are so many, robots wait, and send later, instead of learning later where they
+// are. At the 30 lookups a second of a single thread where every frame returns to a place, the last waits for 9 s.
+inline constexpr std::size_t kMaxWaiting = 256;
 
 // Thread-safe.
 class LookupQueue {
@@ -69,7 +70,6 @@ class LookupQueue {
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
   // Whether kMaxWaiting frames wait, so that no more keyframes should be taken in before some have been looked up.
-  // Robots then send later, instead of learning later where they are.
   bool is_full() const;
 
  private:

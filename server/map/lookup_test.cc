@@ -38,6 +38,27 @@ TEST(FirstRecent, IsAThousandFramesBackAtMost) {
   EXPECT_EQ(first_recent(session_of(place::kMonoCamera, 1300, 1), {1, 1250}), 250u);
 }
 
+// In a lift a robot sees the cabin before and after it was carried.
+TEST(FirstRecent, DoesNotCountWhereTheRobotStoodStill) {
+  place::HandMadeGraph graph;
+  graph.add_session(1, place::kStereoCamera);
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    storage::FrameHot hot;
+    hot.time_us = std::int64_t{i} * 1'000'000;
+    graph.add_frame({1, i}, std::move(hot));
+    if (i == 0) continue;
+    graph.add_edge({1, i - 1}, {1, i}, 0);
+    storage::Edge& step = graph.edit_hot({1, i}).edges.front();
+    const bool stood = i > 100 && i <= 130;
+    (stood ? step.standing_s : step.driven_s) = 1;
+  }
+  EXPECT_EQ(first_recent(graph, {1, 100}), 80u);
+  EXPECT_EQ(first_recent(graph, {1, 130}), 80u);
+  EXPECT_EQ(first_recent(graph, {1, 140}), 90u);
+  EXPECT_EQ(first_recent(graph, {1, 150}), 100u);
+  EXPECT_EQ(first_recent(graph, {1, 151}), 131u);
+}
+
 TEST(FirstRecent, EndsWhereAMonoSessionIsBroken) {
   place::HandMadeGraph graph;
   graph.add_session(1, place::kMonoCamera);

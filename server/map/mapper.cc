@@ -447,8 +447,11 @@ Status Mapper::Impl::submit(storage::JournalRecord record, Done done) {
   if (budget->used(storage::Share::kDirty) > budget->allowance(storage::Share::kDirty))
     if (Status status = health(); !status.ok()) return status;
   // Lookups share the queue's memory, and what they find must still fit in.
-  if (std::holds_alternative<storage::KeyframeRecord>(record) && lookups.is_full())
-    return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
+  if (std::holds_alternative<storage::KeyframeRecord>(record)) {
+    if (lookups.is_full()) return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
+    if (durable.lag_s() > static_cast<double>(kMaxWorkerLag.count()))
+      return {Reason::BUDGET_EXCEEDED, "the worker is too far behind"};
+  }
   return writer->submit(std::move(record), std::move(done));
 }
 

@@ -49,8 +49,14 @@ Status feed(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t from, s
   for (std::uint32_t i = from; i < to; ++i) {
     storage::KeyframeRecord record = keyframe_record(world, i);
     record.session = *session;
-    if (const Status submitted = mapper.submit(std::move(record), [](const Result<std::uint64_t>&) {}); !submitted.ok())
-      return submitted;
+    const auto deadline = soon();
+    for (;;) {
+      const Status submitted = mapper.submit(record, [](const Result<std::uint64_t>&) {});
+      if (submitted.ok()) break;
+      const bool behind = submitted.reason() == Reason::BUDGET_EXCEEDED;
+      if (!behind || std::chrono::steady_clock::now() > deadline) return submitted;
+      std::this_thread::sleep_for(5ms);
+    }
   }
   return mapper.wait_idle(soon());
 }

@@ -32,9 +32,10 @@ RecordQueue::~RecordQueue() {
 
 void RecordQueue::push(std::vector<DurableRecord> group) {
   const MutexLock lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
   for (DurableRecord& record : group) {
     const bool is_keyframe = std::holds_alternative<storage::KeyframeRecord>(record.record);
-    entries_.push_back({{std::move(record), {}}, is_keyframe ? Stage::kWaits : Stage::kReady});
+    entries_.push_back({{std::move(record), {}}, is_keyframe ? Stage::kWaits : Stage::kReady, now});
   }
   changed_.notify_all();
 }
@@ -42,6 +43,12 @@ void RecordQueue::push(std::vector<DurableRecord> group) {
 std::size_t RecordQueue::size() const {
   const MutexLock lock(mutex_);
   return entries_.size();
+}
+
+double RecordQueue::lag_s() const {
+  const MutexLock lock(mutex_);
+  if (entries_.empty()) return 0;
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - entries_.front().pushed).count();
 }
 
 RecordQueue::Next RecordQueue::take() {

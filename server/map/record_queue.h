@@ -2,6 +2,7 @@
 // worker is at others, so that it does only what needs the map. Records leave in the order in which they came.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -16,6 +17,9 @@
 #include "storage/memory/budget.h"
 
 namespace relmap::map {
+
+// Beyond this robots wait: the worker is behind by so much, and a start after a crash has to do all of it again.
+inline constexpr std::chrono::seconds kMaxWorkerLag{1};
 
 // Thread-safe; one thread takes.
 class RecordQueue {
@@ -34,6 +38,8 @@ class RecordQueue {
   void push(std::vector<DurableRecord> group);
   bool empty() const { return size() == 0; }
   std::size_t size() const;
+  // For how many seconds the first record has waited for the worker; 0 if none waits.
+  double lag_s() const;
   // Takes the first record; there must be one. Waits for a thread that is preparing it, but for none to begin.
   Next take();
 
@@ -42,6 +48,7 @@ class RecordQueue {
   struct Entry {
     Next next;
     Stage stage = Stage::kWaits;
+    std::chrono::steady_clock::time_point pushed;
   };
 
   void run();

@@ -42,6 +42,20 @@ std::vector<std::uint32_t> some_words(std::span<const AppearanceFeature> feature
 
 std::shared_ptr<storage::Budget> budget() { return std::make_shared<storage::Budget>(std::size_t{1} << 20); }
 
+TEST(RecordQueueTest, TheLagIsThatOfTheFirstRecord) {
+  RecordQueue queue(some_words, budget(), 1);
+  EXPECT_EQ(queue.lag_s(), 0);
+  queue.push(records(1));
+  std::this_thread::sleep_for(30ms);
+  queue.push(records(1));
+  EXPECT_GE(queue.lag_s(), 0.03);
+  const double before = queue.lag_s();
+  (void)queue.take();
+  EXPECT_LE(queue.lag_s(), before);
+  (void)queue.take();
+  EXPECT_EQ(queue.lag_s(), 0);
+}
+
 TEST(RecordQueueTest, RecordsLeaveInTheirOrderWithWhatWasPrepared) {
   constexpr std::uint32_t kFrames = 60;
   RecordQueue queue(some_words, budget(), 3);
