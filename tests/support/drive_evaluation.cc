@@ -111,6 +111,12 @@ std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start) {
 
 bool is_wrong(const SE3& error) { return error.t.norm() > kWrongMetres || rotation_angle(error.R) > kWrongRadians; }
 
+bool is_wrong(const SE3& error, const Matrix6& covariance) {
+  const double metres = 3 * std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+  const double radians = 3 * std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
+  return error.t.norm() > std::max(kWrongMetres, metres) || rotation_angle(error.R) > std::max(kWrongRadians, radians);
+}
+
 Result<DriveTruth> read_truth(const std::string& folder) {
   DriveTruth truth;
   std::string file = folder + "/poses.txt";

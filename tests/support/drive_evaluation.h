@@ -23,6 +23,8 @@ std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start);
 
 // Whether a closure with this error is wrong: more than 0.5 m or 10 degrees.
 bool is_wrong(const SE3& error);
+// Whether it is besides off by more than its covariance tells: by more than three sigmas in place or in rotation.
+bool is_wrong(const SE3& error, const Matrix6& covariance);
 
 struct DriveEvaluation {
   std::uint32_t keyframes = 0;

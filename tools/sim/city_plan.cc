@@ -14,20 +14,6 @@ constexpr double kToOtherLane = 0.3;  // probability, at each crossing
 constexpr double kStraightOn = 0.5;
 constexpr int kCurvePieces = 32;  // of a curve whose length is summed up
 
-Vector2 direction_of(Heading heading) {
-  switch (heading) {
-    case Heading::kNorth:
-      return {0, 1};
-    case Heading::kEast:
-      return {1, 0};
-    case Heading::kSouth:
-      return {0, -1};
-    case Heading::kWest:
-      return {-1, 0};
-  }
-  return {0, 1};
-}
-
 Heading heading_of(PieceId piece) { return static_cast<Heading>(piece % 4); }
 Heading turned(Heading heading, int quarters) {
   return static_cast<Heading>((static_cast<int>(heading) + 4 + quarters) % 4);
@@ -86,6 +72,20 @@ PlanePose pose_of(const Vector2& place, const Vector2& direction) {
 }
 
 }  // namespace
+
+Vector2 direction_of(Heading heading) {
+  switch (heading) {
+    case Heading::kNorth:
+      return {0, 1};
+    case Heading::kEast:
+      return {1, 0};
+    case Heading::kSouth:
+      return {0, -1};
+    case Heading::kWest:
+      return {-1, 0};
+  }
+  return {0, 1};
+}
 
 CityPlan::CityPlan(const CityOptions& options) {
   assert(options.columns >= 2 && options.rows >= 2 && options.min_block > 2 * kHalfStreet);

@@ -21,6 +21,7 @@ struct CityOptions {
 };
 
 enum class Heading : std::uint8_t { kNorth, kEast, kSouth, kWest };
+Vector2 direction_of(Heading heading);  // x, z; of length 1
 
 // One direction of a street between two neighbouring crossings: 4 * the crossing that it leaves + its heading.
 using PieceId = std::uint32_t;

@@ -22,8 +22,8 @@ constexpr double kSameWay = 0.64;        // cosine of the largest angle between 
 constexpr double kThroughTheDoor = 0.4;  // part of what is outside that is seen from a cabin
 constexpr std::uint32_t kPass = 1024;    // frames: after these, a robot sees other points of a street
 constexpr std::uint32_t kCabinPoints = 260, kCabinTracked = 140;
-constexpr std::uint32_t kCornerPoints = 200, kCornerTracked = 90;  // of each corner and each closed side
-constexpr std::uint32_t kKeepCells = 64;                           // frames that an unused cell is kept
+constexpr std::uint32_t kCornerPoints = 400, kCornerTracked = 180;  // of each corner and each closed side
+constexpr std::uint32_t kKeepCells = 64;                            // frames that an unused cell is kept
 constexpr std::size_t kMaxDescriptors = 20'000;
 constexpr double kBorder = 4;       // pixels
 constexpr double kPointSize = 0.3;  // metres: the described region
@@ -122,6 +122,7 @@ std::vector<CityWorld::Point> CityWorld::crossing_points(std::size_t crossing) c
       const double up = random.uniform(-0.2, 6);
       point.at = {centre.x() + plane.x(), kCameraHeight - up, centre.y() + plane.y()};
       point.from = random.uniform(kMinCorner, kMaxCorner);
+      point.facing = static_cast<Heading>(random.bits() % 4);
       points.push_back(point);
     }
   }
@@ -232,7 +233,10 @@ void CityRobot::look_at_crossing(std::size_t crossing, const SE3& T_frame_world,
   const auto [cell, fresh] = cells_.try_emplace(crossing_id(crossing));
   if (fresh) cell->second.points = world_.crossing_points(crossing);
   cell->second.used = i;
+  const Vector3 ahead = T_frame_world.R.row(2);
   for (const CityWorld::Point& point : cell->second.points) {
+    const Vector2 facing = direction_of(point.facing);
+    if (ahead.x() * facing.x() + ahead.z() * facing.y() < kSameWay) continue;
     const Vector3 in_frame = T_frame_world * point.at;
     if (in_frame.z() <= point.from && visible(in_frame) && shown(point, i, part)) seen.push_back({&point, in_frame});
   }

@@ -2,7 +2,7 @@
 //
 // The houses and kerbs of each direction of each street have points, and so have the corners of crossings. A robot sees
 // those before it, from both lanes the same ones, nearer or farther; on each pass it sees another part of them. Driving
-// the other way shows other points, as a camera that looks forward sees the other sides of things. Some
+// another way shows other points, as a camera that looks forward sees the other sides of things. Some
 // stretches of streets look nearly like others. In the cabin of a train it sees the cabin alone.
 //
 // Everything is a function of the options. A keyframe's tracks go on from one frame to the next, so that a robot makes
@@ -40,7 +40,7 @@ struct CityWorldOptions {
   double copied_share = 0.6;                     // of the points of a copied stretch
 
   double speed = 5;                                                          // m/s
-  double pixel_noise = 0.7;                                                  // sigma of u_left, v and u_right, px
+  double pixel_noise = 0.5;                                                  // sigma of u_left, v and u_right, px
   double step_noise_m = 0.01, step_noise_rad = 0.05 * 0.017453292519943295;  // sigma of the odometry step, per axis
   // Of a point's descriptor: the largest change of an entry in a pass, and again in a frame; and the probability that
   // light, viewpoint or a wrong orientation make it another one altogether. On a rendered drive, descriptors of a track
@@ -64,6 +64,7 @@ class CityWorld {
     std::uint64_t style = 0;
     Vector3 at;       // in the world, or in the cabin: x right, y down, z ahead, metres
     double from = 0;  // seen from at most so many metres before it, along the piece or the robot's view
+    Heading facing = Heading::kNorth;  // of a crossing: seen by who drives about this way
     bool tracked = false;
   };
   // The points of the metre that begins `metre` metres along the piece; of the cabin of a robot's ride.

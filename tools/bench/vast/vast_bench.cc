@@ -53,7 +53,8 @@ void report_run(const VastProgress& progress, const VastOptions& options, const 
   report.add("place_p50_ms", median(progress.place_ms), "where a frame is, over RPC, while it streamed");
   report.add("place_p99_ms", p99(progress.place_ms), "");
   report.add("places_found", static_cast<double>(progress.places_found), "of these questions");
-  report.add("places_wrong", static_cast<double>(progress.places_wrong), "found more than 0.5 m or 10 degrees off");
+  report.add("places_wrong", static_cast<double>(progress.places_wrong),
+             "off by more than 0.5 m or 10 degrees, and three sigmas");
 }
 
 void report_map(const VastVerdict& verdict, Report& report) {
@@ -63,7 +64,9 @@ void report_map(const VastVerdict& verdict, Report& report) {
   report.add("driven_km", verdict.metres / 1000, "by all robots");
   report.add("streets_km", verdict.street_metres / 1000, "in the town");
   report.add("closures_right", static_cast<double>(verdict.closures_right), "in force, within 0.5 m and 10 degrees");
-  report.add("closures_wrong", static_cast<double>(verdict.closures_wrong), "in force, beyond that");
+  report.add("closures_vague", static_cast<double>(verdict.closures_vague),
+             "in force, beyond that, as their covariance tells");
+  report.add("closures_wrong", static_cast<double>(verdict.closures_wrong), "in force, beyond that and three sigmas");
   report.add("revisits", static_cast<double>(verdict.revisits), "frames where an earlier one had stood");
   report.add(
       "revisits_bound_share",

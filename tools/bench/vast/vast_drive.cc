@@ -275,7 +275,8 @@ class VastRun {
       if (!robot) robot = std::make_unique<sim::CityRobot>(town_.robot(town_.robot_of(session->name)));
       return robot->T_world_frame(of.index);
     };
-    return testing::is_wrong((pose(place.frame).inverse() * pose(frame)).inverse() * place.T_frame_view);
+    return testing::is_wrong((pose(place.frame).inverse() * pose(frame)).inverse() * place.T_frame_view,
+                             place.covariance);
   }
 
   // The picture is no part of the measurement: if it cannot be drawn, the reason is told.

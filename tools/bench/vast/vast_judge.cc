@@ -136,14 +136,15 @@ class TownJudge {
       }
       if (edge.state != storage::EdgeState::kAccepted) continue;
       const SE3 error = (truth(edge.a).inverse() * truth(edge.b)).inverse() * edge.T_ab;
-      if (!testing::is_wrong(error)) {
-        ++verdict.closures_right;
+      if (!testing::is_wrong(error, edge.covariance)) {
+        ++(testing::is_wrong(error) ? verdict.closures_vague : verdict.closures_right);
         continue;
       }
       ++verdict.closures_wrong;
       if (verdict.wrong.size() < kMaxTold)
         verdict.wrong.push_back(edge.a.to_string() + " to " + edge.b.to_string() + ": " +
-                                std::to_string(error.t.norm()) + " m off");
+                                std::to_string(error.t.norm()) + " m off, " + std::to_string(edge.inliers) +
+                                " inliers");
     }
   }
 

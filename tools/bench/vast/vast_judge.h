@@ -11,8 +11,10 @@ namespace relmap::bench {
 
 struct VastVerdict {
   std::uint64_t keyframes = 0, lost = 0, doubled = 0;  // doubled: one payload under two numbers
-  std::uint64_t closures_right = 0, closures_wrong = 0;
-  std::vector<std::string> wrong;  // the first of these, in words
+  // In force. Wrong: off by more than 0.5 m or 10 degrees, and by more than its covariance tells. Vague: off by so
+  // much, but its covariance tells.
+  std::uint64_t closures_right = 0, closures_vague = 0, closures_wrong = 0;
+  std::vector<std::string> wrong;  // the first of the wrong ones, in words
   // A frame returns to a place if an earlier one, of another robot or long before, stood within 2 m and 15 degrees. It
   // is bound there if it has at least 20 observations of landmarks from then.
   std::uint64_t revisits = 0, revisits_bound = 0;

@@ -10,10 +10,22 @@ namespace {
 
 constexpr double kOfThePlace = 0.75;        // of the features
 constexpr double kResidual = 254 / 11.314;  // of each of 128 entries
+constexpr double kWaysThere = 4;            // metres driven for each of street
+constexpr double kMaxRideEvery = 5000;      // metres
+constexpr double kMinRides = 3;             // of each robot
+
+// Streets that run north, and as many that run east.
+int streets_for(double metres, const sim::CityOptions& plan) {
+  // n streets each way have 2 n (n - 1) blocks.
+  const double blocks = metres / ((plan.min_block + plan.max_block) / 2);
+  return std::max(2, static_cast<int>(std::lround((1 + std::sqrt(1 + 2 * blocks)) / 2)));
+}
 
 sim::CityWorldOptions world_options(const VastOptions& options) {
   sim::CityWorldOptions world;
   world.plan.seed = options.seed;
+  const double metres = sim::CityDriveOptions().step * static_cast<double>(options.keyframes);
+  world.plan.columns = world.plan.rows = streets_for(metres / kWaysThere, world.plan);
   world.draw = draw_words(place::Vocabulary::load(place::default_vocabulary_path()).or_throw());
   if (options.light) {
     world.tracks = 44;
@@ -51,6 +63,7 @@ VastTown::VastTown(const VastOptions& options) : world_(std::make_unique<sim::Ci
     sim::CityDriveOptions drive;
     drive.seed = 1000 * options.seed + robot;
     drive.frames = static_cast<std::uint32_t>(options.keyframes / options.robots);
+    drive.ride_every = std::min(kMaxRideEvery, drive.step * drive.frames / kMinRides);
     drives_.push_back(drive);
   }
 }
