@@ -22,7 +22,7 @@ constexpr double kSameWay = 0.64;        // cosine of the largest angle between 
 constexpr double kThroughTheDoor = 0.4;  // part of what is outside that is seen from a cabin
 constexpr std::uint32_t kPass = 1024;    // frames: after these, a robot sees other points of a street
 constexpr std::uint32_t kCabinPoints = 260, kCabinTracked = 140;
-constexpr std::uint32_t kCornerPoints = 400, kCornerTracked = 180;  // of each corner and each closed side
+constexpr std::uint32_t kCornerPoints = 500, kCornerTracked = 260;  // of each corner and each closed side
 constexpr std::uint32_t kKeepCells = 64;                            // frames that an unused cell is kept
 constexpr std::size_t kMaxDescriptors = 20'000;
 constexpr double kBorder = 4;       // pixels

@@ -175,6 +175,12 @@ class VastRun {
     return connected.ok() ? std::move(*connected) : nullptr;
   }
 
+  std::uint64_t keyframes() const {
+    std::uint64_t all = 0;
+    for (std::uint32_t robot = 0; robot < town_.robots(); ++robot) all += town_.frames(robot);
+    return all;
+  }
+
   // Samples the daemon and kills it at the times that are due, until all robots have arrived and the map is idle.
   void watch() {
     auto asked = client();
@@ -204,13 +210,13 @@ class VastRun {
       }
       const bool kill_due = progress_.kills < options_.kills &&
                             static_cast<double>(status->frames) >=
-                                static_cast<double>(options_.keyframes) * (progress_.kills + 0.5) / options_.kills;
+                                static_cast<double>(keyframes()) * (progress_.kills + 0.5) / options_.kills;
       if (kill_due) {
         asked.reset();
         (void)daemon_.restart();
         ++progress_.kills;
         progress_.starts_s.push_back(daemon_.starts_s().back());
-      } else if (arrived_ == town_.robots()) {
+      } else if (arrived_ == town_.robots() && progress_.kills >= options_.kills) {
         if (Status idle = asked->wait_idle(); idle.ok()) return;
         asked.reset();
       }
