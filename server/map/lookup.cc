@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "server/map/stops.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"
@@ -70,15 +71,9 @@ std::optional<OldNeighbour> nearest_old_frame(const storage::Graph& view, FrameI
 }
 
 std::optional<FrameId> step_back(const storage::Graph& graph, FrameId frame, const storage::FrameHot& hot) {
-  if (!hot.edges.empty() && hot.edges.front().id.ordinal == 0) return hot.edges.front().a;
+  if (const storage::Edge* motion = motion_to(hot)) return motion->a;
   if (place::is_mono_session(graph, frame.session)) return place::previous_of(graph, frame);
   return std::nullopt;
-}
-
-// Whether the robot stood still for most of the time since the frame before.
-bool stood_before(const storage::FrameHot& hot) {
-  if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return false;
-  return hot.edges.front().standing_s > hot.edges.front().driven_s;
 }
 
 // Whether the verification with the older view, or a frame next to it, places the query about where the map has it.
@@ -161,9 +156,10 @@ std::uint32_t first_recent(const storage::Graph& graph, FrameId query) {
     if (driven > kRecentEdges && driving_us > kRecentMicroseconds) return frame.index + 1;
     const auto previous = step_back(graph, frame, *hot);
     if (!previous) return frame.index;
-    const bool stood = stood_before(*hot);
-    driven += !stood;
-    if (stood) time_us = graph.hot(*previous)->time_us;
+    const storage::Edge* motion = motion_to(*hot);
+    const bool stands = motion && stood(*motion);
+    driven += !stands;
+    if (stands) time_us = graph.hot(*previous)->time_us;
     frame = *previous;
   }
   return frame.index + 1;

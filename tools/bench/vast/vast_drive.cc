@@ -37,7 +37,6 @@ json to_json(const VastSample& sample) {
           {"update_p99_us", sample.update_p99_us},
           {"lookup_lag_s", sample.lookup_lag_s},
           {"resident_mb", sample.resident_mb},
-          {"place_query_p99_us", sample.place_query_p99_us},
           {"closures", sample.closures}};
 }
 
@@ -66,7 +65,7 @@ VastProgress progress_of(const json& saved) {
   saved.at("peak_resident_mb").get_to(progress.peak_resident_mb);
   for (const json& s : saved.at("samples"))
     progress.samples.push_back({s.at("s"), s.at("frames"), s.at("update_p99_us"), s.at("lookup_lag_s"),
-                                s.at("resident_mb"), s.at("place_query_p99_us"), s.at("closures")});
+                                s.at("resident_mb"), s.at("closures")});
   saved.at("route_ms").get_to(progress.route_ms);
   saved.at("place_ms").get_to(progress.place_ms);
   saved.at("routes_refused").get_to(progress.routes_refused);

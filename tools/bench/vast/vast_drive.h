@@ -15,7 +15,7 @@ struct VastSample {
   std::uint64_t frames = 0;  // in the map
   double update_p99_us = 0;  // of relative bundle adjustment, over the last updates
   double lookup_lag_s = 0;   // how long ago the frame that waits longest for its lookup came into the map
-  double resident_mb = 0, place_query_p99_us = 0;
+  double resident_mb = 0;
   std::uint64_t closures = 0;
 };
 
