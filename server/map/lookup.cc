@@ -6,7 +6,6 @@
 #include <limits>
 #include <optional>
 
-#include "server/map/stops.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"

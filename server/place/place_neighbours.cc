@@ -28,9 +28,14 @@ std::optional<FrameId> next_of(const storage::Graph& graph, FrameId frame) {
   return std::nullopt;
 }
 
+namespace {
+
 constexpr std::size_t kMaxNeighbours = 1000;
 
-std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centre, std::uint32_t radius) {
+// `is_free(frame, hot, step)` tells whether a step, in either direction, does not count.
+template <typename IsFree>
+std::vector<FrameId> neighbours_within(const storage::Graph& graph, FrameId centre, std::uint32_t radius,
+                                       const IsFree& is_free) {
   std::unordered_map<SessionNumber, bool> mono;
   const auto is_mono = [&](SessionNumber number) {
     const auto [entry, fresh] = mono.try_emplace(number, false);
@@ -38,27 +43,49 @@ std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centr
     return entry->second;
   };
 
-  std::vector<FrameId> found{centre};
+  std::vector<FrameId> found{centre}, next;  // `next` is one step further away than the end of `found`
   std::unordered_set<FrameId> seen{centre};
   std::size_t begin = 0;
-  for (std::uint32_t depth = 0; depth < radius; ++depth) {
-    const std::size_t end = found.size();
-    for (std::size_t i = begin; i < end; ++i) {
-      const FrameId frame = found[i];
+  for (std::uint32_t depth = 0;; ++depth) {
+    for (; begin < found.size(); ++begin) {
+      const FrameId frame = found[begin];
       const auto hot = graph.hot(frame);
       if (!hot) continue;
-      std::vector<FrameId> steps;
-      for (const storage::Neighbour& n : storage::neighbours(graph, frame, *hot)) steps.push_back(n.frame);
+      const auto add = [&](FrameId step, bool free) {
+        if ((free || depth < radius) && seen.insert(step).second) (free ? found : next).push_back(step);
+      };
+      for (const storage::Neighbour& n : storage::neighbours(graph, frame, *hot)) add(n.frame, is_free(frame, *hot, n));
       if (is_mono(frame.session))
         for (const auto& step : {previous_of(graph, frame), next_of(graph, frame)})
-          if (step) steps.push_back(*step);
-      for (const FrameId step : steps)
-        if (seen.insert(step).second) found.push_back(step);
-      if (found.size() >= kMaxNeighbours) return found;
+          if (step) add(*step, false);
+      if (seen.size() >= kMaxNeighbours) break;
     }
-    begin = end;
+    const bool ends = next.empty() || seen.size() >= kMaxNeighbours;
+    found.insert(found.end(), next.begin(), next.end());
+    if (ends) return found;
+    next.clear();
   }
-  return found;
+}
+
+}  // namespace
+
+std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centre, std::uint32_t radius) {
+  return neighbours_within(graph, centre, radius,
+                           [](FrameId, const storage::FrameHot&, const storage::Neighbour&) { return false; });
+}
+
+std::vector<FrameId> place_neighbours_driven(const storage::Graph& graph, FrameId centre, std::uint32_t radius) {
+  const auto stands = [](const storage::FrameHot& hot, EdgeId step) {
+    const storage::Edge* edge = hot.edge(step);
+    return edge && edge->kind != storage::EdgeKind::kLoop && storage::stood(*edge);
+  };
+  return neighbours_within(graph, centre, radius,
+                           [&](FrameId frame, const storage::FrameHot& hot, const storage::Neighbour& step) {
+                             if (step.edge.ordinal != 0) return false;
+                             if (step.edge.frame == frame) return stands(hot, step.edge);
+                             const auto other = graph.hot(step.edge.frame);
+                             return other && stands(*other, step.edge);
+                           });
 }
 
 }  // namespace relmap::place

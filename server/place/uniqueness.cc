@@ -60,7 +60,7 @@ std::vector<std::uint32_t> places_of(const storage::Graph& graph, std::span<cons
 
 std::vector<storage::FrameRange> place_ranges(const storage::Graph& graph, FrameId frame) {
   std::vector<storage::FrameRange> ranges;
-  for (const FrameId near : place_neighbours(graph, frame, kPlaceEdges))
+  for (const FrameId near : place_neighbours_driven(graph, frame, kPlaceEdges))
     ranges.push_back({near.session, near.index, near.index});
   return ranges;
 }

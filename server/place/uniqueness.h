@@ -57,8 +57,8 @@ bool is_ambiguous(const storage::Uniqueness& uniqueness, std::uint32_t inliers);
 std::vector<PlaceCandidate> look_alikes(const storage::Graph& graph, const PlaceIndex& places, FrameId frame,
                                         std::span<const storage::FrameRange> masked);
 
-// The frames that show the same place as `frame` according to the graph: those within 20 steps of place_neighbours(),
-// one range each.
+// The frames that show the same place as `frame` according to the graph: those within 20 steps of
+// place_neighbours_driven(), one range each.
 std::vector<storage::FrameRange> place_ranges(const storage::Graph& graph, FrameId frame);
 
 }  // namespace relmap::place

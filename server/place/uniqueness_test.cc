@@ -106,6 +106,26 @@ TEST_F(Weigh, APhotographThatWasAddedTwiceIsNoRivalOfItself) {
   EXPECT_EQ(weigh(trials).uniqueness.runner_up, (FrameId{2, 5}));
 }
 
+// Lookups make no closure between frames between which it stood, so nothing else joins them.
+TEST_F(Weigh, WhereTheRobotStandsIsOnePlaceHoweverLong) {
+  constexpr std::uint32_t kStood = 25, kDriven = 20;
+  graph_.add_session(10, kStereoCamera);
+  for (std::uint32_t i = 0; i <= kStood + kDriven + 1; ++i) {
+    graph_.add_frame({10, i});
+    if (i == 0) continue;
+    graph_.add_edge({10, i - 1}, {10, i}, 0);
+    storage::Edge& motion = graph_.edit_hot({10, i}).edges.front();
+    (i <= kStood ? motion.standing_s : motion.driven_s) = 1;
+  }
+  const auto seen = features(0, 40);
+  for (const std::uint32_t other : {kStood, kStood + kDriven, kStood + kDriven + 1}) {
+    const std::vector<PlaceTrial> trials{fits({10, 0}, seen), fits({10, other}, seen)};
+    EXPECT_EQ(is_ambiguous(weigh(trials), trials), other > kStood + kDriven) << other;
+    const std::vector<PlaceTrial> back{fits({10, other}, seen), fits({10, 0}, seen)};
+    EXPECT_EQ(is_ambiguous(weigh(back), back), other > kStood + kDriven) << other;
+  }
+}
+
 TEST_F(Weigh, FeaturesThatFitAtManyPlacesCountLess) {
   const auto door = features(0, 40);
   std::vector<PlaceTrial> trials{fits({1, 5}, door + features(100, 30))};

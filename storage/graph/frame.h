@@ -136,6 +136,8 @@ inline bool is_guessed(const Edge& edge) {
 }
 // Whether the motion is a guess and too few landmarks have been seen from both sides since to support the edge.
 inline bool is_unmeasured(const Edge& edge) { return is_guessed(edge) && edge.support < kMinSupport; }
+// Whether the robot stood still for most of the time of an odometry edge.
+inline bool stood(const Edge& motion) { return motion.standing_s > motion.driven_s; }
 
 // The closure of claims and observations whose own closure was deleted with its session (server/map/deletion.h). It is
 // always in force.
@@ -196,6 +198,11 @@ struct FrameHot {
   }
   const Edge* edge(EdgeId id) const { return const_cast<FrameHot*>(this)->edge(id); }
 };
+
+// The odometry edge that leads to the frame of `hot`; nullptr if there is none.
+inline const Edge* motion_to(const FrameHot& hot) {
+  return !hot.edges.empty() && hot.edges.front().id.ordinal == 0 ? &hot.edges.front() : nullptr;
+}
 
 // The order in which the map took its frames in. It alone decides which of two frames is older. One owner numbers all
 // frames. Where a map comes to have several owners, each numbers its own journal, and the owner of the frame decides
