@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/map/own_motion.h"
 #include "server/map/sorted.h"
 
 namespace relmap::map {
@@ -33,7 +34,8 @@ class Measured {
     for (const EdgeId id : step.carried_by)
       if (auto closure = storage::find_edge(graph_, id)) carriers.push_back(std::move(*closure));
     const auto way = [](const storage::Edge& closure) {
-      return (closure.carried.first - closure.a.index) + (closure.b.index - closure.carried.last);
+      const auto own = own_motion(closure);
+      return own ? (closure.carried.first - own->from.index) + (closure.b.index - closure.carried.last) : ~0u;
     };
     std::stable_sort(carriers.begin(), carriers.end(),
                      [&](const storage::Edge& x, const storage::Edge& y) { return way(x) < way(y); });
@@ -45,11 +47,11 @@ class Measured {
     for (const storage::Edge& closure : carriers) {
       const FrameId first{closure.carried.session, closure.carried.first};
       const FrameId last{closure.carried.session, closure.carried.last};
-      const auto to_a = place::back_along_odometry(graph_, first, closure.a, beyond);
-      const auto from_b = to_a ? place::back_along_odometry(graph_, closure.b, last, beyond) : std::nullopt;
+      const auto own = own_motion(closure);
+      const auto to_from = own ? place::back_along_odometry(graph_, first, own->from, beyond) : std::nullopt;
+      const auto from_b = to_from ? place::back_along_odometry(graph_, closure.b, last, beyond) : std::nullopt;
       if (!from_b) continue;
-      const Uncertain T = Uncertain(*to_a, drift_) * Uncertain(closure.prior_T_ab, closure.prior_covariance) *
-                          Uncertain(*from_b, drift_);
+      const Uncertain T = Uncertain(*to_from, drift_) * Uncertain(own->T, own->covariance) * Uncertain(*from_b, drift_);
       storage::Edge stretch;
       stretch.id = closure.id;
       stretch.kind = storage::EdgeKind::kLoop;

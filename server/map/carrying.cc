@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/map/consistency.h"
+#include "server/map/own_motion.h"
 #include "server/map/stops.h"
 
 namespace relmap::map {
@@ -39,12 +40,12 @@ struct Step {
 // was carried.
 bool may_agree(const storage::Edge& edge, SessionNumber session) {
   return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted &&
-         edge.carried.session == 0 && edge.a.session == session && edge.b.session == session &&
-         edge.verification != storage::Verification::kCompounded && edge.b.index - edge.a.index <= kMotionReach;
+         edge.carried.session == 0 && edge.b.session == session &&
+         edge.verification != storage::Verification::kCompounded;
 }
 
-// The frames between the newest match and the oldest query of a set of closures: a single ride that explains all of
-// them lies there.
+// The frames between the newest match, or frame before a stop, and the oldest query of a set of closures: a single ride
+// that explains all of them lies there.
 struct Interval {
   SessionNumber session = 0;
   std::uint32_t first = 0, last = std::numeric_limits<std::uint32_t>::max();
@@ -52,7 +53,7 @@ struct Interval {
 
   bool empty() const { return first >= last; }
   void narrow(const storage::Edge& closure) {
-    first = std::max(first, closure.a.index);
+    first = std::max(first, own_motion(closure)->from.index);
     last = std::min(last, closure.b.index);
     newest = std::max(newest, closure.b.index);
   }
@@ -84,10 +85,11 @@ class Way {
       if (hot && at.index > interval.first) {
         metres_.emplace(at.index, metres);
         for (const storage::Edge& edge : hot->edges) {
-          const bool beside = at.index > interval.newest && edge.a.index >= interval.last;
-          if (beside || !may_agree(edge, session_) || gone.contains(edge.id)) continue;
-          closures_.push_back({edge.id, edge.a.index, at.index, std::nullopt});
-          oldest = std::min(oldest, edge.a.index);
+          if (!may_agree(edge, session_) || gone.contains(edge.id)) continue;
+          const auto own = own_motion(edge);
+          if (!own || (at.index > interval.newest && own->from.index >= interval.last)) continue;
+          closures_.push_back({edge.id, own->from.index, at.index, std::nullopt});
+          oldest = std::min(oldest, own->from.index);
         }
       }
       if (!motion) {

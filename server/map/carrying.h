@@ -28,7 +28,8 @@ struct CarryingEvidence {
   bool speaks_for_carrying() const { return weight() >= 0; }
 };
 
-// Weighs two or more closures of one session with its own past. `closures` is ascending.
+// Weighs two or more closures of queries of one session that all say something about its motion (own_motion()).
+// `closures` is ascending.
 CarryingEvidence weigh_carrying(const storage::Graph& graph, const std::vector<EdgeId>& closures);
 
 // Where the robot was carried, given that these closures are right. `closures` is as for weigh_carrying(), but one is

@@ -12,6 +12,7 @@
 #include "server/map/closure_states.h"
 #include "server/map/consistency.h"
 #include "server/map/look_alike.h"
+#include "server/map/own_motion.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/unmeasured_steps.h"
@@ -233,6 +234,7 @@ EdgeId store_candidate(storage::EditableGraph& map, const storage::ClosurePropos
   edge.probability = proposal.probability;
   edge.spread = proposal.spread;
   edge.uniqueness = proposal.uniqueness;
+  edge.around = proposal.around;
   edge.unknown = proposal.unknown;
   edge.driven_s = loop_duration(map, edge);
   hot.edges.push_back(edge);
@@ -328,7 +330,7 @@ std::vector<EdgeId> of_one_ride(const storage::Graph& graph, EdgeId id, std::uin
       const auto closure = storage::find_edge(graph, other);
       // Those in force stand for another ride, with which `id` does not agree.
       if (contradicts_odometry(*closure) && closure->state != storage::EdgeState::kRemoved &&
-          closure->state != storage::EdgeState::kAccepted && closure->a.session == id.frame.session)
+          closure->state != storage::EdgeState::kAccepted && own_motion(*closure))
         found.push_back(other);
     }
   }
@@ -502,7 +504,7 @@ class Judgement {
   // looks alike. If so, refuses the proposal and takes back those of the closures that are in force. Nullopt: not
   // refused.
   std::optional<ClosureChange> refuse_look_alike() {
-    if (motion_.verdict != MotionVerdict::kAgrees) return std::nullopt;
+    if (motion_.verdict != MotionVerdict::kAgrees || edge().a.session != edge().b.session) return std::nullopt;
     look_alikes_ = weigh_look_alikes(map_, edge());
     const SameStretch& place = look_alikes_.place;
     const bool was_refused =

@@ -6,6 +6,7 @@
 
 #include "proto/geometry/covariance.h"
 #include "server/map/carried_stretch.h"
+#include "server/map/own_motion.h"
 #include "server/map/sorted.h"
 #include "server/map/uncertain.h"
 
@@ -44,13 +45,13 @@ void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t
 MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure, const ConsistencyRules& rules) {
   const Drift drift{rules.drift_share, rules.drift_radians};
   MotionTest test;
-  if (closure.a.session != closure.b.session || closure.a.index >= closure.b.index) return test;
-  if (closure.b.index - closure.a.index > kMotionReach) return test;
+  const auto own = own_motion(closure);
+  if (!own) return test;
 
   const place::AcrossCarried measured = across_as_measured(graph, drift);
   std::set<EdgeId> carriers;
   bool met_carried = false;
-  const auto as_measured = place::back_along_odometry(graph, closure.b, closure.a, [&](const storage::Edge& step) {
+  const auto as_measured = place::back_along_odometry(graph, closure.b, own->from, [&](const storage::Edge& step) {
     met_carried = true;
     const auto stretch = measured(step);
     if (!stretch) return stretch;
@@ -61,13 +62,13 @@ MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure
   // Every step as the odometry measured it.
   const auto as_sensed = !met_carried
                              ? as_measured
-                             : place::back_along_odometry(graph, closure.b, closure.a, [](const storage::Edge& step) {
+                             : place::back_along_odometry(graph, closure.b, own->from, [](const storage::Edge& step) {
                                  return std::optional<storage::Edge>(step);
                                });
   test.carriers.assign(carriers.begin(), carriers.end());
-  const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
-  const auto agrees = [&](const std::optional<place::PlacedFrame>& match) {
-    return match && returns_home(T_match_query * Uncertain(*match, drift), rules);
+  const Uncertain T_from_query(own->T, own->covariance);
+  const auto agrees = [&](const std::optional<place::PlacedFrame>& from) {
+    return from && returns_home(T_from_query * Uncertain(*from, drift), rules);
   };
   if (!as_measured) {
     // The way across a carried stretch is not measured, or an end lies within one: only the odometry can refuse it.

@@ -1,19 +1,19 @@
 // Pairwise consistency of loop closures (docs/method.md, 7). Two closures of neighbouring frames agree if the loop
 // query -> match -> match' -> query' -> query is the identity within its covariance. A closure agrees with the robot's
-// own motion if the loop query -> match -> query along the odometry is.
+// own motion if the loop query -> match -> query along the odometry is, or with another session query -> match -> a
+// frame before a stop -> query (way_around.h).
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "server/map/own_motion.h"
 #include "storage/graph/frame_range.h"
 #include "storage/graph/graph.h"
 
 namespace relmap::map {
 
 inline constexpr std::size_t kMaxTested = 24;  // closures that one is tested against, of the nearest queries
-inline constexpr std::uint32_t kMotionReach =
-    1000;  // closures whose ends are further apart, in keyframes, are untested
 
 // The rules and thresholds of consistency. Maps that are kept use the defaults; other values are for measuring what
 // each rule is worth (`relmap-bench closures`, docs/decisions/closures.md).
@@ -33,9 +33,9 @@ struct ConsistencyRules {
   bool look_alikes = true;  // a stretch behind a stop that differs all along from what was seen is another place
 };
 
-// The verdict of the robot's own motion on a closure with its session's own past.
+// The verdict of the robot's own motion on a closure that says something about it (own_motion()).
 enum class MotionVerdict : std::uint8_t {
-  kUntested,     // the ends are of two sessions, too far apart, or there is motion between them that nothing sensed
+  kUntested,     // it says nothing about it, or there is motion that nothing sensed
   kAgrees,       // agrees with the odometry
   kAsMeasured,   // agrees only with the odometry corrected by what closures in force measured where the robot was
                  // carried

@@ -85,7 +85,7 @@ TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
     edge.id = {{1, query}, 1};
     edge.a = {1, match};
     edge.b = {1, query};
-    edge.T_ab = ahead(metres);
+    edge.T_ab = edge.prior_T_ab = ahead(metres);
     edge.prior_covariance = 1e-4 * Matrix6::Identity();
     return edge;
   };

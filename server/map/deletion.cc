@@ -100,6 +100,8 @@ class Deletion {
     storage::Edge edge;
   };
   void join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn);
+  void keep_ride(const storage::Edge& gone);
+  storage::Edge add_compounded(storage::Edge edge);
   const storage::Edge* motion_into(FrameId frame) const;
 
   storage::Map& map_;
@@ -410,6 +412,9 @@ void Deletion::unlink() {
     if (!goes(edge.b))
       std::erase_if(map_.edit_hot(edge.b).edges, [&](const storage::Edge& e) { return e.id == edge.id; });
     if (!goes(edge.a) && map_.hot(edge.a)) std::erase(map_.edit_hot(edge.a).incoming, edge.id);
+    if (!goes(edge.b) && edge.state == storage::EdgeState::kAccepted && edge.carried.session == edge.b.session &&
+        edge.around)
+      keep_ride(edge);
   }
   if (left_) std::erase(map_.edit_hot(*left_).incoming, motions_.front().id);
   // Closures between other frames that bind in frames that go.
@@ -506,9 +511,6 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
   storage::Edge edge;
   edge.a = to_is_newer ? from.frame : to;
   edge.b = to_is_newer ? to : from.frame;
-  edge.kind = storage::EdgeKind::kLoop;
-  edge.reason = Reason::SESSION_DELETED;
-  edge.verification = storage::Verification::kCompounded;
   edge.prior_active = true;
   const SE3 T = to_is_newer ? chain.T() : chain.T().inverse();
   edge.T_ab = edge.prior_T_ab = T.normalized();
@@ -516,13 +518,40 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
       to_is_newer ? chain.covariance() : inverse_covariance(chain.T(), chain.covariance());
   edge.driven_s = static_cast<float>(driven_s);
   edge.standing_s = static_cast<float>(standing_s);
+  add_compounded(std::move(edge));
+  change_.seeds.push_back(to);
+}
+
+// That the robot was carried stays known if a closure with a frame that goes showed it by the way around: as a closure
+// with the robot's own past, which is no edge of the graph.
+void Deletion::keep_ride(const storage::Edge& gone) {
+  storage::Edge edge;
+  edge.a = gone.around->from;
+  edge.b = gone.b;
+  const auto hot = map_.hot(edge.b);
+  const bool known = std::any_of(hot->edges.begin(), hot->edges.end(), [&](const storage::Edge& other) {
+    return other.a == edge.a && other.verification == storage::Verification::kCompounded;
+  });
+  if (known || !map_.hot(edge.a)) return;
+  edge.carries = false;
+  edge.T_ab = edge.prior_T_ab = gone.around->T;
+  edge.covariance = edge.prior_covariance = gone.around->covariance;
+  edge.carried = gone.carried;
+  enter_carrier(map_, add_compounded(std::move(edge)));
+}
+
+// Stores a closure that replaces what was known through frames that go. Returns it with its id.
+storage::Edge Deletion::add_compounded(storage::Edge edge) {
+  edge.kind = storage::EdgeKind::kLoop;
+  edge.reason = Reason::SESSION_DELETED;
+  edge.verification = storage::Verification::kCompounded;
   storage::FrameHot& hot = map_.edit_hot(edge.b);
   edge.id = {edge.b, hot.next_loop_ordinal++};
   edge.history.push_back({sequence_, storage::EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
   hot.edges.push_back(edge);
   insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
   ++map_.state().closures_accepted;
-  change_.seeds.push_back(to);
+  return edge;
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 //   - If the path between two frames led over the session and the remaining path is longer by more than
 //     kLoopEdgeSpacing edges, a bridge replaces it: a closure with the transform and covariance of the chain
 //     (Verification::kCompounded). These are its prior, since nothing is observed along it.
+//   - That a robot was carried, as a closure with the session showed by the way around, stays known: a closure with the
+//     robot's own past (Verification::kCompounded) says it from then on.
 #pragma once
 
 #include <cstdint>

@@ -12,6 +12,7 @@
 #include "server/map/carrying.h"
 #include "server/map/closure_states.h"
 #include "server/map/consistency.h"
+#include "server/map/own_motion.h"
 #include "server/place/map_points.h"
 #include "storage/map/draft.h"
 
@@ -194,8 +195,8 @@ storage::FrameRange carried_by_word(const storage::Graph& graph, EdgeId id, cons
   std::vector<EdgeId> ride{id};
   for (const EdgeId other : agreeing) {
     const auto edge = storage::find_edge(graph, other);
-    if (contradicts_odometry(*edge) && edge->state != storage::EdgeState::kAccepted &&
-        edge->a.session == id.frame.session && edge->b.session == id.frame.session)
+    if (contradicts_odometry(*edge) && edge->state != storage::EdgeState::kAccepted && own_motion(*edge) &&
+        edge->b.session == id.frame.session)
       ride.push_back(other);
   }
   std::sort(ride.begin(), ride.end());

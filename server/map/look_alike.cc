@@ -20,20 +20,6 @@ constexpr std::size_t kMaxOthers = 8;  // other stretches that are examined
 constexpr double kAnother = 0.02;      // above this share of changed parts, it is a place that looks alike
 constexpr double kTheSame = 0.015;     // up to this share, it is the same place
 
-// How long the robot has stood still without interruption, followed step by step.
-class Standing {
- public:
-  // Adds a step; returns whether the robot has stood for kMinRideSeconds by now.
-  bool is_stop(const storage::Edge& motion) {
-    stood_s_ = stood(motion) ? stood_s_ + double{motion.standing_s} : 0;
-    return stood_s_ >= kMinRideSeconds;
-  }
-  bool is_standing() const { return stood_s_ > 0; }
-
- private:
-  double stood_s_ = 0;
-};
-
 // The frame after the last stop before `frame`, or where motion begins; nullopt if neither is found back to `earliest`.
 std::optional<std::uint32_t> alighted(const storage::Graph& graph, FrameId frame, std::uint32_t earliest) {
   Standing standing;

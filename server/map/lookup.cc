@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "server/map/way_around.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"
@@ -142,6 +143,7 @@ storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::Pi
   if (!aligned)
     add_new(proposal.bindings,
             place::propose_bindings(view, query, frame, found.match, found.T_match_query, found.covariance, recent));
+  proposal.around = way_around(view, proposal);
   return proposal;
 }
 

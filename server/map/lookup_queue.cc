@@ -119,7 +119,7 @@ double LookupQueue::lag_s() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - tickets_.begin()->second).count();
 }
 
-bool LookupQueue::is_full() const { return waiting() >= kMaxWaiting; }
+bool LookupQueue::is_full(std::size_t queued) const { return waiting() + queued >= kMaxWaiting; }
 
 std::vector<storage::FrameRange> LookupQueue::later_than(const Pushed& pushed) const {
   const MutexLock lock(mutex_);

@@ -69,8 +69,9 @@ class LookupQueue {
   bool is_waiting(SessionNumber session) const;
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
-  // Whether kMaxWaiting frames wait, so that no more keyframes should be taken in before some have been looked up.
-  bool is_full() const;
+  // Whether kMaxWaiting frames wait, with those of `queued` records that are on their way, so that no more keyframes
+  // should be taken in before some have been looked up.
+  bool is_full(std::size_t queued) const;
 
  private:
   enum class End : std::uint8_t { kDone, kAgain, kFailed, kStopped };

@@ -142,10 +142,11 @@ TEST_F(LookupQueueTest, AFailedLookupDoesNotBlockOthersAndStaysOpenForTheNextSta
 
 TEST_F(LookupQueueTest, FramesThatFailedDoNotFillTheQueue) {
   look_up_ = [](FrameId) { throw std::runtime_error("each of them"); };
-  for (std::uint32_t i = 0; !queue_.is_full(); ++i) queue_.push({1, i});
+  for (std::uint32_t i = 0; !queue_.is_full(0); ++i) queue_.push({1, i});
   start();
   wait();
-  EXPECT_FALSE(queue_.is_full());
+  EXPECT_FALSE(queue_.is_full(0));
+  EXPECT_TRUE(queue_.is_full(kMaxWaiting)) << "of frames that are not applied yet";
 }
 
 TEST_F(LookupQueueTest, TheLagIsThatOfTheFrameThatWaitsLongest) {

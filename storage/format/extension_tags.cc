@@ -2,6 +2,7 @@
 
 #include "proto/keyframe/extension_codec.h"
 #include "storage/format/codec.h"
+#include "storage/format/varint.h"
 
 namespace relmap::storage::tags {
 
@@ -53,6 +54,27 @@ bool take_carried(Extensions& extensions, FrameRange& carried) {
   constexpr std::uint32_t kMaxFrames = 1u << 16;  // frames
   return r.at_end() && carried.session != 0 && carried.first < carried.last &&
          carried.last - carried.first <= kMaxFrames;
+}
+
+void add_way_around(Extensions& extensions, const WayAround* around) {
+  if (!around) return;
+  ByteWriter w;
+  codec::put(w, around->from);
+  varint::put(w, around->T);
+  varint::put(w, around->covariance, Matrix6::Zero());
+  add_extension(extensions, kWayAround, w.take());
+}
+
+bool take_way_around(Extensions& extensions, std::shared_ptr<const WayAround>& around) {
+  const auto bytes = take_extension(extensions, kWayAround);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  WayAround read;
+  read.from = codec::get_frame(r);
+  read.T = varint::get_se3(r);
+  read.covariance = varint::get_matrix6(r, Matrix6::Zero());
+  around = std::make_shared<const WayAround>(read);
+  return r.at_end() && read.from.valid() && read.T.R.allFinite() && read.T.t.allFinite() && read.covariance.allFinite();
 }
 
 void add_map_identity(Extensions& extensions, const MapIdentity& identity) {

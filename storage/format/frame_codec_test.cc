@@ -73,6 +73,8 @@ Bytes dumped(const FrameHot& f) {
     w.put(u.alike), w.put(u.differs), w.put(u.compared), w.put(u.changed);
     w.put(e.carried.session), w.put(e.carried.first), w.put(e.carried.last), dump_ids(w, e.carried_by),
         dump(w, e.unknown);
+    w.put(e.around != nullptr);
+    if (e.around) dump(w, e.around->from), dump(w, e.around->T), w.put_array(e.around->covariance.data(), 36);
     for (const EdgeEvent& event : e.history) {
       w.put(event.journal_sequence), w.put(event.state), w.put(event.reason), dump(w, event.cause);
       w.put_string(event.note);

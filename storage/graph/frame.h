@@ -11,6 +11,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -69,6 +70,19 @@ struct Uniqueness {
   bool operator==(const Uniqueness&) const = default;
 };
 
+// What the map says, by a closure and a way that does not lead through a stop, of the motion of the session that made
+// the closure. The odometry between the two frames leads through a stop: the robot may have been carried there
+// (server/map/way_around.h). It is what the map said when the closure was proposed, and is not changed later.
+struct WayAround {
+  FrameId from;                          // a frame before the stop, of the session of the closure's newer end
+  SE3 T;                                 // T_from_b, b the closure's newer end
+  Matrix6 covariance = Matrix6::Zero();  // of T Exp(xi), with the drift along the way
+
+  bool operator==(const WayAround& other) const {
+    return from == other.from && T.R == other.T.R && T.t == other.T.t && covariance == other.covariance;
+  }
+};
+
 // An edge of the graph, or a loop closure that only binds landmarks (`carries == false`). It is stored with the newer
 // of its two frames.
 struct Edge {
@@ -104,8 +118,10 @@ struct Edge {
   std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
   std::vector<EdgeEvent> history;       // oldest first: the first event and the latest ones, kMaxEvents at most
   Uniqueness uniqueness;
+  // Null: the closure is with the session's own past, or there is no stop or no such way.
+  std::shared_ptr<const WayAround> around;
 
-  // Of a closure with the session's own past that agrees with others and not with the odometry: it says that the robot
+  // Of a closure that agrees with others and not with the odometry of its newer end's session: it says that the robot
   // was carried somewhere between the frames `first` and `last`. Session 0: it says nothing of the kind.
   FrameRange carried;
   // Derived, ascending, of an odometry edge: the accepted closures in whose `carried` it lies. While there are any, the

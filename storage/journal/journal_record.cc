@@ -220,11 +220,12 @@ bool take_extensions(SessionRecord& x, Extensions all) { return set_header_exten
 Extensions extensions_of(const ClosureProposalRecord& x) {
   Extensions all = x.unknown;
   tags::add_uniqueness(all, x.uniqueness);
+  tags::add_way_around(all, x.around.get());
   return all;
 }
 bool take_extensions(ClosureProposalRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  return tags::take_uniqueness(x.unknown, x.uniqueness);
+  return tags::take_uniqueness(x.unknown, x.uniqueness) && tags::take_way_around(x.unknown, x.around);
 }
 
 Extensions extensions_of(const SetEdgeStateRecord& x) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
@@ -63,7 +64,8 @@ struct ClosureProposalRecord {
   float spread = 0;
   std::vector<ProposedBinding> bindings;
   Uniqueness uniqueness;
-  Extensions unknown = {};  // from a later version, kept unchanged
+  std::shared_ptr<const WayAround> around;  // null: see Edge::around
+  Extensions unknown = {};                  // from a later version, kept unchanged
 };
 
 // Landmarks that were seen again by projection along an accepted closure, without a new place (docs/method.md, 2).

@@ -107,6 +107,7 @@ class MapHasher {
         h.mix(key(FrameId{e.carried.session, e.carried.first})).mix(std::uint64_t{e.carried.last});
       if (!e.carried_by.empty()) h.mix(set_of(e.carried_by));
       if (e.uniqueness.known) add_uniqueness(e.uniqueness, h);
+      if (e.around) h.mix(key(e.around->from));
       add_extensions(e.unknown, h);
     }
     h.mix(set_of(f.incoming)).mix(std::uint64_t{f.landmarks.size()});
@@ -159,6 +160,7 @@ class MapHasher {
       h.mix(e.T_ab).mix(e.covariance.data(), 36).mix(e.prior_T_ab).mix(e.prior_covariance.data(), 36);
       if (!is_zero(e.correlation_with_previous))
         for (const std::int8_t part : e.correlation_with_previous) h.mix(static_cast<std::uint64_t>(part));
+      if (e.around) h.mix(e.around->T).mix(e.around->covariance.data(), 36);
       h.mix(e.driven_s).mix(e.standing_s).mix(e.probability).mix(e.spread);
     }
     for (const Landmark& l : f.landmarks) h.mix(l.abr.data(), 3);

@@ -80,6 +80,11 @@ Uniqueness RandomFrames::uniqueness() {
   return u;
 }
 
+std::shared_ptr<const WayAround> RandomFrames::way_around() {
+  if (below(3) != 0) return nullptr;
+  return std::make_shared<const WayAround>(WayAround{{1 + below(9), below(1000)}, transform(), matrix()});
+}
+
 Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   Edge e;
   e.id = {frame, ordinal};
@@ -111,6 +116,7 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
     e.history.push_back({sequence += below(1000), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
                          some_reason(*this), edge_id(), below(2) == 1 ? "a note" : ""});
   e.uniqueness = uniqueness();
+  e.around = way_around();
   if (below(3) == 0) {
     const std::uint32_t first = below(1000);
     e.carried = {1 + below(9), first, first + 1 + below(100)};
@@ -251,6 +257,7 @@ JournalRecord RandomFrames::record() {
       x.spread = static_cast<float>(real());
       x.bindings = bindings();
       x.uniqueness = uniqueness();
+      x.around = way_around();
       x.unknown = extensions();
       return x;
     }

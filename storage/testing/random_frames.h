@@ -34,6 +34,7 @@ class RandomFrames {
   std::string text(std::uint32_t max_size);
   Extensions extensions();
   Uniqueness uniqueness();
+  std::shared_ptr<const WayAround> way_around();
   SessionHeader header();
   Bytes bytes(std::uint32_t max_size);
   std::vector<ProposedBinding> bindings();

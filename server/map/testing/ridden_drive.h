@@ -14,6 +14,7 @@ namespace relmap::map {
 
 inline constexpr std::uint32_t kCircuit = 100;  // frames of the world once round, 0.2 m apart
 inline constexpr std::uint32_t kBeyond = 36;    // frames of the second round, for most tests
+inline constexpr SessionNumber kGuideSession = kDriveSession + 1;
 
 class RiddenDrive {
  public:
@@ -22,9 +23,12 @@ class RiddenDrive {
   static constexpr std::uint32_t kRidden = kAlights - kBoards - 1;
 
   // `beyond` is the number of frames of the second round, `stood_s` the duration of the ride. At the frames `halts` the
-  // robot stands still for the same time without being carried.
-  explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20, std::set<std::uint32_t> halts = {})
+  // robot stands still for the same time without being carried. `guided`: another robot, the session kGuideSession, has
+  // driven all of the way before, and was not carried.
+  explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20, std::set<std::uint32_t> halts = {},
+                       bool guided = false)
       : world_(options(beyond)), halts_(std::move(halts)) {
+    if (guided) take_in_guide();
     drive_.apply(session_record(world_));
     for (std::uint32_t i = 0; i < world_.size(); ++i)
       if (i <= kBoards || i >= kAlights) take_in(i, stood_s);
@@ -34,6 +38,10 @@ class RiddenDrive {
   PointsDrive& drive() { return drive_; }
   // The map's frame for frame i of the world.
   static FrameId frame(std::uint32_t i) { return {kDriveSession, i <= kBoards ? i : i - kRidden}; }
+  // The true transform between the robot's poses at two frames of the world.
+  SE3 T_true(std::uint32_t i, std::uint32_t k) const {
+    return world_.T_world_frame(i).inverse() * world_.T_world_frame(k);
+  }
   static EdgeId ride() { return {frame(kAlights), 0}; }
 
   // The closure that place recognition would propose for world frame i, off by `metres` along the view.
@@ -47,6 +55,14 @@ class RiddenDrive {
     proposal.probability = 0.99f;
     proposal.spread = 0.5f;
     proposal.inliers = 60;
+    return proposal;
+  }
+  // The same with the guide's frame of the same place.
+  storage::ClosureProposalRecord closure_with_guide(std::uint32_t i) const {
+    storage::ClosureProposalRecord proposal = closure(std::max(i, kCircuit));
+    proposal.query = frame(i);
+    proposal.match = {kGuideSession, i};
+    proposal.T_match_query = {};
     return proposal;
   }
   // The closure that it would propose if the robot had not been carried and this place looked like another.
@@ -75,6 +91,18 @@ class RiddenDrive {
     return options;
   }
   const storage::Map& map_const() const { return const_cast<RiddenDrive*>(this)->drive_.map(); }
+
+  void take_in_guide() {
+    storage::SessionRecord session = session_record(world_);
+    session.number = kGuideSession;
+    ++session.header.uuid.bytes[0];
+    drive_.apply(session);
+    for (std::uint32_t i = 0; i < world_.size(); ++i) {
+      storage::KeyframeRecord record = keyframe_record(world_, i);
+      record.session = kGuideSession;
+      drive_.apply(record);
+    }
+  }
 
   void take_in(std::uint32_t i, double stood_s) {
     Keyframe keyframe = world_.keyframe(i);

@@ -1,0 +1,95 @@
+#include "server/map/way_around.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "server/map/consistency.h"
+#include "server/map/own_motion.h"
+#include "server/map/stops.h"
+#include "server/map/uncertain.h"
+#include "server/route/dijkstra.h"
+#include "storage/graph/compounded_chain.h"
+#include "storage/graph/precision.h"
+
+namespace relmap::map {
+
+namespace {
+
+constexpr std::size_t kMaxFrames = std::size_t{1} << 17;
+// A way without a stop is preferred to one that is shorter by so much.
+constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};  // metres
+
+bool is_closure_in_force(const storage::Edge& edge) {
+  return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted;
+}
+
+bool is_joined_to_another(const storage::Graph& graph, FrameId frame, const storage::FrameHot& hot) {
+  const auto joins = [&](const storage::Edge& edge) {
+    return is_closure_in_force(edge) && edge.other(frame).session != frame.session;
+  };
+  return std::any_of(hot.edges.begin(), hot.edges.end(), joins) ||
+         std::any_of(hot.incoming.begin(), hot.incoming.end(), [&](EdgeId id) {
+           if (id.frame.session == frame.session) return false;
+           const auto edge = storage::find_edge(graph, id);
+           return edge && joins(*edge);
+         });
+}
+
+// The last frame before `query` that is joined to another session, if a stop lies between the two.
+std::optional<FrameId> joined_before_stop(const storage::Graph& graph, FrameId query) {
+  bool stopped = false;
+  Standing standing;
+  std::uint32_t covered = query.index;  // back to here closures with its own past measure its motion
+  for (FrameId at = query; at == query || within_motion_reach(at, query);) {
+    const auto hot = graph.hot(at);
+    const storage::Edge* motion = hot ? storage::motion_to(*hot) : nullptr;
+    if (!hot) return std::nullopt;
+    if (at != query) {
+      if (is_joined_to_another(graph, at, *hot)) return stopped ? std::optional(at) : std::nullopt;
+      for (const storage::Edge& edge : hot->edges)
+        if (is_closure_in_force(edge) && edge.a.session == at.session) covered = std::min(covered, edge.a.index);
+    }
+    if (!motion || !motion->in_graph() || motion->source == MotionSource::kUnsensed) return std::nullopt;
+    if (motion->carried_by.empty() && motion->a.index < covered)
+      stopped = standing.is_stop(*motion) || stopped;
+    else
+      standing.interrupt();
+    at = motion->a;
+  }
+  return std::nullopt;
+}
+
+// The transform along the shortest way; nullopt if it does not tell it.
+std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from, FrameId to) {
+  const auto route = route::find_route(graph, {&from, 1}, {&to, 1}, {.weights = kWithoutStops},
+                                       {.max_frames = kMaxFrames, .proceed = {}});
+  if (!route.ok()) return std::nullopt;
+  storage::CompoundedChain chain;
+  double metres = 0;
+  Standing standing;
+  route::PathWalk walk(graph, route->path);
+  while (const auto at = walk.next()) {
+    if (!at->edge) break;
+    const storage::Edge& edge = **at->edge;
+    if (!edge.carried_by.empty() || storage::is_unmeasured(edge) || standing.is_stop(edge)) return std::nullopt;
+    chain.append(edge, at->forward);
+    metres += route::length_m(edge);
+  }
+  const ConsistencyRules rules;
+  return Uncertain({to, chain.T(), chain.covariance(), metres}, Drift{rules.drift_share, rules.drift_radians});
+}
+
+}  // namespace
+
+std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
+                                                     const storage::ClosureProposalRecord& proposal) {
+  if (within_motion_reach(proposal.match, proposal.query)) return nullptr;
+  const auto from = joined_before_stop(graph, proposal.query);
+  const auto to_match = from ? measured_way(graph, *from, proposal.match) : std::nullopt;
+  if (!to_match) return nullptr;
+  const Uncertain way = *to_match * Uncertain(proposal.T_match_query, proposal.covariance);
+  return std::make_shared<const storage::WayAround>(
+      storage::WayAround{*from, storage::rounded(way.T.normalized()), storage::rounded(way.covariance)});
+}
+
+}  // namespace relmap::map

@@ -1,0 +1,26 @@
+// Finds the way around a stop. After a stop, a robot may be recognised in frames of other sessions only. Then no
+// closure measures its own motion, but the map does: from a frame before the stop a way leads over what others drove to
+// the recognised place. Whether this and the robot's odometry agree tells whether the robot was carried
+// (docs/method.md, 7).
+#pragma once
+
+#include <memory>
+
+#include "storage/graph/graph.h"
+#include "storage/journal/journal_record.h"
+
+namespace relmap::map {
+
+// Finds the way for a proposal; null if
+//   - the proposal is with its session's own past, at most kMotionReach keyframes back, which tells the same;
+//   - between its query and the last frame before it that a closure in force joins to another session, the robot did
+//     not stand still for kMinRideSeconds, or that frame is more than kMotionReach keyframes back, or there is motion
+//     that nothing sensed, or a closure with the session's own past leads over the stop;
+//   - the map has no way from that frame to the match, or each that is found leads through such a stop itself, along a
+//     carried stretch, or over motion that was not measured, so that it tells nothing.
+// The search is for the shortest way (Dijkstra). It gives up after 2^17 frames. Throws StatusError where reads of the
+// graph do.
+std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
+                                                     const storage::ClosureProposalRecord& proposal);
+
+}  // namespace relmap::map
