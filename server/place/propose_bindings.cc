@@ -2,13 +2,17 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
+#include <span>
 #include <unordered_set>
+#include <utility>
 
 #include "proto/geometry/covariance.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
+#include "server/place/pixels_by_row.h"
 #include "server/place/verify.h"
 #include "storage/graph/binding.h"
 
@@ -24,18 +28,65 @@ struct Target {
   ExpectedPixel expected;
 };
 
-bool inside_gate(const AppearanceFeature& feature, const StereoCamera& camera, const Target& target) {
-  const StereoPixel z = pixel_of(feature, camera);
-  const double sigma = pixel_sigma(level_of_scale(feature.scale));  // at least 1: the gate is never under 3 px
-  const Vector3 residual = z - target.expected.pixel;
-  const Matrix3 S = target.expected.covariance + sigma * sigma * Matrix3::Identity();
-  if (is_mono(z)) {
-    const Eigen::Matrix2d S2 = S.topLeftCorner<2, 2>();
-    const Vector2 r = residual.head<2>();
-    return mahalanobis_squared(r, S2) <= kChi2With2At99;
+// The features of a query that may be bound, by the level at which they were measured: where few levels are coarse, the
+// gates of most stay small.
+class Bindable {
+ public:
+  template <typename Free>
+  Bindable(const QueryPicture& query, const Free& free) {
+    std::map<int, std::vector<std::uint32_t>> by_level;
+    for (std::uint32_t f = 0; f < query.features.size(); ++f) {
+      measured_.push_back(pixel_of(query.features[f], query.camera));
+      if (free(query.features[f])) by_level[level_of_scale(query.features[f].scale)].push_back(f);
+    }
+    for (auto& [level, features] : by_level) levels_.push_back(std::make_unique<Level>(level, features, measured_));
   }
-  return mahalanobis_squared(residual, S) <= kChi2With3At99;
-}
+
+  // Appends the features inside the target's gate, ascending.
+  void find_inside_gate(const Target& target, std::vector<std::uint32_t>& found) const {
+    const Matrix3& expected = target.expected.covariance;
+    for (const std::unique_ptr<const Level>& level : levels_) {
+      const double variance = level->sigma * level->sigma;  // at least 1: the gate is never under 3 px
+      const double radius = std::sqrt(kChi2With3At99 * (expected(0, 0) + expected(1, 1) + variance));
+      level->by_row.visit_near(target.expected.pixel.head<2>(), radius, [&](std::uint32_t at) {
+        if (inside_gate(measured_[level->features[at]], variance, target)) found.push_back(level->features[at]);
+      });
+    }
+    std::ranges::sort(found);
+  }
+
+ private:
+  struct Level {
+    Level(int level, std::vector<std::uint32_t> its_features, std::span<const StereoPixel> measured)
+        : sigma(pixel_sigma(level)), features(std::move(its_features)), pixels(pixels_of(features, measured)) {}
+
+    static std::vector<Vector2> pixels_of(std::span<const std::uint32_t> features,
+                                          std::span<const StereoPixel> measured) {
+      std::vector<Vector2> pixels;
+      for (const std::uint32_t f : features) pixels.push_back(measured[f].head<2>());
+      return pixels;
+    }
+
+    const double sigma;
+    const std::vector<std::uint32_t> features;
+    const std::vector<Vector2> pixels;
+    const PixelsByRow by_row{pixels};
+  };
+
+  static bool inside_gate(const StereoPixel& z, double variance, const Target& target) {
+    const Vector3 residual = z - target.expected.pixel;
+    const Matrix3 S = target.expected.covariance + variance * Matrix3::Identity();
+    if (is_mono(z)) {
+      const Eigen::Matrix2d S2 = S.topLeftCorner<2, 2>();
+      const Vector2 r = residual.head<2>();
+      return mahalanobis_squared(r, S2) <= kChi2With2At99;
+    }
+    return mahalanobis_squared(residual, S) <= kChi2With3At99;
+  }
+
+  std::vector<StereoPixel> measured_;
+  std::vector<std::unique_ptr<const Level>> levels_;
+};
 
 std::uint32_t distance(const AppearanceFeature& feature, const Target& target) {
   std::uint32_t best = std::numeric_limits<std::uint32_t>::max();
@@ -70,6 +121,8 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
            recent(seen.of_track[static_cast<std::size_t>(feature.track)].base);
   };
 
+  const Bindable bindable(query, free);
+  std::vector<std::uint32_t> inside;
   struct Best {
     LandmarkId landmark;
     std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
@@ -79,8 +132,9 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
     if (!target) continue;
     std::size_t best = 0;
     std::uint32_t first = std::numeric_limits<std::uint32_t>::max(), second = first;
-    for (std::size_t f = 0; f < query.features.size(); ++f) {
-      if (!free(query.features[f]) || !inside_gate(query.features[f], query.camera, *target)) continue;
+    inside.clear();
+    bindable.find_inside_gate(*target, inside);
+    for (const std::uint32_t f : inside) {
       const std::uint32_t d = distance(query.features[f], *target);
       if (d < first) {
         second = first;
