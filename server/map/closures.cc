@@ -173,8 +173,9 @@ ClosureChange change_states(storage::EditableGraph& map, const std::vector<State
     const auto edge = storage::find_edge(map, change.id);
     if (stays(*edge, change)) continue;
     add_bound(map, *edge, holds_after, landmarks, frames);
-    result.seeds.push_back(edge->a);
     result.seeds.push_back(edge->b);
+    // Bindings change what the query measures. Its place takes part as far as the change ripples.
+    if (change.state != storage::EdgeState::kAccepted) result.seeds.push_back(edge->a);
     if (change.state == storage::EdgeState::kAccepted) {
       result.accepted.push_back(change.id);
       to_carry.insert(change.id);
