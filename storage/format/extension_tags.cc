@@ -74,7 +74,7 @@ bool take_way_around(Extensions& extensions, std::shared_ptr<const WayAround>& a
   read.T = varint::get_se3(r);
   read.covariance = varint::get_matrix6(r, Matrix6::Zero());
   around = std::make_shared<const WayAround>(read);
-  return r.at_end() && read.from.valid() && read.T.R.allFinite() && read.T.t.allFinite() && read.covariance.allFinite();
+  return r.at_end() && read.from.valid();
 }
 
 void add_map_identity(Extensions& extensions, const MapIdentity& identity) {
