@@ -172,6 +172,7 @@ TEST(FrameCodec, WritesRoundedEstimatesInAThirdOfTheBytes) {
   edge.consistent_with.clear();
   edge.history.clear();
   edge.carried_by.clear();
+  edge.around.reset();
   edge.unknown.clear();
   const std::size_t before = encoded(hot).size();
   round_estimates(hot);
