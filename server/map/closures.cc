@@ -20,6 +20,7 @@
 #include "storage/graph/binding.h"
 #include "storage/graph/local_graph.h"
 #include "storage/graph/observers.h"
+#include "storage/map/draft.h"
 
 namespace relmap::map {
 
@@ -107,7 +108,10 @@ std::size_t loop_edges_from(const storage::Graph& graph, FrameId frame) {
 
 // Whether an accepted closure becomes an edge of the present graph (docs/method.md, 2).
 bool should_carry(const storage::Graph& graph, const storage::Edge& closure, std::uint32_t spacing) {
-  const bool fits = storage::is_metric(closure.verification) && closure.verification != storage::Verification::kPnP;
+  // What a deletion left of a ride (deletion.h) only tells that the robot was carried.
+  const bool only_tells = closure.verification == storage::Verification::kCompounded && closure.carried.session != 0;
+  const bool fits =
+      storage::is_metric(closure.verification) && closure.verification != storage::Verification::kPnP && !only_tells;
   return fits && far_apart(graph, closure.a, closure.b, spacing) && loop_edges_from(graph, closure.b) < kMaxLoopEdges;
 }
 
@@ -477,6 +481,25 @@ class Judgement {
     return change_states(map_, changes, cause_, spacing_);
   }
 
+  // The opponents of a ride's closures once it is known that the robot was carried along `stretch`: those before the
+  // ride oppose those behind it only as long as the way between them leads along the odometry.
+  std::set<EdgeId> outvoted_by_ride(const std::vector<EdgeId>& ride, const storage::FrameRange& stretch) const {
+    storage::Draft with_it(map_);
+    for (const EdgeId member : ride) {
+      storage::Edge& edge = *with_it.edit_hot(member.frame).edge(member);
+      edge.carried = stretch;
+      enter_carrier(with_it, storage::Edge(edge));
+    }
+    std::set<EdgeId> against;
+    for (const EdgeId member : ride)
+      if (!is_accepted(map_, member))
+        against.merge(opponents(with_it, member,
+                                test_consistency(with_it, *storage::find_edge(with_it, member), rules_).conflicting,
+                                rules_));
+    for (const EdgeId member : ride) against.erase(member);
+    return against;
+  }
+
   // Judges a proposal that contradicts the odometry: either the robot was carried, or it is refused.
   ClosureChange judge_ride() {
     const auto refused = [&] { return stays_candidate(Reason::CONTRADICTS_MOTION, id_); };
@@ -484,7 +507,7 @@ class Judgement {
     const std::vector<EdgeId> ride = of_one_ride(map_, id_, rules_.reach);
     const CarryingEvidence evidence = weigh_carrying(map_, ride);
     if (!evidence.speaks_for_carrying()) return refused();
-    const std::set<EdgeId> outvoted = outvoted_by(ride, opponents(map_, id_, near_.conflicting, rules_));
+    const std::set<EdgeId> outvoted = outvoted_by_ride(ride, evidence.stretch);
     const std::size_t votes = largest_consistent_set(map_, id_, near_.agreeing).size();
     if (strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) return refused();
     std::vector<StateChange> accepted;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/map/carried_stretch.h"
+#include "server/map/closure_states.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/unmeasured_steps.h"
@@ -530,14 +531,24 @@ void Deletion::keep_ride(const storage::Edge& gone) {
   edge.b = gone.b;
   const auto hot = map_.hot(edge.b);
   const bool known = std::any_of(hot->edges.begin(), hot->edges.end(), [&](const storage::Edge& other) {
-    return other.a == edge.a && other.verification == storage::Verification::kCompounded;
+    return other.a == edge.a && other.verification == storage::Verification::kCompounded && other.carried.session != 0;
   });
   if (known || !map_.hot(edge.a)) return;
   edge.carries = false;
   edge.T_ab = edge.prior_T_ab = gone.around->T;
   edge.covariance = edge.prior_covariance = gone.around->covariance;
   edge.carried = gone.carried;
-  enter_carrier(map_, add_compounded(std::move(edge)));
+  edge = add_compounded(std::move(edge));
+  enter_carrier(map_, edge);
+  // They go on voting for the ride together.
+  const EdgeId first_step{{edge.carried.session, edge.carried.first + 1}, 0};
+  std::vector<EdgeId> others;
+  if (const auto step = storage::find_edge(map_, first_step))
+    for (const EdgeId id : step->carried_by)
+      if (const auto other = storage::find_edge(map_, id);
+          id != edge.id && other && other->verification == storage::Verification::kCompounded)
+        others.push_back(id);
+  remember_agreement(map_, edge.id, others);
 }
 
 // Stores a closure that replaces what was known through frames that go. Returns it with its id.

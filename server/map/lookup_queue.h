@@ -69,8 +69,8 @@ class LookupQueue {
   bool is_waiting(SessionNumber session) const;
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
-  // Whether kMaxWaiting frames wait, with those of `queued` records that are on their way, so that no more keyframes
-  // should be taken in before some have been looked up.
+  // Whether the frames that wait, and the `queued` records that may become such frames, are kMaxWaiting or more, so
+  // that no more keyframes should be taken in before some have been looked up.
   bool is_full(std::size_t queued) const;
 
  private:

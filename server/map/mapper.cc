@@ -448,7 +448,8 @@ Status Mapper::Impl::submit(storage::JournalRecord record, Done done) {
     if (Status status = health(); !status.ok()) return status;
   // Lookups share the queue's memory, and what they find must still fit in.
   if (std::holds_alternative<storage::KeyframeRecord>(record)) {
-    if (lookups.is_full(durable.size())) return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
+    if (lookups.is_full(recognises_places() ? durable.size() : 0))
+      return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
     if (durable.lag_s() > static_cast<double>(kMaxWorkerLag.count()))
       return {Reason::BUDGET_EXCEEDED, "the worker is too far behind"};
   }

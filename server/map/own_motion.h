@@ -9,7 +9,7 @@
 
 namespace relmap::map {
 
-inline constexpr std::uint32_t kMotionReach = 1000;  // keyframes that lie between two that are compared, at most
+inline constexpr std::uint32_t kMotionReach = 1000;  // largest difference of index of two keyframes that are compared
 
 // Whether `from` is an earlier keyframe of the session of `to`, near enough to be compared.
 inline bool within_motion_reach(FrameId from, FrameId to) {

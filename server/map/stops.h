@@ -12,7 +12,7 @@ inline constexpr double kMinRideSeconds = 3;  // without interruption
 // How long a robot has stood still without interruption, followed step by step in either direction.
 class Standing {
  public:
-  // Adds a step; returns whether the robot has stood for kMinRideSeconds by now. It did not stand along a closure.
+  // Adds a step; returns whether the robot has stood for kMinRideSeconds by now. A closure ends a stand.
   bool is_stop(const storage::Edge& step) {
     const bool stands = step.kind != storage::EdgeKind::kLoop && storage::stood(step);
     stood_s_ = stands ? stood_s_ + double{step.standing_s} : 0;

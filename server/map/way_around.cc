@@ -1,5 +1,7 @@
 #include "server/map/way_around.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -22,6 +24,9 @@ constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};  // metres
 bool is_closure_in_force(const storage::Edge& edge) {
   return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted;
 }
+
+// Whether it replaces a path through a deleted session, of which nobody knows whether somebody stood on it.
+bool is_bridge(const storage::Edge& edge) { return edge.verification == storage::Verification::kCompounded; }
 
 bool is_joined_to_another(const storage::Graph& graph, FrameId frame, const storage::FrameHot& hot) {
   const auto joins = [&](const storage::Edge& edge) {
@@ -47,7 +52,8 @@ std::optional<FrameId> joined_before_stop(const storage::Graph& graph, FrameId q
     if (at != query) {
       if (is_joined_to_another(graph, at, *hot)) return stopped ? std::optional(at) : std::nullopt;
       for (const storage::Edge& edge : hot->edges)
-        if (is_closure_in_force(edge) && edge.a.session == at.session) covered = std::min(covered, edge.a.index);
+        if (is_closure_in_force(edge) && !is_bridge(edge) && within_motion_reach(edge.a, at))
+          covered = std::min(covered, edge.a.index);
     }
     if (!motion || !motion->in_graph() || motion->source == MotionSource::kUnsensed) return std::nullopt;
     if (motion->carried_by.empty() && motion->a.index < covered)
@@ -59,10 +65,13 @@ std::optional<FrameId> joined_before_stop(const storage::Graph& graph, FrameId q
   return std::nullopt;
 }
 
-// The transform along the shortest way; nullopt if it does not tell it.
-std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from, FrameId to) {
-  const auto route = route::find_route(graph, {&from, 1}, {&to, 1}, {.weights = kWithoutStops},
-                                       {.max_frames = kMaxFrames, .proceed = {}});
+// The transform along the cheapest way; nullopt if it does not tell it.
+std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from, FrameId to,
+                                      const route::RouteWeights& weights) {
+  route::RouteOptions options;
+  options.weights = weights;
+  options.filter.against_oneway = true;
+  const auto route = route::find_route(graph, {&from, 1}, {&to, 1}, options, {.max_frames = kMaxFrames, .proceed = {}});
   if (!route.ok()) return std::nullopt;
   storage::CompoundedChain chain;
   double metres = 0;
@@ -71,7 +80,8 @@ std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from,
   while (const auto at = walk.next()) {
     if (!at->edge) break;
     const storage::Edge& edge = **at->edge;
-    if (!edge.carried_by.empty() || storage::is_unmeasured(edge) || standing.is_stop(edge)) return std::nullopt;
+    if (!edge.carried_by.empty() || storage::is_unmeasured(edge) || is_bridge(edge) || standing.is_stop(edge))
+      return std::nullopt;
     chain.append(edge, at->forward);
     metres += route::length_m(edge);
   }
@@ -81,15 +91,31 @@ std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from,
 
 }  // namespace
 
-std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
-                                                     const storage::ClosureProposalRecord& proposal) {
+namespace {
+
+std::shared_ptr<const storage::WayAround> find_way_around(const storage::Graph& graph,
+                                                          const storage::ClosureProposalRecord& proposal) {
   if (within_motion_reach(proposal.match, proposal.query)) return nullptr;
   const auto from = joined_before_stop(graph, proposal.query);
-  const auto to_match = from ? measured_way(graph, *from, proposal.match) : std::nullopt;
+  if (!from) return nullptr;
+  auto to_match = measured_way(graph, *from, proposal.match, route::kByDistance);
+  if (!to_match) to_match = measured_way(graph, *from, proposal.match, kWithoutStops);
   if (!to_match) return nullptr;
   const Uncertain way = *to_match * Uncertain(proposal.T_match_query, proposal.covariance);
   return std::make_shared<const storage::WayAround>(
       storage::WayAround{*from, storage::rounded(way.T.normalized()), storage::rounded(way.covariance)});
+}
+
+}  // namespace
+
+std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
+                                                     const storage::ClosureProposalRecord& proposal) try {
+  return find_way_around(graph, proposal);
+} catch (const StatusError& error) {
+  if (error.status().reason() == Reason::VIEW_EXPIRED) throw;
+  // The search reads much of the map. What is damaged somewhere there must not cost this frame its closure.
+  spdlog::warn("no way around a stop is known for {}: {}", proposal.query.to_string(), error.status().to_string());
+  return nullptr;
 }
 
 }  // namespace relmap::map

@@ -79,6 +79,10 @@ TEST(WayAround, ClosuresWithOthersFramesTellThatTheRobotWasCarried) {
   EXPECT_NEAR(ride->T_ab.t.norm(), 0.2 * (RiddenDrive::kRidden + 1), 0.3);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 
+  for (std::uint32_t i = kJoined - 10; i <= kJoined; ++i)
+    EXPECT_EQ(drive.closure_of(i).state, storage::EdgeState::kAccepted)
+        << i << ": before the ride they were right, too";
+
   const std::uint32_t next = RiddenDrive::kAlights + believed + 2;
   EXPECT_FALSE(drive.looked_up(next).around) << "it is joined to the map again";
   const storage::Edge later = drive.propose(drive.looked_up(next));

@@ -52,7 +52,8 @@ std::vector<FrameId> neighbours_within(const storage::Graph& graph, FrameId cent
       const auto hot = graph.hot(frame);
       if (!hot) continue;
       const auto add = [&](FrameId step, bool free) {
-        if ((free || depth < radius) && seen.insert(step).second) (free ? found : next).push_back(step);
+        if (free ? seen.insert(step).second : depth < radius && !seen.contains(step))
+          (free ? found : next).push_back(step);
       };
       for (const storage::Neighbour& n : storage::neighbours(graph, frame, *hot)) add(n.frame, is_free(frame, *hot, n));
       if (is_mono(frame.session))
@@ -61,7 +62,8 @@ std::vector<FrameId> neighbours_within(const storage::Graph& graph, FrameId cent
       if (seen.size() >= kMaxNeighbours) break;
     }
     const bool ends = next.empty() || seen.size() >= kMaxNeighbours;
-    found.insert(found.end(), next.begin(), next.end());
+    for (const FrameId step : next)
+      if (seen.insert(step).second) found.push_back(step);
     if (ends) return found;
     next.clear();
   }

@@ -22,9 +22,8 @@ std::optional<FrameId> next_of(const storage::Graph& graph, FrameId frame);
 // 1,000. A step is an accepted edge or, in a mono session, which has no edges, the next or previous frame.
 std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centre, std::uint32_t radius);
 
-// The same, but steps at which the robot stood still do not count: however long it stands at a place, it is one place.
-// A closure between two of these frames may be missing, since lookups do not count them either
-// (server/map/lookup.h, first_recent()).
+// The same, but steps at which the robot stood still do not count: where it stands is one place. Lookups propose no
+// closure between such frames (server/map/lookup.h, first_recent()), so nothing else joins them.
 std::vector<FrameId> place_neighbours_driven(const storage::Graph& graph, FrameId centre, std::uint32_t radius);
 
 }  // namespace relmap::place

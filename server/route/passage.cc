@@ -23,7 +23,8 @@ bool Passage::open(const storage::Edge& edge, bool forward) {
     met_filter_ = true;
     return false;
   }
-  if (forward || edge.kind == storage::EdgeKind::kLoop || !is_oneway(edge.id.frame.session)) return true;
+  if (forward || filter_.against_oneway || edge.kind == storage::EdgeKind::kLoop || !is_oneway(edge.id.frame.session))
+    return true;
   met_oneway_ = true;
   return false;
 }

@@ -17,9 +17,12 @@ struct RouteFilter {
   std::unordered_set<FrameId> avoided;  // frames that may not be passed
   std::uint32_t min_support = 0;        // minimum support of an edge in force, in observations
   bool long_loops = true;               // whether loop edges longer than kLongLoopMetres may be used
+  bool against_oneway = false;          // one-way sessions are open in both directions: nobody is going to drive there
   storage::Supposed supposed;           // closures that are taken to be edges, too
 
-  bool refuses_nothing() const { return sessions.empty() && avoided.empty() && min_support == 0 && long_loops; }
+  bool refuses_nothing() const {
+    return sessions.empty() && avoided.empty() && min_support == 0 && long_loops && !against_oneway;
+  }
   bool passes(FrameId frame) const {
     return (sessions.empty() || sessions.contains(frame.session)) && !avoided.contains(frame);
   }

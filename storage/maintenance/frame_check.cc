@@ -31,6 +31,11 @@ void check_edge(FrameId id, const Edge& edge, const Complain& complain_of_frame)
   check_transform(edge.prior_T_ab, "its prior", complain);
   if (!is_covariance(edge.covariance)) complain("its covariance is not a covariance");
   if (!is_covariance(edge.prior_covariance)) complain("its prior's covariance is not a covariance");
+  if (edge.around) {
+    check_transform(edge.around->T, "its way around", complain);
+    if (!is_covariance(edge.around->covariance)) complain("its way around has no covariance");
+    if (edge.around->from.session != id.session) complain("its way around begins in another session");
+  }
   const float numbers[] = {edge.driven_s, edge.standing_s, edge.probability, edge.spread};
   if (!std::all_of(std::begin(numbers), std::end(numbers), [](float x) { return std::isfinite(x); }))
     complain("a number is not finite");

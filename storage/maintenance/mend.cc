@@ -180,6 +180,9 @@ class Mender {
         edge.covariance = edge.prior_covariance;
         edge.correlation_with_previous = {};
       }
+      if (edge.around && (!is_transform(edge.around->T) || !is_covariance(edge.around->covariance) ||
+                          edge.around->from.session != id.session))
+        edge.around.reset();
       for (float* number : {&edge.driven_s, &edge.standing_s, &edge.probability, &edge.spread})
         if (!std::isfinite(*number)) *number = 0;
       std::sort(edge.bound_frames.begin(), edge.bound_frames.end());

@@ -19,11 +19,11 @@ const char* explanation(Reason reason) {
     case Reason::INCONSISTENT:
       return "a larger set of closures contradicts it";
     case Reason::CONTRADICTS_MOTION:
-      return "the robot's own motion between its ends contradicts it";
+      return "the robot's own motion contradicts it";
     case Reason::ACCEPTED_BY_OPERATOR:
       return "an operator put it into force";
     case Reason::CARRIED:
-      return "other closures agree: the robot was carried between its ends";
+      return "other closures agree: the robot was carried before it saw this place";
     case Reason::BEYOND_DOUBT:
       return "its geometry is strong, and no other place comes near it";
     case Reason::LOOKS_ALIKE:
