@@ -26,6 +26,7 @@ TEST(Vast, ATownIsTakenInWholeThoughTheDaemonIsKilled) {
   EXPECT_GT(figures["closures_right"], 30);
   EXPECT_LE(figures["closures_wrong"], 0.01 * figures["closures_right"]);
   EXPECT_EQ(figures["places_wrong"], 0);
+  EXPECT_EQ(figures["carried_wrongly"], 0);
   EXPECT_NE(read_text(page).find("Beside the paper"), std::string::npos);
 }
 

@@ -75,6 +75,8 @@ void report_map(const VastVerdict& verdict, Report& report) {
   report.add("rides", static_cast<double>(verdict.rides), "in trains");
   report.add("rides_returned", static_cast<double>(verdict.rides_returned), "after which a known place was seen");
   report.add("rides_closed", static_cast<double>(verdict.rides_closed), "of these, known to have carried the robot");
+  report.add("carried_wrongly", static_cast<double>(verdict.carried_wrongly),
+             "closures in force that tell of a ride where there was none");
   report.add("odometry_error_p50_m", median(verdict.odometry_error_m), "at revisits, by the robot's odometry");
   report.add("map_error_p50_m", median(verdict.map_error_m), "at revisits, through the map");
   report.add("map_error_max_m", greatest(verdict.map_error_m), "");

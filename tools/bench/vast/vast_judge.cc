@@ -135,6 +135,7 @@ class TownJudge {
         continue;
       }
       if (edge.state != storage::EdgeState::kAccepted) continue;
+      verdict.carried_wrongly += edge.carried.session != 0 && !rode(edge.carried);
       const SE3 error = (truth(edge.a).inverse() * truth(edge.b)).inverse() * edge.T_ab;
       if (!testing::is_wrong(error, edge.covariance)) {
         ++(testing::is_wrong(error) ? verdict.closures_vague : verdict.closures_right);
@@ -146,6 +147,14 @@ class TownJudge {
                                 std::to_string(error.t.norm()) + " m off, " + std::to_string(edge.inliers) +
                                 " inliers");
     }
+  }
+
+  // Whether a train ran somewhere along the stretch.
+  bool rode(const storage::FrameRange& stretch) const {
+    const sim::CityDrive& drive = robots_.at(stretch.session)->drive();
+    for (std::uint32_t i = stretch.first; i <= stretch.last; ++i)
+      if (drive.at(i).running) return true;
+    return false;
   }
 
   bool is_bound(FrameId frame) const {
