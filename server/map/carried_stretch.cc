@@ -90,6 +90,12 @@ place::AcrossCarried across_as_measured(const storage::Graph& graph, Drift drift
   return [measured](const storage::Edge& step) { return measured->across(step); };
 }
 
+void say_carried(storage::EditableGraph& map, EdgeId closure, const storage::FrameRange& stretch) {
+  storage::Edge& edge = *map.edit_hot(closure.frame).edge(closure);
+  edge.carried = stretch;
+  enter_carrier(map, storage::Edge(edge));
+}
+
 void enter_carrier(storage::EditableGraph& map, const storage::Edge& closure) {
   for_each_step(map, closure, [&](std::vector<EdgeId>& carriers) { insert_sorted(carriers, closure.id); });
 }

@@ -20,6 +20,9 @@ std::optional<storage::Edge> measured_stretch(const storage::Graph& graph, const
 // lead over it. The graph must not change while it is in use.
 place::AcrossCarried across_as_measured(const storage::Graph& graph, Drift drift);
 
+// Lets a closure say that the robot was carried along `stretch`, and enters it there.
+void say_carried(storage::EditableGraph& map, EdgeId closure, const storage::FrameRange& stretch);
+
 // Adds `closure`, which came into force, to Edge::carried_by along its stretch, or takes it out there.
 void enter_carrier(storage::EditableGraph& map, const storage::Edge& closure);
 void take_out_carrier(storage::EditableGraph& map, const storage::Edge& closure);

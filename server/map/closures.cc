@@ -177,14 +177,14 @@ ClosureChange change_states(storage::EditableGraph& map, const std::vector<State
     const auto edge = storage::find_edge(map, change.id);
     if (stays(*edge, change)) continue;
     add_bound(map, *edge, holds_after, landmarks, frames);
+    // What comes into force changes what the query measures; its place takes part as far as the change ripples.
     result.seeds.push_back(edge->b);
-    // Bindings change what the query measures. Its place takes part as far as the change ripples.
-    if (change.state != storage::EdgeState::kAccepted) result.seeds.push_back(edge->a);
     if (change.state == storage::EdgeState::kAccepted) {
       result.accepted.push_back(change.id);
       to_carry.insert(change.id);
       if (withdrawing || should_carry(map, *edge, spacing)) ends.insert(edge->b);
     } else {
+      result.seeds.push_back(edge->a);
       result.withdrawn.push_back(change.id);
       if (edge->state == storage::EdgeState::kAccepted) result.out_of_force.push_back(change.id);
       if (!edge->in_graph()) continue;
@@ -458,12 +458,15 @@ class Judgement {
     return {};
   }
 
+  std::set<EdgeId> opponents_of(const storage::Graph& graph, EdgeId id) const {
+    return opponents(graph, id, test_consistency(graph, *storage::find_edge(graph, id), rules_).conflicting, rules_);
+  }
+
   // `against`, and the opponents of the other winners that are not accepted yet; without the winners themselves.
-  std::set<EdgeId> outvoted_by(const std::vector<EdgeId>& winners, std::set<EdgeId> against) const {
+  std::set<EdgeId> outvoted_by(const storage::Graph& graph, const std::vector<EdgeId>& winners,
+                               std::set<EdgeId> against) const {
     for (const EdgeId member : winners)
-      if (member != id_ && !is_accepted(map_, member))
-        against.merge(opponents(map_, member,
-                                test_consistency(map_, *storage::find_edge(map_, member), rules_).conflicting, rules_));
+      if (member != id_ && !is_accepted(graph, member)) against.merge(opponents_of(graph, member));
     for (const EdgeId member : winners) against.erase(member);
     return against;
   }
@@ -485,19 +488,8 @@ class Judgement {
   // ride oppose those behind it only as long as the way between them leads along the odometry.
   std::set<EdgeId> outvoted_by_ride(const std::vector<EdgeId>& ride, const storage::FrameRange& stretch) const {
     storage::Draft with_it(map_);
-    for (const EdgeId member : ride) {
-      storage::Edge& edge = *with_it.edit_hot(member.frame).edge(member);
-      edge.carried = stretch;
-      enter_carrier(with_it, storage::Edge(edge));
-    }
-    std::set<EdgeId> against;
-    for (const EdgeId member : ride)
-      if (!is_accepted(map_, member))
-        against.merge(opponents(with_it, member,
-                                test_consistency(with_it, *storage::find_edge(with_it, member), rules_).conflicting,
-                                rules_));
-    for (const EdgeId member : ride) against.erase(member);
-    return against;
+    for (const EdgeId member : ride) say_carried(with_it, member, stretch);
+    return outvoted_by(with_it, ride, opponents_of(with_it, id_));
   }
 
   // Judges a proposal that contradicts the odometry: either the robot was carried, or it is refused.
@@ -588,7 +580,7 @@ class Judgement {
       partners.pop_back();
     for (const std::vector<EdgeId>& agreeing : partners) {
       std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
-      const std::set<EdgeId> outvoted = outvoted_by(set, against);
+      const std::set<EdgeId> outvoted = outvoted_by(map_, set, against);
       // A tie is decided against a ride, because that is the simpler explanation.
       const std::size_t votes = set.size() + (motion_.verdict == MotionVerdict::kDenies ? 1 : 0);
       if (set.size() < 2 || strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) continue;

@@ -226,9 +226,7 @@ Word word_on(const storage::Graph& graph, EdgeId id) {
   if (word.carried.session != 0) {
     // Closures on either side of the ride agree with the odometry. They can be in force together with this one once the
     // path between them crosses the ride as this one measured it.
-    storage::Edge& carrier = *with_it.edit_hot(id.frame).edge(id);
-    carrier.carried = word.carried;
-    enter_carrier(with_it, storage::Edge(carrier));
+    say_carried(with_it, id, word.carried);
     word.against = opponents(with_it, id, test_consistency(with_it, *storage::find_edge(with_it, id)).conflicting);
   } else {
     word.carried = carried_by_word(graph, id, near.agreeing, word.against);

@@ -65,18 +65,12 @@ std::optional<FrameId> joined_before_stop(const storage::Graph& graph, FrameId q
   return std::nullopt;
 }
 
-// The transform along the cheapest way; nullopt if it does not tell it.
-std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from, FrameId to,
-                                      const route::RouteWeights& weights) {
-  route::RouteOptions options;
-  options.weights = weights;
-  options.filter.against_oneway = true;
-  const auto route = route::find_route(graph, {&from, 1}, {&to, 1}, options, {.max_frames = kMaxFrames, .proceed = {}});
-  if (!route.ok()) return std::nullopt;
+// The transform along a way; nullopt if the way does not tell it.
+std::optional<Uncertain> transform_along(const storage::Graph& graph, const route::Path& path) {
   storage::CompoundedChain chain;
   double metres = 0;
   Standing standing;
-  route::PathWalk walk(graph, route->path);
+  route::PathWalk walk(graph, path);
   while (const auto at = walk.next()) {
     if (!at->edge) break;
     const storage::Edge& edge = **at->edge;
@@ -86,20 +80,28 @@ std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from,
     metres += route::length_m(edge);
   }
   const ConsistencyRules rules;
-  return Uncertain({to, chain.T(), chain.covariance(), metres}, Drift{rules.drift_share, rules.drift_radians});
+  return Uncertain({path.to, chain.T(), chain.covariance(), metres}, Drift{rules.drift_share, rules.drift_radians});
 }
 
-}  // namespace
-
-namespace {
+// The transform along the shortest way or, if that does not tell it, along the one with the least standing.
+std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from, FrameId to) {
+  route::RouteOptions options;
+  options.filter.against_oneway = true;
+  for (const route::RouteWeights& weights : {route::kByDistance, kWithoutStops}) {
+    options.weights = weights;
+    const auto route =
+        route::find_route(graph, {&from, 1}, {&to, 1}, options, {.max_frames = kMaxFrames, .proceed = {}});
+    if (!route.ok()) return std::nullopt;  // no way, whatever it costs
+    if (auto told = transform_along(graph, route->path)) return told;
+  }
+  return std::nullopt;
+}
 
 std::shared_ptr<const storage::WayAround> find_way_around(const storage::Graph& graph,
                                                           const storage::ClosureProposalRecord& proposal) {
   if (within_motion_reach(proposal.match, proposal.query)) return nullptr;
   const auto from = joined_before_stop(graph, proposal.query);
-  if (!from) return nullptr;
-  auto to_match = measured_way(graph, *from, proposal.match, route::kByDistance);
-  if (!to_match) to_match = measured_way(graph, *from, proposal.match, kWithoutStops);
+  const auto to_match = from ? measured_way(graph, *from, proposal.match) : std::nullopt;
   if (!to_match) return nullptr;
   const Uncertain way = *to_match * Uncertain(proposal.T_match_query, proposal.covariance);
   return std::make_shared<const storage::WayAround>(

@@ -17,9 +17,8 @@ namespace relmap::map {
 //     not stand still for kMinRideSeconds, or that frame is more than kMotionReach keyframes back, or there is motion
 //     that nothing sensed, or a closure with the session's own past leads over the stop;
 //   - the map has no way from that frame to the match, or both the shortest way and the one with the least standing
-//   lead
-//     through such a stop themselves, along a carried stretch, over motion that was not measured or through a deleted
-//     session, so that they tell nothing.
+//     lead through such a stop themselves, along a carried stretch, over motion that was not measured or through a
+//     deleted session, so that they tell nothing.
 // A search (Dijkstra) gives up after 2^17 frames, and where the map is damaged. Throws StatusError VIEW_EXPIRED.
 std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
                                                      const storage::ClosureProposalRecord& proposal);
