@@ -29,7 +29,7 @@ BenchFigures fleet(double seconds, double rate, const std::vector<std::string>& 
 // The capacity of this machine at the moment relative to two idle cores, of which twenty robots need half: measured by
 // taking in, relaxing and looking up keyframes as fast as possible. From 0.1 to 1.
 double machine_share() {
-  constexpr double kOfTwoCores = 900;
+  constexpr double kOfTwoCores = 1200;
   const BenchFigures figures({"fleet", "--robots", "1", "--seconds", "0.2", "--no-closures", "--batch", "1000"},
                              std::chrono::seconds(500));
   const double share = std::clamp(figures["batch_full_frames_per_s"] / kOfTwoCores, 0.1, 1.0);

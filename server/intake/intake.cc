@@ -230,7 +230,8 @@ void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t 
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
   const bool sound = entry.intake.take(sequence, std::move(payload)).ok();
   if (!sound) entry.schedule.news();
-  advance(session, entry, now);
+  join_line(session, entry);
+  serve_line(now);
   if (sound && entry.begun && !std::exchange(entry.announced, true))
     note(RobotEvent::Kind::kHeard, session, entry, now);
 }
@@ -247,7 +248,8 @@ void Intake::take_gap(const Gap& gap, SteadyTime now) try {
   if (!entry) return refuse(Reason::BUDGET_EXCEEDED);
   entry->schedule.news();
   entry->intake.give_up(gap.from, gap.to, gap.reason);
-  advance(gap.session, *entry, now);
+  join_line(gap.session, *entry);
+  serve_line(now);
 } catch (const StatusError& error) {
   ++stats_.messages_refused[index_of(error.status().reason())];
 }
@@ -265,14 +267,36 @@ void Intake::take_end(const SessionEnd& end, SteadyTime now) try {
 
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
 
-void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
+// Why nothing of the session is being journalled; OK if it is.
+Status Intake::blocked(const Entry& entry) const { return entry.in_line ? no_room_ : entry.intake.blocked(); }
+
+void Intake::join_line(const SessionUuid& session, Entry& entry) {
+  if (!std::exchange(entry.in_line, true)) line_.push_back(session);
+}
+
+// Submits what the sessions in line have, one record of each in turn, until the sink has no more room.
+void Intake::serve_line(SteadyTime now) {
   take_outcomes(now);  // records that failed must be submitted again before later ones
-  entry.intake.advance();
-  if (!entry.begun && entry.intake.begun()) {
-    entry.begun = true;
-    ++begun_version_;
+  while (!line_.empty()) {
+    const SessionUuid session = line_.front();
+    const auto it = sessions_.find(session);
+    if (it != sessions_.end()) {
+      Entry& entry = it->second;
+      const bool more = entry.intake.submit_next();
+      if (!entry.begun && entry.intake.begun()) {
+        entry.begun = true;
+        ++begun_version_;
+      }
+      reassembly_.forget(session, entry.intake.turn());
+      if (entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED) {
+        no_room_ = entry.intake.blocked();
+        return;
+      }
+      entry.in_line = false;
+      if (more) join_line(session, entry);
+    }
+    line_.pop_front();
   }
-  reassembly_.forget(session, entry.intake.turn());
 }
 
 void Intake::take_outcomes(SteadyTime now) {
@@ -332,27 +356,21 @@ bool Intake::paced(Entry& entry, std::uint32_t sequence, SteadyTime now) {
   return false;
 }
 
-// Each poll begins with the session after the one that the last poll began with, so that scarce room is given in turn.
 std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   take_outcomes(now);
   forget_silent(now);
   tell_of_namesakes(now);
+  for (auto& [session, entry] : sessions_)
+    if (!entry.intake.blocked().ok()) join_line(session, entry);
+  serve_line(now);
   std::vector<Acknowledgement> due;
-  const auto serve = [&](auto first, auto last) {
-    for (auto it = first; it != last; ++it) {
-      auto& [session, entry] = *it;
-      if (!entry.intake.blocked().ok()) advance(session, entry, now);
-      tell_pace(session, entry, now);
-      const SteadyTime said = entry.schedule.due(imperfect(session, entry));
-      if (said > now || (!entry.begun && said > entry.schedule.last_heard() + kStranger)) continue;
-      entry.schedule.sent(now);
-      due.push_back(make_acknowledgement(session, entry));
-    }
-  };
-  const auto first = sessions_.upper_bound(first_served_);
-  serve(first, sessions_.end());
-  serve(sessions_.begin(), first);
-  first_served_ = first == sessions_.end() ? SessionUuid{} : first->first;
+  for (auto& [session, entry] : sessions_) {
+    tell_pace(session, entry, now);
+    const SteadyTime said = entry.schedule.due(imperfect(session, entry));
+    if (said > now || (!entry.begun && said > entry.schedule.last_heard() + kStranger)) continue;
+    entry.schedule.sent(now);
+    due.push_back(make_acknowledgement(session, entry));
+  }
   stats_.acknowledgements += due.size();
   return due;
 }
@@ -361,7 +379,7 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
 void Intake::tell_pace(const SessionUuid& session, Entry& entry, SteadyTime now) {
   replenish(entry, now);
   const bool limited = entry.limited_at != SteadyTime{} && now - entry.limited_at < kHeldBack;
-  const bool full = entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED;
+  const bool full = blocked(entry).reason() == Reason::BUDGET_EXCEEDED;
   if (!limited && !full) {
     entry.held_back_since = {};
     if (entry.slowed_at == SteadyTime{} || now - entry.slowed_at < kToldAgain) return;
@@ -381,9 +399,9 @@ SteadyTime Intake::next_due(SteadyTime now) const {
   for (const auto& [session, entry] : sessions_) {
     const SteadyTime said = entry.schedule.due(imperfect(session, entry));
     if (entry.begun || said <= entry.schedule.last_heard() + kStranger) next = std::min(next, said);
-    const Reason blocked = entry.intake.blocked().reason();
-    if (blocked != Reason::OK)
-      next = std::min(next, now + (blocked == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails));
+    const Reason reason = blocked(entry).reason();
+    if (reason != Reason::OK)
+      next = std::min(next, now + (reason == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails));
   }
   return next;
 }
@@ -397,8 +415,8 @@ bool Intake::imperfect(const SessionUuid& session, const Entry& entry) const {
 // The keyframes that have come already, and as many more as there is room for, shared among the sessions. At least one
 // unless the sink fails or the rate limit is reached; otherwise nothing would ever be sent again.
 std::uint32_t Intake::credits(const SessionUuid& session, const Entry& entry) const {
-  const Status& blocked = entry.intake.blocked();
-  if (!blocked.ok() && blocked.reason() != Reason::BUDGET_EXCEEDED) return 0;
+  const Reason reason = blocked(entry).reason();
+  if (reason != Reason::OK && reason != Reason::BUDGET_EXCEEDED) return 0;
   const std::size_t reserved = budget_.used(storage::Share::kReassembly);
   const std::size_t allowed = budget_.allowance(storage::Share::kReassembly);
   const std::size_t room = std::min(sink_.free_bytes(), allowed - std::min(allowed, reserved));
@@ -438,7 +456,7 @@ IngestStats Intake::stats(SteadyTime now) const {
   for (const auto& [session, entry] : sessions_) {
     stats.heard += entry.schedule.last_heard() + kLately > now;
     stats.incomplete += reassembly_.incomplete(session).size();
-    if (stats.blocked.ok()) stats.blocked = entry.intake.blocked();
+    if (stats.blocked.ok()) stats.blocked = blocked(entry);
   }
   for (const auto& [session, silent] : silent_) stats.heard += silent.heard + kLately > now;
   return stats;
@@ -463,7 +481,7 @@ RobotStats Intake::stats_of(const SessionUuid& session, Entry& entry, SteadyTime
   robot.credits = ack.credits;
   robot.refused = entry.intake.refusals();
   robot.not_taken = entry.not_taken;
-  robot.blocked = entry.intake.blocked().reason();
+  robot.blocked = blocked(entry).reason();
   if (entry.by_parts) robot.limit_hz = options_.max_keyframes_per_s;
   return robot;
 }

@@ -2,6 +2,7 @@
 // Deterministic apart from the sink, since time is an argument. Not thread-safe; IngestServer adds a lock and threads.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -81,6 +82,7 @@ class Intake {
     SteadyTime held_back_since{};  // since when it sends more than is taken; epoch: it does not
     SteadyTime slowed_at{};        // when it was last told to slow down; epoch: never, or told to resume
     SteadyTime heard_first{};
+    bool in_line = false;
     bool begun = false;
     bool announced = false;      // kHeard has been logged
     bool namesake_told = false;  // kSameName has been logged
@@ -112,6 +114,7 @@ class Intake {
   Namesakes namesakes(SteadyTime now) const;
   void tell_of_namesakes(SteadyTime now);
   void note(RobotEvent::Kind kind, const SessionUuid& session, const Entry& entry, SteadyTime now);
+  Status blocked(const Entry& entry) const;
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void replenish(Entry& entry, SteadyTime now);
   bool paced(Entry& entry, std::uint32_t sequence, SteadyTime now);
@@ -120,7 +123,8 @@ class Intake {
   void take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
                   SteadyTime now);
   void take_outcomes(SteadyTime now);
-  void advance(const SessionUuid& session, Entry& entry, SteadyTime now);
+  void join_line(const SessionUuid& session, Entry& entry);
+  void serve_line(SteadyTime now);
   bool imperfect(const SessionUuid& session, const Entry& entry) const;
   std::uint32_t credits(const SessionUuid& session, const Entry& entry) const;
   Acknowledgement make_acknowledgement(const SessionUuid& session, const Entry& entry) const;
@@ -140,7 +144,10 @@ class Intake {
   std::map<SessionUuid, Entry> sessions_;
   std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};
-  SessionUuid first_served_;  // the session with which the last poll() began
+  // Sessions that have something to submit, in the order in which they are served, one record at a time. It is empty
+  // but while the sink has no room: then a session that sends more than others waits longer than they do.
+  std::deque<SessionUuid> line_;
+  Status no_room_;  // why the first of them waits
   std::vector<PoseNews> news_;
   std::vector<RobotEvent> events_;
   std::uint64_t begun_version_ = 0;

@@ -668,6 +668,30 @@ TEST_F(IntakeTest, SessionsGetRoomInTurn) {
   for (const SessionUuid& session : sessions) EXPECT_GE(intake_->acknowledgement(session)->next_sequence, 4u);
 }
 
+// The room that appears goes to those who wait, not to whoever sends at the moment, and to each of them alike.
+TEST_F(IntakeTest, WhoSendsMuchDoesNotTakeTheRoomForWhichOthersWait) {
+  sink_.capacity = 2;
+  const SessionUuid much = uuid_;
+  for (std::uint32_t s = 0; s < 20; ++s) send(s);
+  uuid_.bytes.fill(7);
+  const SessionUuid little = uuid_;
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  (void)intake_->poll(now_);
+  for (const RobotStats& robot : intake_->robots(now_)) EXPECT_EQ(robot.blocked, Reason::BUDGET_EXCEEDED);
+  uuid_ = much;
+  for (std::uint32_t s = 20; s < 28; ++s) {
+    sink_.sync(1);
+    send(s);  // at once, before any poll
+  }
+  (void)intake_->poll(now_);
+  EXPECT_EQ(intake_->acknowledgement(little)->next_sequence, 3u);
+  EXPECT_EQ(intake_->acknowledgement(much)->next_sequence, 5u);
+  for (int round = 0; round < 20; ++round) settle();
+  EXPECT_EQ(intake_->acknowledgement(much)->next_sequence, 28u);
+  for (const RobotStats& robot : intake_->robots(now_)) EXPECT_EQ(robot.blocked, Reason::OK);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
 TEST_F(IntakeTest, ReportsTheStateOfEachRobot) {
   for (const std::uint32_t s : {0, 1, 5}) send(s);
   const Bytes payload = encode_keyframe(keyframe(3));

@@ -125,28 +125,22 @@ void SessionIntake::note_conflict(std::uint32_t sequence, std::uint32_t crc, Rea
   if (conflicts_.size() > kMaxConflicts) conflicts_.pop_front();
 }
 
-void SessionIntake::advance() {
-  if (broken_) return;
+bool SessionIntake::submit_next() {
+  if (broken_) return false;
   blocked_ = {};
-  for (;;) {
-    if (const auto it = held_.find(static_cast<std::uint32_t>(turn_)); turn_ <= UINT32_MAX && it != held_.end()) {
-      if (!judge_keyframe(it->first, it->second)) return;
-      waiting_bytes_ -= it->second.payload.size();
-      held_.erase(it);
-      continue;
-    }
-    // Gives up a range, except the sequences of it that came all the same.
-    auto gap = given_up_.begin();
-    if (gap == given_up_.end() || gap->first > turn_) return;
-    if (gap->second.to >= turn_) {
-      const auto next_held = held_.lower_bound(static_cast<std::uint32_t>(turn_));
-      const std::uint32_t to =
-          next_held == held_.end() ? gap->second.to : std::min(gap->second.to, next_held->first - 1);
-      if (!judge_gap(to, gap->second.reason)) return;
-      if (to < gap->second.to) continue;
-    }
-    given_up_.erase(gap);
+  if (const auto it = held_.find(static_cast<std::uint32_t>(turn_)); turn_ <= UINT32_MAX && it != held_.end()) {
+    if (!judge_keyframe(it->first, it->second)) return false;
+    waiting_bytes_ -= it->second.payload.size();
+    held_.erase(it);
+    return true;
   }
+  while (!given_up_.empty() && given_up_.begin()->second.to < turn_) given_up_.erase(given_up_.begin());
+  // Gives up a range, except the sequences of it that came all the same.
+  const auto gap = given_up_.begin();
+  if (gap == given_up_.end() || gap->first > turn_) return false;
+  const auto next_held = held_.lower_bound(static_cast<std::uint32_t>(turn_));
+  const std::uint32_t to = next_held == held_.end() ? gap->second.to : std::min(gap->second.to, next_held->first - 1);
+  return judge_gap(to, gap->second.reason);
 }
 
 // Not OK if an operator has frozen or deleted the session.

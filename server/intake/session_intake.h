@@ -49,8 +49,9 @@ class SessionIntake {
   // the robot has to repeat it. Does nothing if the session has ended already, or is frozen or deleted.
   void end(std::uint64_t next_sequence);
 
-  // Submits everything whose turn has come. Call after take() and give_up(), and repeatedly while blocked() is not OK.
-  void advance();
+  // Submits the next record whose turn has come. False if there is none, or if blocked() is not OK now. Call it after
+  // take() and give_up() until it returns false, and again while blocked() is not OK.
+  bool submit_next();
   // Handles the outcome of a submitted record.
   void settle(std::uint64_t ticket, const Status& outcome);
 

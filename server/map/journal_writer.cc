@@ -89,11 +89,11 @@ void JournalWriter::run() {
     } else {
       group.swap(queue_);
     }
-    writing_ = true;
+    writing_ = group.size();
     lock.unlock();
     write(std::move(group));
     lock.lock();
-    writing_ = false;
+    writing_ = 0;
     lock.unlock();
     on_idle_();
     lock.lock();
@@ -166,9 +166,9 @@ std::uint64_t JournalWriter::durable_through() const {
   return durable_;
 }
 
-bool JournalWriter::idle() const {
+std::size_t JournalWriter::waiting() const {
   const MutexLock lock(mutex_);
-  return queue_.empty() && !writing_;
+  return queue_.size() + writing_;
 }
 
 Status JournalWriter::health() const {

@@ -430,7 +430,7 @@ bool Mapper::Impl::journal_patiently(const storage::JournalRecord& record) {
 }
 
 bool Mapper::Impl::all_done() const {
-  return writer->idle() && durable.empty() && !applying && applied == writer->durable_through() &&
+  return writer->waiting() == 0 && durable.empty() && !applying && applied == writer->durable_through() &&
          lookups.waiting() == 0 && background.done();
 }
 
@@ -448,7 +448,7 @@ Status Mapper::Impl::submit(storage::JournalRecord record, Done done) {
     if (Status status = health(); !status.ok()) return status;
   // Lookups share the queue's memory, and what they find must still fit in.
   if (std::holds_alternative<storage::KeyframeRecord>(record)) {
-    if (lookups.is_full(recognises_places() ? durable.size() : 0))
+    if (lookups.is_full(recognises_places() ? writer->waiting() + durable.size() : 0))
       return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
     if (durable.lag_s() > static_cast<double>(kMaxWorkerLag.count()))
       return {Reason::BUDGET_EXCEEDED, "the worker is too far behind"};
