@@ -69,12 +69,13 @@ namespace relmap {
   X(REMOVED_WITH_SET, 84)     /* went with the consistent set of a removed closure */                                 \
   X(MOTION, 85)               /* accepted: an edge of the robot's own motion */                                       \
   X(DECLARED_GAP, 86)         /* accepted: bridges keyframes the robot gave up */                                     \
-  X(CONTRADICTS_MOTION, 87)   /* candidate: the robot's own motion between its ends says otherwise */                 \
+  X(CONTRADICTS_MOTION, 87)   /* candidate: the robot's own motion says otherwise */                                  \
   X(ACCEPTED_BY_OPERATOR, 88) /* accepted: an operator decided; never outvoted */                                     \
-  X(CARRIED, 89)              /* accepted: shows, as others do, that the robot was carried between its ends */        \
+  X(CARRIED, 89)              /* accepted: shows, as others do, that the robot was carried */                         \
   X(BEYOND_DOUBT, 90)         /* accepted alone: its geometry is strong and no other place comes near it */           \
-  X(LOOKS_ALIKE, 91)   /* another place that looks alike: so say all closures between the two stretches of motion */  \
-  X(REMOVED_ALONE, 92) /* an operator removed this closure and none of those that agree with it */                    \
+  X(LOOKS_ALIKE, 91)     /* another place that looks alike: so say all closures between two stretches of motion */    \
+  X(REMOVED_ALONE, 92)   /* an operator removed this closure and none of those that agree with it */                  \
+  X(NOT_SEEN_BEYOND, 93) /* quarantined: going on, the robot saw nothing of what the map shows */                     \
   /* The daemon and its disk. */                                                                                      \
   X(UNIMPLEMENTED, 100)                                                                                               \
   X(BUDGET_EXCEEDED, 101)                                                                                             \

@@ -27,6 +27,7 @@ namespace relmap::map {
 namespace {
 
 constexpr std::size_t kMaxOfOneRide = 128;  // closures that are weighed together
+constexpr std::size_t kMinUnseen = 8;       // frames that saw nothing of where closures lead; fewer may be a lorry
 constexpr std::size_t kMaxClaims = 4;       // of a landmark: the first in force counts, the others take over if it goes
 
 void set_state(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
@@ -622,6 +623,31 @@ ClosureChange apply_proposal(storage::EditableGraph& map, std::uint64_t sequence
       already_proposed(*query, proposal.match) || is_going(map, proposal.query) || is_going(map, proposal.match))
     return {};
   return Judgement(map, sequence, proposal, loop_edge_spacing, rules).run();
+}
+
+ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, const storage::UnseenRecord& record,
+                           std::uint32_t loop_edge_spacing) {
+  const auto closure = storage::find_edge(map, record.closure);
+  if (!closure || closure->kind != storage::EdgeKind::kLoop || closure->state != storage::EdgeState::kAccepted ||
+      record.frame.session != closure->b.session || record.frame.index <= closure->b.index || !map.hot(record.frame) ||
+      closure->unseen.size() >= storage::kMaxUnseen)
+    return {};
+  insert_sorted(map.edit_hot(closure->b).edge(closure->id)->unseen, record.frame.index);
+
+  std::set<EdgeId> set{closure->id};
+  for (const EdgeId other : closure->consistent_with)
+    if (is_accepted(map, other)) set.insert(other);
+  std::size_t unseen = 0;
+  for (const EdgeId member : set) unseen += storage::find_edge(map, member)->unseen.size();
+  if (unseen < kMinUnseen || unseen <= set.size() || decided_among(map, set)) return {};
+  std::vector<StateChange> changes;
+  for (const EdgeId member : set)
+    changes.push_back({member, storage::EdgeState::kQuarantined, Reason::NOT_SEEN_BEYOND});
+  std::set<EdgeId> gone = set;
+  add_left_alone(map, {}, gone);
+  for (const EdgeId member : gone)
+    if (!set.contains(member)) changes.push_back({member, storage::EdgeState::kQuarantined, Reason::INCONSISTENT});
+  return change_states(map, changes, {sequence, closure->id}, loop_edge_spacing);
 }
 
 ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record) {

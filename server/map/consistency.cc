@@ -102,7 +102,8 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
     if (other.state == storage::EdgeState::kRemoved) return true;
     if (contradicts) return contradicts_odometry(other);
     if (other.carried.session != 0) return other.state == storage::EdgeState::kAccepted;
-    return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE;
+    return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE &&
+           other.reason != Reason::NOT_SEEN_BEYOND;
   };
 
   Neighbourhood result;

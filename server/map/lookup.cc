@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "server/map/unseen.h"
 #include "server/map/way_around.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
@@ -68,6 +69,22 @@ std::optional<OldNeighbour> nearest_old_frame(const storage::Graph& view, FrameI
   old.T_old_frame = chain.T();
   old.covariance = chain.covariance();
   return old;
+}
+
+// Binds the frame to the landmarks around an older frame near by that closures in force join to it.
+std::optional<storage::BindingRecord> bind_to_older(const storage::Graph& view, place::PictureCache& pictures,
+                                                    const place::QueryPicture& query, FrameId frame,
+                                                    std::uint32_t recent) {
+  const auto old = nearest_old_frame(view, frame, recent);
+  if (!old) return std::nullopt;
+  const place::Standpoint standpoint{old->frame, old->T_old_frame, old->covariance};
+  storage::BindingRecord record{frame, old->closure,
+                                place::reobserve(view, pictures, frame, {&standpoint, 1}, recent).bindings};
+  if (record.bindings.empty())
+    record.bindings =
+        place::propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
+  if (record.bindings.size() < kMinBindings) return std::nullopt;
+  return record;
 }
 
 std::optional<FrameId> step_back(const storage::Graph& graph, FrameId frame, const storage::FrameHot& hot) {
@@ -224,19 +241,16 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
     storage::ClosureProposalRecord proposal =
         proposal_of(view, pictures, query, frame, *trials.all()[standing->best].verified, standing->uniqueness, recent);
     proposal.probability = probability_of(standing->best);
-    return {{std::move(proposal)}, {}};
+    const FrameId recognised = proposal.match;
+    Lookup found{{std::move(proposal)}, {}};
+    if (const auto unseen = find_unseen(view, query, frame, recognised, ransac_seed(view, frame)))
+      found.records.emplace_back(*unseen);
+    return found;
   }
 
-  const auto old = nearest_old_frame(view, frame, recent);
-  if (!old) return {};
-  const place::Standpoint standpoint{old->frame, old->T_old_frame, old->covariance};
-  storage::BindingRecord record{frame, old->closure,
-                                place::reobserve(view, pictures, frame, {&standpoint, 1}, recent).bindings};
-  if (record.bindings.empty())
-    record.bindings =
-        place::propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
-  if (record.bindings.size() < kMinBindings) return {};
-  return {{std::move(record)}, {}};
+  if (auto bound = bind_to_older(view, pictures, query, frame, recent)) return {{*std::move(bound)}, {}};
+  if (const auto unseen = find_unseen(view, query, frame, {}, ransac_seed(view, frame))) return {{*unseen}, {}};
+  return {};
 }
 
 }  // namespace relmap::map

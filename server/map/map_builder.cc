@@ -212,6 +212,10 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::BindingRecord& re
   return relax_from(apply_binding(map_, record));
 }
 
+Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::UnseenRecord& record) {
+  return recorded([&](storage::EditableGraph& map) { return apply_unseen(map, sequence, record, loop_edge_spacing_); });
+}
+
 Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::SetEdgeStateRecord& record) {
   return recorded(
       [&](storage::EditableGraph& map) { return apply_edge_edit(map, sequence, record, loop_edge_spacing_); });

@@ -46,6 +46,7 @@ class MapBuilder {
   Applied apply_record(std::uint64_t sequence, const storage::RefusalRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::ClosureProposalRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::BindingRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::UnseenRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::SetEdgeStateRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::SetLabelRecord& record);
   Applied apply_record(std::uint64_t sequence, const storage::IdleWorkRecord& record);

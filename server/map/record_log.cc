@@ -67,6 +67,17 @@ std::string line(const storage::Graph&, const storage::SetEdgeStateRecord& recor
          (others > 0 ? ", with " + std::to_string(others) + " others" : "") + quoted_note(record.note);
 }
 
+std::string line(const storage::Graph&, const storage::UnseenRecord& record, const Applied& applied) {
+  const auto gone = std::ranges::count_if(applied.edges, [](const EdgeChange& change) {
+    return change.after && change.after->reason == Reason::NOT_SEEN_BEYOND;
+  });
+  if (gone == 0) return "";
+  return "closure " + record.closure.to_string() +
+         (gone > 1 ? " and " + std::to_string(gone - 1) + " that agree with it are" : " is") +
+         " quarantined: going on from there, the robot saw nothing of what the map shows, last in frame " +
+         record.frame.to_string();
+}
+
 std::string line(const storage::Graph& map, const storage::SetLabelRecord& record, const Applied&) {
   if (!map.hot(record.frame)) return "";
   return "operator: frame " + record.frame.to_string() +

@@ -1,5 +1,5 @@
-// Log lines for journal records: for sessions that begin, end, are frozen, thawed or deleted, and for an operator's
-// edits.
+// Log lines for journal records: for sessions that begin, end, are frozen, thawed or deleted, for an operator's edits,
+// and for closures that go out of force since nothing is seen beyond them.
 #pragma once
 
 #include <string>

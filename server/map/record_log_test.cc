@@ -55,5 +55,15 @@ TEST_F(RecordLog, DescribesSessionsAndOperatorEditsOnly) {
   EXPECT_EQ(line(storage::IdleWorkRecord{1000}), "");
 }
 
+TEST_F(RecordLog, DescribesClosuresThatGoBecauseNothingIsSeenBeyond) {
+  for (const std::uint32_t query : {62, 64}) propose_wrongly(query);
+  for (std::uint32_t i = 66; i < 73; ++i)
+    EXPECT_EQ(line(storage::UnseenRecord{{kDriveSession, i}, closure(64).id}), "") << i;
+  EXPECT_EQ(line(storage::UnseenRecord{{kDriveSession, 73}, closure(64).id}),
+            "closure " + closure(64).id.to_string() +
+                " and 1 that agree with it are quarantined: going on from there, the robot saw nothing of what the map "
+                "shows, last in frame 1:73");
+}
+
 }  // namespace
 }  // namespace relmap::map

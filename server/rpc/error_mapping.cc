@@ -15,6 +15,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::CARRIED:
     case Reason::BEYOND_DOUBT:
     case Reason::LOOKS_ALIKE:
+    case Reason::NOT_SEEN_BEYOND:
       return grpc::StatusCode::OK;
 
     case Reason::NOT_FINITE:

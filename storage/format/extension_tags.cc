@@ -1,5 +1,7 @@
 #include "storage/format/extension_tags.h"
 
+#include <algorithm>
+
 #include "proto/keyframe/extension_codec.h"
 #include "storage/format/codec.h"
 #include "storage/format/varint.h"
@@ -75,6 +77,21 @@ bool take_way_around(Extensions& extensions, std::shared_ptr<const WayAround>& a
   read.covariance = varint::get_matrix6(r, Matrix6::Zero());
   around = std::make_shared<const WayAround>(read);
   return r.at_end() && read.from.valid();
+}
+
+void add_unseen(Extensions& extensions, const std::vector<std::uint32_t>& unseen) {
+  if (unseen.empty()) return;
+  ByteWriter w;
+  for (const std::uint32_t index : unseen) w.put(index);
+  add_extension(extensions, kUnseen, w.take());
+}
+
+bool take_unseen(Extensions& extensions, std::vector<std::uint32_t>& unseen) {
+  const auto bytes = take_extension(extensions, kUnseen);
+  if (!bytes) return true;
+  for (ByteReader r(*bytes); r.ok() && !r.at_end();) unseen.push_back(r.get<std::uint32_t>());
+  return bytes->size() == unseen.size() * sizeof(std::uint32_t) && !unseen.empty() && unseen.size() <= kMaxUnseen &&
+         std::is_sorted(unseen.begin(), unseen.end());
 }
 
 void add_map_identity(Extensions& extensions, const MapIdentity& identity) {

@@ -19,7 +19,7 @@ using varint::get_unsigned;
 using varint::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
-static_assert(sizeof(Edge) == 1072 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 288 && sizeof(Observation) == 40);
+static_assert(sizeof(Edge) == 1104 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 288 && sizeof(Observation) == 40);
 
 constexpr std::size_t kMaxColdBytes = std::size_t{1} << 20;
 
@@ -80,6 +80,7 @@ Extensions edge_extensions(const Edge& e) {
   tags::add_uniqueness(all, e.uniqueness);
   tags::add_carried(all, e.carried);
   tags::add_way_around(all, e.around.get());
+  tags::add_unseen(all, e.unseen);
   return all;
 }
 
@@ -199,7 +200,7 @@ Edge get_edge(ByteReader& r, FrameId id) {
   if (flag(byte, 7)) {
     e.unknown = get_extensions(r);
     if (!tags::take_uniqueness(e.unknown, e.uniqueness) || !tags::take_carried(e.unknown, e.carried) ||
-        !tags::take_way_around(e.unknown, e.around))
+        !tags::take_way_around(e.unknown, e.around) || !tags::take_unseen(e.unknown, e.unseen))
       spend(r);
   }
   return e;

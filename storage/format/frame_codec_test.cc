@@ -73,6 +73,7 @@ Bytes dumped(const FrameHot& f) {
     w.put(u.alike), w.put(u.differs), w.put(u.compared), w.put(u.changed);
     w.put(e.carried.session), w.put(e.carried.first), w.put(e.carried.last), dump_ids(w, e.carried_by),
         dump(w, e.unknown);
+    w.put(e.unseen.size()), w.put_array(e.unseen.data(), e.unseen.size());
     w.put(e.around != nullptr);
     if (e.around) dump(w, e.around->from), dump(w, e.around->T), w.put_array(e.around->covariance.data(), 36);
     for (const EdgeEvent& event : e.history) {
@@ -173,6 +174,7 @@ TEST(FrameCodec, WritesRoundedEstimatesInAThirdOfTheBytes) {
   edge.history.clear();
   edge.carried_by.clear();
   edge.around.reset();
+  edge.unseen.clear();
   edge.unknown.clear();
   const std::size_t before = encoded(hot).size();
   round_estimates(hot);

@@ -19,7 +19,7 @@ std::size_t memory_bytes(const FrameHot& frame) {
                       heap(frame.landmarks) + heap(frame.unreached) + heap(frame.labels) + heap_bytes(frame.unknown);
   for (const Edge& edge : frame.edges)
     bytes += heap(edge.bound_frames) + heap(edge.consistent_with) + heap(edge.history) + heap(edge.carried_by) +
-             heap_bytes(edge.unknown) + (edge.around ? sizeof(WayAround) + kAllocation : 0);
+             heap(edge.unseen) + heap_bytes(edge.unknown) + (edge.around ? sizeof(WayAround) + kAllocation : 0);
   for (const Landmark& landmark : frame.landmarks) bytes += heap(landmark.claims) + heap(landmark.observers);
   for (const std::string& label : frame.labels) bytes += label.capacity();
   return bytes;

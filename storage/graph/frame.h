@@ -121,6 +121,10 @@ struct Edge {
   // Null: the closure is with the session's own past, or there is no stop or no such way.
   std::shared_ptr<const WayAround> around;
 
+  // Indices, ascending, of frames that its newer end's session took after it, from where landmarks around its older end
+  // should have been seen, and none was (server/map/unseen.h). kMaxUnseen at most.
+  std::vector<std::uint32_t> unseen;
+
   // Of a closure that agrees with others and not with the odometry of its newer end's session: it says that the robot
   // was carried somewhere between the frames `first` and `last`. Session 0: it says nothing of the kind.
   FrameRange carried;
@@ -142,6 +146,7 @@ void for_each_carried_step(const Edge& closure, Visit visit) {
     visit(EdgeId{{closure.carried.session, index + 1}, 0});
 }
 
+inline constexpr std::size_t kMaxUnseen = 64;     // kept with an edge
 inline constexpr std::size_t kMaxEvents = 16;     // kept in the history of an edge
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
 

@@ -25,6 +25,7 @@ enum Kind : std::uint8_t {
   kIdleWork = 9,
   kSetSessionState = 10,
   kRemoveChunk = 11,
+  kUnseen = 12,
 };
 
 constexpr std::uint8_t kAlignedBinding = 0x80;  // beside the level, which is at most 31
@@ -145,6 +146,17 @@ bool get(ByteReader& r, BindingRecord& x) {
   x.frame = codec::get_frame(r);
   x.closure = codec::get_edge(r);
   return get_bindings(r, x.bindings);
+}
+
+Kind put(ByteWriter& w, const UnseenRecord& x) {
+  codec::put(w, x.frame);
+  codec::put(w, x.closure);
+  return kUnseen;
+}
+bool get(ByteReader& r, UnseenRecord& x) {
+  x.frame = codec::get_frame(r);
+  x.closure = codec::get_edge(r);
+  return true;
 }
 
 Kind put(ByteWriter& w, const SetEdgeStateRecord& x) {
@@ -306,6 +318,8 @@ Result<DecodedRecord> decode_record(ByteSpan bytes) {
       return decode_as<SetSessionStateRecord>(r, sealed->version, acknowledged);
     case kRemoveChunk:
       return decode_as<RemoveChunkRecord>(r, sealed->version, acknowledged);
+    case kUnseen:
+      return decode_as<UnseenRecord>(r, sealed->version, acknowledged);
     default:
       return Status(Reason::UNKNOWN_FORMAT_VERSION, "journal record of kind " + std::to_string(sealed->kind));
   }

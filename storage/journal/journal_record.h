@@ -75,6 +75,13 @@ struct BindingRecord {
   std::vector<ProposedBinding> bindings;
 };
 
+// The robot went on from where it made `closure`. By that closure, `frame` should have seen landmarks of the map, and
+// it saw none of them.
+struct UnseenRecord {
+  FrameId frame;  // of the session of the closure's newer end, after it
+  ClosureId closure;
+};
+
 // An operator's edits.
 struct SetEdgeStateRecord {
   EdgeId edge;
@@ -116,9 +123,9 @@ struct IdleWorkRecord {
   std::uint64_t budget = 0;
 };
 
-using JournalRecord =
-    std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord, BindingRecord,
-                 SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord, SetSessionStateRecord, RemoveChunkRecord>;
+using JournalRecord = std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord,
+                                   BindingRecord, SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord,
+                                   SetSessionStateRecord, RemoveChunkRecord, UnseenRecord>;
 
 Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_through);
 

@@ -108,6 +108,7 @@ class MapHasher {
       if (!e.carried_by.empty()) h.mix(set_of(e.carried_by));
       if (e.uniqueness.known) add_uniqueness(e.uniqueness, h);
       if (e.around) h.mix(key(e.around->from));
+      for (const std::uint32_t index : e.unseen) h.mix(std::uint64_t{index});
       add_extensions(e.unknown, h);
     }
     h.mix(set_of(f.incoming)).mix(std::uint64_t{f.landmarks.size()});

@@ -117,6 +117,7 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
                          some_reason(*this), edge_id(), below(2) == 1 ? "a note" : ""});
   e.uniqueness = uniqueness();
   e.around = way_around();
+  for (std::uint32_t n = below(4), index = 0; n > 0; --n) e.unseen.push_back(index += 1 + below(100));
   if (below(3) == 0) {
     const std::uint32_t first = below(1000);
     e.carried = {1 + below(9), first, first + 1 + below(100)};
@@ -234,7 +235,7 @@ std::vector<ProposedBinding> RandomFrames::bindings() {
 }
 
 JournalRecord RandomFrames::record() {
-  switch (below(11)) {
+  switch (below(12)) {
     case 0:
       return SessionRecord{1 + below(9), text(30), header()};
     case 1:
@@ -274,6 +275,8 @@ JournalRecord RandomFrames::record() {
       return SetSessionStateRecord{below(100), pick(*this, SessionState::kOpen, SessionState::kDeleting), extensions()};
     case 9:
       return RemoveChunkRecord{below(100), below(1000)};
+    case 10:
+      return UnseenRecord{frame_id(), edge_id()};
     default:
       return IdleWorkRecord{rng_()};
   }

@@ -30,6 +30,8 @@ const char* explanation(Reason reason) {
       return "the robot stood still in between, and pictures point to another place that looks alike: the robot may "
              "have "
              "been carried there";
+    case Reason::NOT_SEEN_BEYOND:
+      return "going on from there, the robot saw nothing of what the map shows: this is another place that looks alike";
     case Reason::AMBIGUOUS_PLACE:
       return "another place explains the picture about as well";
     case Reason::REMOVED_BY_OPERATOR:

@@ -158,10 +158,17 @@ class TownJudge {
   }
 
   bool is_bound(FrameId frame) const {
+    // Of two robots that drive side by side, either may have begun a landmark that both see.
+    const auto is_old = [&](LandmarkId landmark) {
+      const auto base = graph_.hot(landmark.base);
+      if (!base || landmark.slot >= base->landmarks.size()) return false;
+      const auto from_old = [&](FrameId other) { return Ground::is_old(other, frame); };
+      return from_old(landmark.base) || std::ranges::any_of(base->landmarks[landmark.slot].observers, from_old);
+    };
     std::uint32_t old = 0;
     for (const storage::Observation& observation : graph_.warm(frame)->observations)
-      old += storage::closure_holds(graph_, observation.origin) &&
-             Ground::is_old(storage::resolve(graph_, observation.landmark).base, frame);
+      old +=
+          storage::closure_holds(graph_, observation.origin) && is_old(storage::resolve(graph_, observation.landmark));
     return old >= kBoundObservations;
   }
 

@@ -16,7 +16,7 @@ struct VastVerdict {
   std::uint64_t closures_right = 0, closures_vague = 0, closures_wrong = 0;
   std::vector<std::string> wrong;  // the first of the wrong ones, in words
   // A frame returns to a place if an earlier one, of another robot or long before, stood within 2 m and 15 degrees. It
-  // is bound there if it has at least 20 observations of landmarks from then.
+  // is bound there if it has at least 20 observations of landmarks that were seen then.
   std::uint64_t revisits = 0, revisits_bound = 0;
   // Rides in trains; after how many of them the robot came where somebody had been before; and for how many of these
   // the map knows over which steps the robot was carried.
