@@ -222,7 +222,7 @@ TEST_F(MapTest, ASessionIsRemovedChunkByChunkAndEarlierViewsStillHaveIt) {
 
 TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
   MapHash large, small;
-  for (const std::size_t limit : {std::size_t{256} << 20, std::size_t{320} << 10}) {
+  for (const std::size_t limit : {std::size_t{256} << 20, std::size_t{352} << 10}) {
     engine = make_memory_engine();
     epoch = engine->acquire().value();
     budget = std::make_shared<Budget>(limit);
