@@ -77,6 +77,7 @@ bool Intake::make_room(SteadyTime now) {
   if (oldest == sessions_.end()) return false;
   reassembly_.forget(oldest->first, UINT64_MAX);
   remember(oldest->first, oldest->second, now);
+  leave_line(oldest->first);
   sessions_.erase(oldest);
   ++begun_version_;
   return true;
@@ -103,7 +104,10 @@ void Intake::forget_silent(SteadyTime now) {
     }
     const bool gone = silent && entry.intake.idle();
     begun_version_ += gone;
-    if (gone) remember(session, entry, now);
+    if (gone) {
+      remember(session, entry, now);
+      leave_line(session);
+    }
     it = gone ? sessions_.erase(it) : std::next(it);
   }
   std::erase_if(silent_, [&](const auto& item) { return item.second.heard + options_.remember <= now; });
@@ -230,7 +234,7 @@ void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t 
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
   const bool sound = entry.intake.take(sequence, std::move(payload)).ok();
   if (!sound) entry.schedule.news();
-  join_line(session, entry);
+  if (entry.intake.has_next()) join_line(session, entry);
   serve_line(now);
   if (sound && entry.begun && !std::exchange(entry.announced, true))
     note(RobotEvent::Kind::kHeard, session, entry, now);
@@ -248,7 +252,7 @@ void Intake::take_gap(const Gap& gap, SteadyTime now) try {
   if (!entry) return refuse(Reason::BUDGET_EXCEEDED);
   entry->schedule.news();
   entry->intake.give_up(gap.from, gap.to, gap.reason);
-  join_line(gap.session, *entry);
+  if (entry->intake.has_next()) join_line(gap.session, *entry);
   serve_line(now);
 } catch (const StatusError& error) {
   ++stats_.messages_refused[index_of(error.status().reason())];
@@ -274,28 +278,28 @@ void Intake::join_line(const SessionUuid& session, Entry& entry) {
   if (!std::exchange(entry.in_line, true)) line_.push_back(session);
 }
 
-// Submits what the sessions in line have, one record of each in turn, until the sink has no more room.
+void Intake::leave_line(const SessionUuid& session) { std::erase(line_, session); }
+
+// Submits what the sessions in line have, one record of each in turn, until the sink has no more room. A session that
+// cannot begin, since the map has as many as its memory allows, keeps nobody waiting; poll() lets it try again.
 void Intake::serve_line(SteadyTime now) {
   take_outcomes(now);  // records that failed must be submitted again before later ones
   while (!line_.empty()) {
     const SessionUuid session = line_.front();
-    const auto it = sessions_.find(session);
-    if (it != sessions_.end()) {
-      Entry& entry = it->second;
-      const bool more = entry.intake.submit_next();
-      if (!entry.begun && entry.intake.begun()) {
-        entry.begun = true;
-        ++begun_version_;
-      }
-      reassembly_.forget(session, entry.intake.turn());
-      if (entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED) {
-        no_room_ = entry.intake.blocked();
-        return;
-      }
-      entry.in_line = false;
-      if (more) join_line(session, entry);
+    Entry& entry = sessions_.find(session)->second;
+    const bool more = entry.intake.submit_next();
+    if (!entry.begun && entry.intake.begun()) {
+      entry.begun = true;
+      ++begun_version_;
+    }
+    reassembly_.forget(session, entry.intake.turn());
+    if (entry.intake.begun() && entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED) {
+      no_room_ = entry.intake.blocked();
+      return;
     }
     line_.pop_front();
+    entry.in_line = false;
+    if (more) join_line(session, entry);
   }
 }
 

@@ -124,6 +124,7 @@ class Intake {
                   SteadyTime now);
   void take_outcomes(SteadyTime now);
   void join_line(const SessionUuid& session, Entry& entry);
+  void leave_line(const SessionUuid& session);
   void serve_line(SteadyTime now);
   bool imperfect(const SessionUuid& session, const Entry& entry) const;
   std::uint32_t credits(const SessionUuid& session, const Entry& entry) const;
@@ -144,8 +145,8 @@ class Intake {
   std::map<SessionUuid, Entry> sessions_;
   std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};
-  // Sessions that have something to submit, in the order in which they are served, one record at a time. It is empty
-  // but while the sink has no room: then a session that sends more than others waits longer than they do.
+  // Sessions that have something to submit, each once, in the order in which they are served, one record at a time. It
+  // is empty but while the sink has no room: then a session that sends more than others waits longer than they do.
   std::deque<SessionUuid> line_;
   Status no_room_;  // why the first of them waits
   std::vector<PoseNews> news_;

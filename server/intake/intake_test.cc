@@ -692,6 +692,35 @@ TEST_F(IntakeTest, WhoSendsMuchDoesNotTakeTheRoomForWhichOthersWait) {
   EXPECT_TRUE(sink_.faults.empty());
 }
 
+// The map has as many sessions as its memory allows.
+TEST_F(IntakeTest, ASessionThatCannotBeginKeepsNobodyWaiting) {
+  const SessionUuid begun = uuid_;
+  send(0);
+  settle();
+  sink_.refuse_begin = Status(Reason::BUDGET_EXCEEDED, "too many sessions");
+  uuid_.bytes.fill(7);
+  const SessionUuid waits = uuid_;
+  send(0);
+  EXPECT_EQ(intake_->stats(now_).blocked.reason(), Reason::BUDGET_EXCEEDED);
+  uuid_ = begun;
+  send(1);
+  EXPECT_EQ(settle().next_sequence, 2u);
+  sink_.refuse_begin = {};
+  settle();
+  uuid_ = waits;
+  EXPECT_EQ(settle().next_sequence, 1u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, WhoHasNothingToSubmitDoesNotWaitForRoom) {
+  sink_.capacity = 1;
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  uuid_.bytes.fill(7);
+  send(1);  // 0 has not come
+  for (const RobotStats& robot : intake_->robots(now_))
+    EXPECT_EQ(robot.blocked, robot.uuid == uuid_ ? Reason::OK : Reason::BUDGET_EXCEEDED);
+}
+
 TEST_F(IntakeTest, ReportsTheStateOfEachRobot) {
   for (const std::uint32_t s : {0, 1, 5}) send(s);
   const Bytes payload = encode_keyframe(keyframe(3));

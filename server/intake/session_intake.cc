@@ -125,6 +125,11 @@ void SessionIntake::note_conflict(std::uint32_t sequence, std::uint32_t crc, Rea
   if (conflicts_.size() > kMaxConflicts) conflicts_.pop_front();
 }
 
+bool SessionIntake::has_next() const {
+  return (turn_ <= UINT32_MAX && held_.contains(static_cast<std::uint32_t>(turn_))) ||
+         (!given_up_.empty() && given_up_.begin()->first <= turn_);
+}
+
 bool SessionIntake::submit_next() {
   if (broken_) return false;
   blocked_ = {};

@@ -52,6 +52,8 @@ class SessionIntake {
   // Submits the next record whose turn has come. False if there is none, or if blocked() is not OK now. Call it after
   // take() and give_up() until it returns false, and again while blocked() is not OK.
   bool submit_next();
+  // Whether the next sequence has come, or has been given up, so that submit_next() has something to do.
+  bool has_next() const;
   // Handles the outcome of a submitted record.
   void settle(std::uint64_t ticket, const Status& outcome);
 

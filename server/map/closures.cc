@@ -148,6 +148,17 @@ void count_states(storage::MapState& state, storage::EdgeState from, storage::Ed
 
 }  // namespace
 
+void ClosureChange::append(const ClosureChange& next) {
+  const auto add = [](auto& all, const auto& more) { all.insert(all.end(), more.begin(), more.end()); };
+  add(seeds, next.seeds);
+  add(accepted, next.accepted);
+  add(withdrawn, next.withdrawn);
+  add(out_of_force, next.out_of_force);
+  add(lone, next.lone);
+  add(gone, next.gone);
+  sort_unique(seeds);
+}
+
 void add_event(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
   if (edge.history.size() >= storage::kMaxEvents) edge.history.erase(edge.history.begin() + 1);
   edge.history.push_back(
@@ -336,7 +347,8 @@ std::vector<EdgeId> of_one_ride(const storage::Graph& graph, EdgeId id, std::uin
       const auto closure = storage::find_edge(graph, other);
       // Those in force stand for another ride, with which `id` does not agree.
       if (contradicts_odometry(*closure) && closure->state != storage::EdgeState::kRemoved &&
-          closure->state != storage::EdgeState::kAccepted && own_motion(*closure))
+          closure->reason != Reason::NOT_SEEN_BEYOND && closure->state != storage::EdgeState::kAccepted &&
+          own_motion(*closure))
         found.push_back(other);
     }
   }
@@ -630,16 +642,20 @@ ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, 
   const auto closure = storage::find_edge(map, record.closure);
   if (!closure || closure->kind != storage::EdgeKind::kLoop || closure->state != storage::EdgeState::kAccepted ||
       record.frame.session != closure->b.session || record.frame.index <= closure->b.index || !map.hot(record.frame) ||
-      closure->unseen.size() >= storage::kMaxUnseen)
+      is_going(map, record.frame) || is_going(map, closure->a) || closure->unseen.size() >= storage::kMaxUnseen ||
+      std::ranges::binary_search(closure->unseen, record.frame.index))
     return {};
   insert_sorted(map.edit_hot(closure->b).edge(closure->id)->unseen, record.frame.index);
 
   std::set<EdgeId> set{closure->id};
   for (const EdgeId other : closure->consistent_with)
     if (is_accepted(map, other)) set.insert(other);
-  std::size_t unseen = 0;
-  for (const EdgeId member : set) unseen += storage::find_edge(map, member)->unseen.size();
-  if (unseen < kMinUnseen || unseen <= set.size() || decided_among(map, set)) return {};
+  std::set<std::uint32_t> unseen;  // a frame that is looked up again may name another closure of the set
+  for (const EdgeId member : set) {
+    const auto edge = storage::find_edge(map, member);
+    unseen.insert(edge->unseen.begin(), edge->unseen.end());
+  }
+  if (unseen.size() < kMinUnseen || unseen.size() <= set.size() || decided_among(map, set)) return {};
   std::vector<StateChange> changes;
   for (const EdgeId member : set)
     changes.push_back({member, storage::EdgeState::kQuarantined, Reason::NOT_SEEN_BEYOND});

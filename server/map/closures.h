@@ -25,6 +25,9 @@ struct ClosureChange {
   std::vector<EdgeId> out_of_force;  // those of `withdrawn` that were in force
   std::vector<EdgeId> lone;          // stored now, and await confirmation by another closure
   std::vector<storage::Edge> gone;   // were in force, and were deleted with a session (state: removed)
+
+  // Adds what another change of the same record did after this one.
+  void append(const ClosureChange& next);
 };
 
 // Stores the proposal as a candidate with its bindings. Accepts it, together with candidates that it confirms, if they

@@ -100,10 +100,10 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
   // Closures that contradict the odometry are no witnesses for those that agree with it, and the other way round.
   const auto is_witness = [&](const storage::Edge& other) {
     if (other.state == storage::EdgeState::kRemoved) return true;
+    if (other.reason == Reason::NOT_SEEN_BEYOND) return false;
     if (contradicts) return contradicts_odometry(other);
     if (other.carried.session != 0) return other.state == storage::EdgeState::kAccepted;
-    return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE &&
-           other.reason != Reason::NOT_SEEN_BEYOND;
+    return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE;
   };
 
   Neighbourhood result;

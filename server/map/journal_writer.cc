@@ -89,11 +89,13 @@ void JournalWriter::run() {
     } else {
       group.swap(queue_);
     }
-    writing_ = group.size();
+    writing_ = true;
+    in_group_ = group.size();
     lock.unlock();
     write(std::move(group));
     lock.lock();
-    writing_ = 0;
+    writing_ = false;
+    in_group_ = 0;
     lock.unlock();
     on_idle_();
     lock.lock();
@@ -114,6 +116,10 @@ void JournalWriter::write(std::vector<Queued> group) {
   for (std::size_t i = 0; i < group.size(); ++i)
     durable.push_back({first + i, std::move(group[i].record), group[i].bytes});
   on_durable_(std::move(durable));
+  {
+    const MutexLock lock(mutex_);
+    in_group_ = 0;
+  }
   for (std::size_t i = 0; i < group.size(); ++i) group[i].done(first + i);
 }
 
@@ -166,9 +172,14 @@ std::uint64_t JournalWriter::durable_through() const {
   return durable_;
 }
 
+bool JournalWriter::idle() const {
+  const MutexLock lock(mutex_);
+  return queue_.empty() && !writing_;
+}
+
 std::size_t JournalWriter::waiting() const {
   const MutexLock lock(mutex_);
-  return queue_.size() + writing_;
+  return queue_.size() + in_group_;
 }
 
 Status JournalWriter::health() const {

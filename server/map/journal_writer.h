@@ -29,7 +29,7 @@ class JournalWriter {
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   // Called from the writer's thread with each durable group, in order, before their `done`.
   using OnDurable = std::function<void(std::vector<DurableRecord>)>;
-  // Called from the writer's thread, without a lock held, when waiting() may have become 0.
+  // Called from the writer's thread, without a lock held, when idle() may have become true.
   using OnIdle = std::function<void()>;
 
   // `one_at_a_time` (deterministic mode): writes groups of one record, each only after finished() of the one before.
@@ -47,7 +47,8 @@ class JournalWriter {
   Result<std::uint64_t> append_follow_up(const storage::JournalRecord& record);
 
   std::uint64_t durable_through() const;
-  std::size_t waiting() const;  // records queued or being written
+  std::size_t waiting() const;  // records queued or being written, not durable yet
+  bool idle() const;            // nothing queued, nothing being written, and everybody told
   Status health() const;        // not ok: why nothing is taken now
 
   // Writes what is queued, then ends the thread.
@@ -75,7 +76,8 @@ class JournalWriter {
   mutable Mutex mutex_;
   ConditionVariable wake_;
   std::vector<Queued> queue_ RELMAP_GUARDED_BY(mutex_);
-  std::size_t writing_ RELMAP_GUARDED_BY(mutex_) = 0;  // records
+  bool writing_ RELMAP_GUARDED_BY(mutex_) = false;
+  std::size_t in_group_ RELMAP_GUARDED_BY(mutex_) = 0;  // records being written
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
   std::uint64_t durable_ RELMAP_GUARDED_BY(mutex_) = 0;
   std::uint64_t finished_ RELMAP_GUARDED_BY(mutex_) = 0;

@@ -105,7 +105,7 @@ class JournalWriterTest : public ::testing::Test {
           }
         },
         [this] {
-          const bool idle = writer_->waiting() == 0;
+          const bool idle = writer_->idle();
           const std::lock_guard lock(mutex_);
           told_idle_ = idle;
           changed_.notify_all();

@@ -241,11 +241,9 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
     storage::ClosureProposalRecord proposal =
         proposal_of(view, pictures, query, frame, *trials.all()[standing->best].verified, standing->uniqueness, recent);
     proposal.probability = probability_of(standing->best);
-    const FrameId recognised = proposal.match;
-    Lookup found{{std::move(proposal)}, {}};
-    if (const auto unseen = find_unseen(view, query, frame, recognised, ransac_seed(view, frame)))
-      found.records.emplace_back(*unseen);
-    return found;
+    if (const auto unseen = find_unseen(view, query, frame, proposal.match, ransac_seed(view, frame)))
+      proposal.unseen = unseen->closure;
+    return {{std::move(proposal)}, {}};
   }
 
   if (auto bound = bind_to_older(view, pictures, query, frame, recent)) return {{*std::move(bound)}, {}};

@@ -129,6 +129,35 @@ TEST_F(LookUpAs, WhatIsToldToBeLaterIsNotAskedFor) {
               }).records.empty());
 }
 
+// Session 2 recognised the street at its frame 5, and goes on elsewhere.
+TEST(LookUp, TellsThatNothingOfAPlaceIsSeen) {
+  constexpr std::uint32_t kFrames = 20, kRecognised = 5, kNow = 12;
+  const auto vocabulary = place::random_vocabulary(200, 50, 1);
+  place::PlaceIndex places(vocabulary);
+  place::SyntheticStreet street(3, kFrames, 0.3, 2000), elsewhere(4, kFrames, 0.3, 2000);
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    storage::FrameCold& cold = street.graph.edit_cold({1, i});
+    cold.words = vocabulary->words(cold.appearance);
+    ASSERT_TRUE(places.add({1, i}, cold.words).ok());
+  }
+  for (std::uint32_t i = 0; i <= kNow; ++i) {
+    street.graph.add_frame({2, i});
+    if (i > 0) street.graph.add_edge({2, i - 1}, {2, i}, 0, SE3{Matrix3::Identity(), Vector3(0, 0, 0.3)});
+  }
+  street.graph.add_edge({1, kRecognised}, {2, kRecognised}, 1);
+  street.graph.edit_hot({2, kRecognised}).edges.back().verification = storage::Verification::kStereo;
+  storage::FrameCold& cold = street.graph.edit_cold({2, kNow});
+  std::vector<std::size_t> points;
+  cold.appearance = elsewhere.picture(elsewhere.pose(kNow), true, points);
+  cold.words = vocabulary->words(cold.appearance);
+  place::PictureCache pictures;
+  const Lookup found = look_up(street.graph, places, pictures, {2, kNow});
+  ASSERT_EQ(found.records.size(), 1u);
+  const auto& unseen = std::get<storage::UnseenRecord>(found.records.front());
+  EXPECT_EQ(unseen.frame, (FrameId{2, kNow}));
+  EXPECT_EQ(unseen.closure, (ClosureId{{2, kRecognised}, 1}));
+}
+
 // Photographs of the street, though they are more alike than what a robot saw, take no closure away.
 TEST_F(LookUpAs, PhotographsOfAPlaceTakeNoClosureAway) {
   StereoCamera one_eye = place::kStreetCamera;

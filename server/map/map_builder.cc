@@ -204,8 +204,12 @@ Applied MapBuilder::recorded(Edit edit) {
 }
 
 Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::ClosureProposalRecord& record) {
-  return recorded(
-      [&](storage::EditableGraph& map) { return apply_proposal(map, sequence, record, loop_edge_spacing_, rules_); });
+  return recorded([&](storage::EditableGraph& map) {
+    ClosureChange change = apply_proposal(map, sequence, record, loop_edge_spacing_, rules_);
+    if (record.unseen.valid())
+      change.append(apply_unseen(map, sequence, {record.query, record.unseen}, loop_edge_spacing_));
+    return change;
+  });
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const storage::BindingRecord& record) {

@@ -430,7 +430,7 @@ bool Mapper::Impl::journal_patiently(const storage::JournalRecord& record) {
 }
 
 bool Mapper::Impl::all_done() const {
-  return writer->waiting() == 0 && durable.empty() && !applying && applied == writer->durable_through() &&
+  return writer->idle() && durable.empty() && !applying && applied == writer->durable_through() &&
          lookups.waiting() == 0 && background.done();
 }
 

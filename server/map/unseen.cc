@@ -17,10 +17,9 @@ constexpr std::uint32_t kReach =
 // Two views show nearly the same if they are no further apart than this share of the distance of what is seen, and
 // turned by no more than this. From further apart, the same points look different.
 constexpr double kMaxParallax = 0.25, kMaxAngle = 0.35;  // radians
-// A share of cells that differ above this, where hardly any feature fits, is another place. Of a place that is seen
-// again with too few features to be verified, no more than half of the cells differ (docs/decisions/closures.md).
+// A place of which geometry finds nothing is another one if more cells differ. Of the right place that is seen with too
+// few features to be verified, hardly ever more than half of the cells differ (docs/decisions/closures.md).
 constexpr float kDiffers = 0.7f;
-constexpr std::size_t kFits = 8;  // features that fit by chance are fewer
 
 constexpr std::size_t kMaxStretches = 2;
 
@@ -117,7 +116,8 @@ std::optional<storage::UnseenRecord> find_unseen(const storage::Graph& graph, co
   for (const EarlierClosure& earlier : earlier_closures(graph, frame, recognised)) {
     const auto expected = expected_view(graph, query, earlier, max_distance);
     if (!expected || place::differing_share(graph, query, *expected) < kDiffers) continue;
-    if (place::try_place(graph, query, expected->match, seed).features.size() >= kFits) continue;
+    const place::PlaceTrial trial = place::try_place(graph, query, expected->match, seed);
+    if (!trial.features.empty() || trial.verified.status().reason() == Reason::POOR_SPREAD) continue;
     return storage::UnseenRecord{frame, earlier.closure.id};
   }
   return std::nullopt;

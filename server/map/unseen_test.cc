@@ -143,6 +143,25 @@ TEST_F(Unseen, AsManyAgreeingClosuresHold) {
   expect_derived_facts_hold();
 }
 
+// A lookup may be made again after a restart, and then see newer closures.
+TEST_F(Unseen, AFrameIsCountedOnceWhicheverClosureItNames) {
+  for (const std::uint32_t query : {62, 64}) propose_wrongly(query);
+  not_seen(70, 4, 62);
+  not_seen(70, 4, 64);
+  EXPECT_EQ(state(64), storage::EdgeState::kAccepted);
+}
+
+TEST_F(Unseen, AProposalMayTellOfAnotherClosureWhosePlaceIsNotSeen) {
+  for (const std::uint32_t query : {62, 64}) propose_wrongly(query);
+  not_seen(70, 7, 64);
+  auto proposal = *true_closure(drive_.map(), world_, 80, kLap);
+  proposal.unseen = closure(64).id;
+  drive_.apply(proposal);
+  EXPECT_EQ(closure(64).reason, Reason::NOT_SEEN_BEYOND);
+  EXPECT_EQ(closure(80).a, proposal.match);
+  expect_derived_facts_hold();
+}
+
 TEST_F(Unseen, WhatAnOperatorPutIntoForceHolds) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   drive_.apply(storage::SetEdgeStateRecord{closure(62).id, storage::EdgeState::kAccepted, "I was there", true});

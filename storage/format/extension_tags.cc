@@ -94,6 +94,21 @@ bool take_unseen(Extensions& extensions, std::vector<std::uint32_t>& unseen) {
          std::is_sorted(unseen.begin(), unseen.end());
 }
 
+void add_unseen_place(Extensions& extensions, ClosureId closure) {
+  if (!closure.valid()) return;
+  ByteWriter w;
+  codec::put(w, closure);
+  add_extension(extensions, kUnseenPlace, w.take());
+}
+
+bool take_unseen_place(Extensions& extensions, ClosureId& closure) {
+  const auto bytes = take_extension(extensions, kUnseenPlace);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  closure = codec::get_edge(r);
+  return r.at_end() && closure.valid();
+}
+
 void add_map_identity(Extensions& extensions, const MapIdentity& identity) {
   if (!identity.known()) return;
   add_extension(extensions, kMapIdentity, {identity.uuid.bytes.begin(), identity.uuid.bytes.end()});

@@ -21,6 +21,7 @@ inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state t
 inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a mark of what it may remove
 inline constexpr std::uint32_t kWayAround = 28;     // of a closure, or a proposal
 inline constexpr std::uint32_t kUnseen = 29;        // of a closure: frames that saw nothing of where it leads
+inline constexpr std::uint32_t kUnseenPlace = 30;   // of a proposal: the closure of whose place the query saw nothing
 
 // These tags say how the map came about, so map hashes leave them out. The last three are reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
@@ -32,6 +33,7 @@ void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
 void add_way_around(Extensions& extensions, const WayAround* around);  // nullptr: there is none
 void add_unseen(Extensions& extensions, const std::vector<std::uint32_t>& unseen);
+void add_unseen_place(Extensions& extensions, ClosureId closure);  // invalid: there is none
 void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
@@ -40,6 +42,7 @@ bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
 bool take_way_around(Extensions& extensions, std::shared_ptr<const WayAround>& around);
 bool take_unseen(Extensions& extensions, std::vector<std::uint32_t>& unseen);
+bool take_unseen_place(Extensions& extensions, ClosureId& closure);
 bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
 bool take_shown(Extensions& extensions, std::uint64_t& shown);

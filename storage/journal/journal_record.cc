@@ -233,11 +233,13 @@ Extensions extensions_of(const ClosureProposalRecord& x) {
   Extensions all = x.unknown;
   tags::add_uniqueness(all, x.uniqueness);
   tags::add_way_around(all, x.around.get());
+  tags::add_unseen_place(all, x.unseen);
   return all;
 }
 bool take_extensions(ClosureProposalRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  return tags::take_uniqueness(x.unknown, x.uniqueness) && tags::take_way_around(x.unknown, x.around);
+  return tags::take_uniqueness(x.unknown, x.uniqueness) && tags::take_way_around(x.unknown, x.around) &&
+         tags::take_unseen_place(x.unknown, x.unseen);
 }
 
 Extensions extensions_of(const SetEdgeStateRecord& x) {

@@ -65,6 +65,7 @@ struct ClosureProposalRecord {
   std::vector<ProposedBinding> bindings;
   Uniqueness uniqueness;
   std::shared_ptr<const WayAround> around;  // null: see Edge::around
+  ClosureId unseen = {};                    // valid: the query has seen nothing of this one's place, as in UnseenRecord
   Extensions unknown = {};                  // from a later version, kept unchanged
 };
 

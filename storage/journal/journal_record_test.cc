@@ -54,11 +54,13 @@ TEST(JournalRecord, KeepsTheExtensionsOfALaterVersion) {
   proposal.uniqueness.compared = 30;
   proposal.uniqueness.changed = 4;
   proposal.around = std::make_shared<const WayAround>(WayAround{{5, 6}, {}, 2 * Matrix6::Identity()});
+  proposal.unseen = {{7, 8}, 9};
   proposal.unknown = unknown;
   const auto got = std::get<ClosureProposalRecord>(decode_record(encode_record(proposal, 0))->record);
   EXPECT_EQ(got.uniqueness, proposal.uniqueness);
   ASSERT_TRUE(got.around);
   EXPECT_EQ(*got.around, *proposal.around);
+  EXPECT_EQ(got.unseen, proposal.unseen);
   EXPECT_EQ(got.unknown, unknown);
   SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kAccepted, "a note", true, true, 7, unknown};
   const auto edited = std::get<SetEdgeStateRecord>(decode_record(encode_record(edit, 0))->record);

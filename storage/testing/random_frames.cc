@@ -259,6 +259,7 @@ JournalRecord RandomFrames::record() {
       x.bindings = bindings();
       x.uniqueness = uniqueness();
       x.around = way_around();
+      if (below(3) == 0) x.unseen = edge_id();
       x.unknown = extensions();
       return x;
     }

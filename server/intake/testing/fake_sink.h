@@ -48,12 +48,14 @@ class FakeSink final : public KeyframeSink {
   std::size_t capacity = 1000;      // maximum number of queued records
   bool sync_at_once = false;        // records become durable within submit()
   Status refuse_submit;             // not ok: submit() returns this
+  Status refuse_begin;              // not ok: begin_session() returns this for new sessions
   std::vector<std::string> faults;  // contract violations by the intake
 
   Result<SessionNumber> begin_session(const SessionHeader& header) override {
     const std::lock_guard lock(mutex_);
     for (const auto& [number, session] : graph_.by_number)
       if (session.header.uuid == header.uuid) return number;
+    if (!refuse_begin.ok()) return refuse_begin;
     storage::Session session;
     session.number = static_cast<SessionNumber>(graph_.by_number.size() + 1);
     session.header = header;
