@@ -234,8 +234,7 @@ void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t 
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
   const bool sound = entry.intake.take(sequence, std::move(payload)).ok();
   if (!sound) entry.schedule.news();
-  if (entry.intake.has_next()) join_line(session, entry);
-  serve_line(now);
+  advance(session, entry, now);
   if (sound && entry.begun && !std::exchange(entry.announced, true))
     note(RobotEvent::Kind::kHeard, session, entry, now);
 }
@@ -252,8 +251,7 @@ void Intake::take_gap(const Gap& gap, SteadyTime now) try {
   if (!entry) return refuse(Reason::BUDGET_EXCEEDED);
   entry->schedule.news();
   entry->intake.give_up(gap.from, gap.to, gap.reason);
-  if (entry->intake.has_next()) join_line(gap.session, *entry);
-  serve_line(now);
+  advance(gap.session, *entry, now);
 } catch (const StatusError& error) {
   ++stats_.messages_refused[index_of(error.status().reason())];
 }
@@ -272,7 +270,12 @@ void Intake::take_end(const SessionEnd& end, SteadyTime now) try {
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
 
 // Why nothing of the session is being journalled; OK if it is.
-Status Intake::blocked(const Entry& entry) const { return entry.in_line ? no_room_ : entry.intake.blocked(); }
+const Status& Intake::blocked(const Entry& entry) const { return entry.in_line ? no_room_ : entry.intake.blocked(); }
+
+void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
+  if (entry.intake.has_next()) join_line(session, entry);
+  serve_line(now);
+}
 
 void Intake::join_line(const SessionUuid& session, Entry& entry) {
   if (!std::exchange(entry.in_line, true)) line_.push_back(session);

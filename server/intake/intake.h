@@ -114,7 +114,7 @@ class Intake {
   Namesakes namesakes(SteadyTime now) const;
   void tell_of_namesakes(SteadyTime now);
   void note(RobotEvent::Kind kind, const SessionUuid& session, const Entry& entry, SteadyTime now);
-  Status blocked(const Entry& entry) const;
+  const Status& blocked(const Entry& entry) const;
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void replenish(Entry& entry, SteadyTime now);
   bool paced(Entry& entry, std::uint32_t sequence, SteadyTime now);
@@ -123,6 +123,7 @@ class Intake {
   void take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
                   SteadyTime now);
   void take_outcomes(SteadyTime now);
+  void advance(const SessionUuid& session, Entry& entry, SteadyTime now);
   void join_line(const SessionUuid& session, Entry& entry);
   void leave_line(const SessionUuid& session);
   void serve_line(SteadyTime now);

@@ -442,6 +442,17 @@ bool is_going(const storage::Graph& graph, FrameId frame) {
 
 namespace {
 
+// The changes that quarantine `outvoted` and `refused`, the latter for `reason`, and what is then left alone.
+std::vector<StateChange> quarantined(const storage::Graph& graph, const std::vector<EdgeId>& winners,
+                                     std::set<EdgeId> outvoted, const std::set<EdgeId>& refused, Reason reason) {
+  outvoted.insert(refused.begin(), refused.end());
+  add_left_alone(graph, winners, outvoted);
+  std::vector<StateChange> changes;
+  for (const EdgeId id : outvoted)
+    changes.push_back({id, storage::EdgeState::kQuarantined, refused.contains(id) ? reason : Reason::INCONSISTENT});
+  return changes;
+}
+
 // Judges one proposal: stores it as a candidate, then weighs it against the closures near by.
 class Judgement {
  public:
@@ -487,12 +498,8 @@ class Judgement {
   // Puts `accepted` into force and quarantines the outvoted closures and those that are taken back.
   ClosureChange change(std::vector<StateChange> accepted, const std::vector<EdgeId>& winners,
                        std::set<EdgeId> outvoted) {
-    outvoted.insert(taken_back_.begin(), taken_back_.end());
-    add_left_alone(map_, winners, outvoted);
-    std::vector<StateChange> changes;
-    for (const EdgeId other : outvoted)
-      changes.push_back({other, storage::EdgeState::kQuarantined,
-                         taken_back_.contains(other) ? Reason::LOOKS_ALIKE : Reason::INCONSISTENT});
+    std::vector<StateChange> changes =
+        quarantined(map_, winners, std::move(outvoted), taken_back_, Reason::LOOKS_ALIKE);
     changes.insert(changes.end(), accepted.begin(), accepted.end());
     return change_states(map_, changes, cause_, spacing_);
   }
@@ -656,14 +663,8 @@ ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, 
     unseen.insert(edge->unseen.begin(), edge->unseen.end());
   }
   if (unseen.size() < kMinUnseen || unseen.size() <= set.size() || decided_among(map, set)) return {};
-  std::vector<StateChange> changes;
-  for (const EdgeId member : set)
-    changes.push_back({member, storage::EdgeState::kQuarantined, Reason::NOT_SEEN_BEYOND});
-  std::set<EdgeId> gone = set;
-  add_left_alone(map, {}, gone);
-  for (const EdgeId member : gone)
-    if (!set.contains(member)) changes.push_back({member, storage::EdgeState::kQuarantined, Reason::INCONSISTENT});
-  return change_states(map, changes, {sequence, closure->id}, loop_edge_spacing);
+  return change_states(map, quarantined(map, {}, {}, set, Reason::NOT_SEEN_BEYOND), {sequence, closure->id},
+                       loop_edge_spacing);
 }
 
 ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record) {

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/base/quantile.h"
 #include "server/map/stops.h"
 #include "server/place/changes.h"
 #include "server/place/map_points.h"
@@ -12,8 +13,8 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::uint32_t kReach =
-    60;  // steps of the odometry, from the closure to the frame, and in the place's session
+// Steps of the odometry from the closure to the frame, and in the place's session.
+constexpr std::uint32_t kReach = 60;
 // Two views show nearly the same if they are no further apart than this share of the distance of what is seen, and
 // turned by no more than this. From further apart, the same points look different.
 constexpr double kMaxParallax = 0.25, kMaxAngle = 0.35;  // radians
@@ -33,37 +34,27 @@ bool in_one_stretch(FrameId a, FrameId b) {
   return a.session == b.session && std::max(a.index, b.index) - std::min(a.index, b.index) <= kReach;
 }
 
-// The frames that along_odometry() reaches from `centre` without a stop on the way: beyond one, the robot may have been
-// carried elsewhere.
-std::vector<place::PlacedFrame> along_odometry_to_stops(const storage::Graph& graph, FrameId centre, std::uint32_t back,
-                                                        std::uint32_t forward) {
-  std::vector<place::PlacedFrame> reached;
+// The frames that along_odometry() reaches on one way, back or forward, without a stop: beyond one, the robot may have
+// been carried elsewhere.
+std::vector<place::PlacedFrame> along_odometry_to_stop(const storage::Graph& graph, FrameId centre, std::uint32_t back,
+                                                       std::uint32_t forward) {
+  std::vector<place::PlacedFrame> way = place::along_odometry(graph, centre, back, forward);
   Standing standing;
-  bool stopped = false, was_back = true;
-  FrameId before = centre;
-  for (place::PlacedFrame& placed : place::along_odometry(graph, centre, back, forward)) {
-    const bool is_back = placed.frame.index <= centre.index;
-    if (std::exchange(was_back, is_back) != is_back) {
-      standing = {};
-      stopped = false;
-    }
-    // The step that leads from the frame before, or to it.
-    const auto newer = graph.hot(is_back ? before : placed.frame);
-    if (placed.frame != centre && !stopped) {
-      const storage::Edge* step = storage::motion_to(*newer);
-      stopped = !step || standing.is_stop(*step);
-    }
-    before = placed.frame;
-    if (!stopped) reached.push_back(std::move(placed));
+  for (std::size_t i = 1; i < way.size(); ++i) {
+    const auto newer = graph.hot(std::max(way[i - 1].frame, way[i].frame));
+    const storage::Edge* step = storage::motion_to(*newer);
+    if (step && !standing.is_stop(*step)) continue;
+    way.resize(i);
+    break;
   }
-  return reached;
+  return way;
 }
 
 // The last closures in force along the odometry before `frame`, one for each stretch to which they lead, the newest
 // first; none of the stretch of `recognised`, and none before a stop.
 std::vector<EarlierClosure> earlier_closures(const storage::Graph& graph, FrameId frame, FrameId recognised) {
   std::vector<EarlierClosure> found;
-  for (const place::PlacedFrame& placed : along_odometry_to_stops(graph, frame, kReach, 0)) {
+  for (const place::PlacedFrame& placed : along_odometry_to_stop(graph, frame, kReach, 0)) {
     const auto hot = graph.hot(placed.frame);
     for (const storage::Edge& edge : hot->edges) {
       if (edge.kind != storage::EdgeKind::kLoop || edge.state != storage::EdgeState::kAccepted ||
@@ -83,10 +74,7 @@ double median_depth(const place::QueryPicture& query) {
   std::vector<double> depths;
   for (const AppearanceFeature& feature : query.features)
     if (feature.disparity > 0) depths.push_back(query.camera.f * query.camera.baseline / double{feature.disparity});
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::ranges::nth_element(depths, middle);
-  return *middle;
+  return depths.empty() ? 0 : upper_median(std::move(depths));
 }
 
 // The view of the place's session that is nearest to where the closure puts the query.
@@ -95,16 +83,20 @@ std::optional<place::VerifiedPlace> expected_view(const storage::Graph& graph, c
   const SE3 T_older_end_query = earlier.closure.T_ab * earlier.T_newer_end_frame;
   std::optional<place::VerifiedPlace> nearest;
   double min_distance = max_distance;
-  for (const place::PlacedFrame& placed : along_odometry_to_stops(graph, earlier.closure.a, kReach, kReach)) {
-    const SE3 T_frame_query = placed.T_centre_frame.inverse() * T_older_end_query;
-    if (T_frame_query.t.norm() > min_distance || rotation_angle(T_frame_query.R) > kMaxAngle ||
-        !place::may_answer(graph, query, placed.frame))
-      continue;
-    min_distance = T_frame_query.t.norm();
-    nearest.emplace();
-    nearest->match = placed.frame;
-    nearest->T_match_query = T_frame_query;
-  }
+  const auto find_nearest = [&](const std::vector<place::PlacedFrame>& way) {
+    for (const place::PlacedFrame& placed : way) {
+      const SE3 T_frame_query = placed.T_centre_frame.inverse() * T_older_end_query;
+      if (T_frame_query.t.norm() > min_distance || rotation_angle(T_frame_query.R) > kMaxAngle ||
+          !place::may_answer(graph, query, placed.frame))
+        continue;
+      min_distance = T_frame_query.t.norm();
+      nearest.emplace();
+      nearest->match = placed.frame;
+      nearest->T_match_query = T_frame_query;
+    }
+  };
+  find_nearest(along_odometry_to_stop(graph, earlier.closure.a, kReach, 0));
+  find_nearest(along_odometry_to_stop(graph, earlier.closure.a, 0, kReach));
   return nearest;
 }
 
