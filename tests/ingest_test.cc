@@ -37,6 +37,9 @@ TEST(Ingest, AnyNumberOfLookupThreadsAndOfRobotsFindTheSame) {
   EXPECT_EQ(robots["keyframes"], 4 * one["keyframes"]);
   EXPECT_GT(robots["closures"], 3 * one["keyframes"]) << "all but the first of four find frames of those before";
   EXPECT_EQ(robots["wrong"], 0);
+  // Most observations lead across closures; the robots' own steps stay as exact as they were.
+  EXPECT_LT(one["worst_step_m"], 0.02);
+  EXPECT_LT(robots["worst_step_m"], 0.2);
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ namespace relmap::rba {
 
 struct EdgeEstimate {
   SE3 T_ab;
-  bool changed = false;  // T_ab changed since it was loaded
+  bool changed = false;   // T_ab changed since it was loaded
+  bool measured = false;  // so well, in the last solve, that its estimate may become its prior
   Matrix6 covariance = Matrix6::Zero();
   bool covariance_changed = false;
   std::int32_t previous = -1;               // the edge of with_previous; -1: with_previous has not been computed

@@ -168,7 +168,7 @@ struct Relaxer::Impl {
         stored.correlation_with_previous =
             storage::to_correlation(edge.with_previous, edge.covariance, local.estimates[edge.previous].covariance);
       // A closure keeps the prior that its verification measured, because a free loop edge fits any measurements.
-      if (stored.support >= storage::kMinSupport && stored.kind == storage::EdgeKind::kOdometry) {
+      if (edge.measured && stored.kind == storage::EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;
         stored.prior_covariance = stored.covariance;
       }

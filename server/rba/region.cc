@@ -282,14 +282,18 @@ void Region::choose_columns(Problem* problem) {
     if (uses_[e] == 0 || !(is_active(local.a) || is_active(local.b))) continue;
     edge.column = problem->columns++;
     edge_of_column_.push_back(edge_of_problem_[e]);
-    edge.prior = local.record->prior_active || uses_[e] < static_cast<std::int32_t>(storage::kMinSupport);
-    if (!edge.prior) continue;
-    edge.prior_T_ab = local.record->prior_T_ab;
-    const Eigen::LLT<Matrix6> cholesky(local.record->prior_covariance);
+  }
+  count_across_columns(problem);
+  support_.compute(*problem);
+  for (ProblemEdge& edge : problem->edges) {
+    if (edge.column < 0) continue;
+    const storage::Edge& record = *local_.edges[edge_of_column_[edge.column]].record;
+    if (!record.prior_active && support_.of(edge.column) >= storage::kMinSupport) continue;
+    const Eigen::LLT<Matrix6> cholesky(record.prior_covariance);
+    edge.prior_T_ab = record.prior_T_ab;
     edge.prior_information = cholesky.solve(Matrix6::Identity());
     edge.prior = cholesky.info() == Eigen::Success && edge.prior_information.allFinite();
   }
-  count_across_columns(problem);
 }
 
 void Region::count_across_columns(Problem* problem) {
@@ -317,6 +321,7 @@ void Region::take(const Problem& problem) {
     const SE3& solved = problem.edges[e].T_ab;
     local.changed = local.changed || local.T_ab.R != solved.R || local.T_ab.t != solved.t;
     local.T_ab = solved;
+    local.measured = support_.of(problem.edges[e].column) >= storage::kMinSupport;
   }
   for (const ProblemBase& base : problem.bases)
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/rba/effective_support.h"
 #include "server/rba/local_map.h"
 #include "server/rba/problem.h"
 
@@ -107,6 +108,8 @@ class Region {
   std::vector<std::int32_t> landmark_of_problem_;
   std::vector<std::int32_t> edge_of_problem_, edge_of_column_;
   std::vector<std::int32_t> problem_edge_;  // by local edge; -1: not in the problem
+
+  EffectiveSupport support_;
 
   // Scratch.
   std::vector<std::int32_t> next_, observers_, observer_ends_, beyond_, uses_;

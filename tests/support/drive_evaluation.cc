@@ -141,8 +141,8 @@ Result<DriveTruth> read_truth(const std::string& folder) {
   return truth;
 }
 
-ClosuresJudged judge_closures(const storage::Graph& graph, const DriveTruth& truth) {
-  ClosuresJudged judged;
+EdgesJudged judge_edges(const storage::Graph& graph, const DriveTruth& truth) {
+  EdgesJudged judged;
   const auto truth_of = [&](FrameId frame) -> std::optional<SE3> {
     const auto session = graph.session(frame.session);
     const auto hot = graph.hot(frame);
@@ -152,9 +152,13 @@ ClosuresJudged judge_closures(const storage::Graph& graph, const DriveTruth& tru
     for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i) {
       const auto hot = graph.hot({session.number, i});
       for (const storage::Edge& edge : hot ? hot->edges : std::vector<storage::Edge>{}) {
-        if (edge.kind != storage::EdgeKind::kLoop || edge.state != storage::EdgeState::kAccepted) continue;
         const auto a = truth_of(edge.a), b = truth_of(edge.b);
-        if (a && b) ++(is_wrong((a->inverse() * *b).inverse() * edge.T_ab) ? judged.wrong : judged.right);
+        if (edge.state != storage::EdgeState::kAccepted || !a || !b) continue;
+        const SE3 error = (a->inverse() * *b).inverse() * edge.T_ab;
+        if (edge.kind == storage::EdgeKind::kLoop)
+          ++(is_wrong(error) ? judged.wrong : judged.right);
+        else
+          judged.worst_step_m = std::max(judged.worst_step_m, error.t.norm());
       }
     }
   return judged;

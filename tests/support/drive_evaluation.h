@@ -41,11 +41,12 @@ struct DriveEvaluation {
   std::uint32_t revisits_disconnected = 0;
 };
 
-struct ClosuresJudged {
+struct EdgesJudged {
   std::uint32_t right = 0, wrong = 0;  // accepted closures
+  double worst_step_m = 0;             // the greatest error of an odometry edge
 };
-// Judges the closures of a map all of whose sessions are the recording that `truth` is of; also those between sessions.
-ClosuresJudged judge_closures(const storage::Graph& graph, const DriveTruth& truth);
+// Judges the edges of a map all of whose sessions are the recording that `truth` is of; also those between sessions.
+EdgesJudged judge_edges(const storage::Graph& graph, const DriveTruth& truth);
 
 // Evaluates one session of the map. Truth is assigned to keyframes by the time since the first keyframe.
 DriveEvaluation evaluate_drive(const storage::Graph& graph, SessionNumber session, const DriveTruth& truth);

@@ -99,12 +99,12 @@ void publish_at_once(const std::string& server, const std::vector<Keyframes>& se
     if (failure) std::rethrow_exception(failure);
 }
 
-testing::ClosuresJudged judge(const std::string& folder, const std::string& truth) {
+testing::EdgesJudged judge(const std::string& folder, const std::string& truth) {
   const auto engine = storage::open_rocksdb(folder, {}).or_throw();
   const std::uint64_t epoch = engine->acquire().or_throw();
   const auto map =
       storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(std::size_t{1} << 30)).or_throw();
-  return testing::judge_closures(*map->publish(), testing::read_truth(truth).or_throw());
+  return testing::judge_edges(*map->publish(), testing::read_truth(truth).or_throw());
 }
 
 void run(const IngestOptions& options, Report& report) {
@@ -149,9 +149,10 @@ void run(const IngestOptions& options, Report& report) {
   report.add("closures", static_cast<double>(status.closures_accepted), "in force at the end");
   report.add("resident_mb", resident / (1 << 20), "of the daemon, at most");
   if (options.truth.empty()) return;
-  const testing::ClosuresJudged judged = judge(how.data, options.truth);
+  const testing::EdgesJudged judged = judge(how.data, options.truth);
   report.add("right", judged.right, "closures in force within 0.5 m and 10 degrees of the truth");
   report.add("wrong", judged.wrong, "closures in force beyond that");
+  report.add("worst_step_m", judged.worst_step_m, "the greatest error of a robot's step from keyframe to keyframe");
 }
 
 }  // namespace
@@ -161,7 +162,7 @@ Run declare_ingest(CLI::App& app) {
   app.add_option("--pictures", options->pictures, "keyframes of one session, as relmap-frontend --out writes them")
       ->required();
   app.add_option("--truth", options->truth,
-                 "folder with poses.txt and times.txt of the recording; judges the closures");
+                 "folder with poses.txt and times.txt of the recording; judges closures and steps");
   app.add_option("--sessions", options->sessions, "robots that send the same recording at the same time")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
