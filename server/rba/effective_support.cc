@@ -20,7 +20,6 @@ const std::vector<double>& EffectiveSupport::compute(const Problem& problem) {
   factor(columns);
   invert(columns);
   // The diagonal of L^-1 is the sum of the squares in each column of the inverse factor.
-  std::fill(support_.begin(), support_.end(), 0);
   for (std::int32_t row = 0; row < columns; ++row)
     for (std::int32_t column = 0; column <= row; ++column)
       support_[static_cast<std::size_t>(column)] += at(row, column) * at(row, column);
@@ -56,7 +55,7 @@ void EffectiveSupport::sum_paths(const Problem& problem, bool pairs) {
         const std::int32_t other = problem.edges[above.edge].column;
         if (other < 0) continue;
         const double product = above.forward == node.forward ? beyond_[n] : -beyond_[n];
-        at(std::max(column, other), std::min(column, other)) += (column == other ? 2 : 1) * product;
+        at(std::max(column, other), std::min(column, other)) += product;
       }
     }
   }

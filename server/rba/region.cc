@@ -288,7 +288,7 @@ void Region::choose_columns(Problem* problem) {
   for (ProblemEdge& edge : problem->edges) {
     if (edge.column < 0) continue;
     const storage::Edge& record = *local_.edges[edge_of_column_[edge.column]].record;
-    if (!record.prior_active && support_.of(edge.column) >= storage::kMinSupport) continue;
+    if (!record.prior_active && is_measured(edge.column)) continue;
     const Eigen::LLT<Matrix6> cholesky(record.prior_covariance);
     edge.prior_T_ab = record.prior_T_ab;
     edge.prior_information = cholesky.solve(Matrix6::Identity());
@@ -321,7 +321,7 @@ void Region::take(const Problem& problem) {
     const SE3& solved = problem.edges[e].T_ab;
     local.changed = local.changed || local.T_ab.R != solved.R || local.T_ab.t != solved.t;
     local.T_ab = solved;
-    local.measured = support_.of(problem.edges[e].column) >= storage::kMinSupport;
+    local.measured = is_measured(problem.edges[e].column);
   }
   for (const ProblemBase& base : problem.bases)
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {

@@ -66,6 +66,8 @@ class Region {
   bool is_held(std::int32_t landmark) const {
     return local_.landmarks[landmark].frozen || (hold_fixed_ && local_.landmarks[landmark].fixed);
   }
+  // Whether the edge of a column of the problem last built needs no prior.
+  bool is_measured(std::int32_t column) const { return support_.of(column) >= storage::kMinSupport; }
   bool free_what_moves();
   void sort_observations();
   void free_landmark(std::int32_t landmark);

@@ -79,6 +79,19 @@ TEST_F(RegionTest, IsClosedUnderThePathsOfItsObservations) {
 TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {
   for (std::uint32_t i = 60; i < 70; ++i) region_.activate(local_.frame(drive_.frame(i)));
   region_.build(&problem_);
+  std::vector<std::int32_t> uses(problem_.edges.size(), 0);
+  for (const ProblemBase& base : problem_.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
+      for (std::int32_t o = problem_.landmarks[l].first_observation; o < problem_.landmarks[l].end_observation; ++o)
+        for (std::int32_t n = problem_.observations[o].node; problem_.nodes[n].parent >= 0;
+             n = problem_.nodes[n].parent)
+          uses[problem_.nodes[n].edge] += problem_.observations[o].counted;
+  for (std::size_t e = 0; e < problem_.edges.size(); ++e) {
+    const ProblemEdge& edge = problem_.edges[e];
+    if (edge.column >= 0) {
+      EXPECT_TRUE(edge.prior || uses[e] >= static_cast<std::int32_t>(storage::kMinSupport));
+    }
+  }
   EffectiveSupport support;
   support.compute(problem_);
   int with = 0, without = 0;
