@@ -70,6 +70,7 @@ struct FoundRoute {
   std::uint32_t ends_fingerprint = 0;
   Charge charge;
 };
+inline bool is_cut_off(const FoundRoute& found) { return found.view->expired(); }
 
 // The index that FindRoute searches, and the routes that it found.
 struct Routes {

@@ -441,13 +441,7 @@ TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
   request.clear_from();  // the token implies it
   request.clear_to();
   auto stream = call(core, find_route, request, deadline_).or_throw();
-  std::size_t at = 5;
-  for (auto rest = stream().or_throw(); rest; rest = stream().or_throw()) {
-    EXPECT_FALSE(rest->has_summary());
-    for (const v1::RouteStep& step : rest->steps())
-      EXPECT_EQ(step.SerializeAsString(), whole[at++].SerializeAsString());
-  }
-  EXPECT_EQ(at, whole.size());
+  const v1::FindRouteRequest rest_of_it = request;
 
   const std::string token = request.resume_token();
   const std::size_t position = token.rfind('-');
@@ -466,6 +460,15 @@ TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
   request.clear_or_to();
   request.mutable_weights()->set_metre(2);
   EXPECT_EQ(call(core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
+
+  std::size_t at = 5;
+  for (auto rest = stream().or_throw(); rest; rest = stream().or_throw()) {
+    EXPECT_FALSE(rest->has_summary());
+    for (const v1::RouteStep& step : rest->steps())
+      EXPECT_EQ(step.SerializeAsString(), whole[at++].SerializeAsString());
+  }
+  EXPECT_EQ(at, whole.size());
+  EXPECT_EQ(call(core, find_route, rest_of_it, deadline_).reason(), Reason::VIEW_EXPIRED) << "it was sent to its end";
 }
 
 TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {

@@ -90,7 +90,10 @@ class RouteStream {
   }
 
   Result<std::optional<v1::FindRouteReply>> take() {
-    if (summarised_ && next_ >= route_.steps()) return std::optional<v1::FindRouteReply>();
+    if (summarised_ && next_ >= route_.steps()) {
+      routes_.found.forget(found_->number);  // and with it the view, which would hold memory for as long as it is kept
+      return std::optional<v1::FindRouteReply>();
+    }
     v1::FindRouteReply reply;
     if (!summarised_) *reply.mutable_summary() = summary();
     summarised_ = true;

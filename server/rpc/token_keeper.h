@@ -24,6 +24,9 @@ struct Continuation {
   std::string position;  // empty means from the start
 };
 
+// Whether the view that it depends on was cut off. There is one function of this name for each type that is kept.
+inline bool is_cut_off(const storage::MapView& view) { return view.expired(); }
+
 // Thread-safe.
 template <typename T>
 class TokenKeeper {
@@ -64,6 +67,11 @@ class TokenKeeper {
     return Continuation<T>{std::move(kept), token.substr(second + 1)};
   }
 
+  // Drops an object: nobody will continue there.
+  void forget(std::uint64_t number) {
+    const MutexLock lock(mutex_);
+    kept_.remove_if([&](const Kept& k) { return k.number == number; });
+  }
   // Drops the least recently used object. False if nothing is kept.
   bool drop_oldest() {
     const MutexLock lock(mutex_);
@@ -71,7 +79,8 @@ class TokenKeeper {
     kept_.pop_back();
     return true;
   }
-  // Drops what is too old. Must be called now and then.
+  // Drops what is too old, and what depends on a view that was cut off, so that its memory is freed. Must be called now
+  // and then.
   void expire() {
     const MutexLock lock(mutex_);
     expire_locked();
@@ -86,7 +95,7 @@ class TokenKeeper {
   };
   void expire_locked() RELMAP_REQUIRES(mutex_) {
     const Clock::time_point oldest = Clock::now() - kMaxAge;
-    kept_.remove_if([&](const Kept& k) { return k.used < oldest; });
+    kept_.remove_if([&](const Kept& k) { return k.used < oldest || is_cut_off(*k.kept); });
   }
   void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) RELMAP_REQUIRES(mutex_) {
     kept_.remove_if([&](const Kept& k) { return k.number == number; });

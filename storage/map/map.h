@@ -111,6 +111,9 @@ class MapView final : public Graph {
                     const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started
+  // Whether the view was cut off, since old views hold more memory than their share: its reads throw VIEW_EXPIRED. Its
+  // memory is freed when its last owner lets it go.
+  bool expired() const;
   const MapFacts& state() const;
   std::size_t pending_frames() const;  // number of frames in MapState::pending
   // The last commit, without what was dirty on top of it: for verifying or copying what stands on disk.

@@ -15,6 +15,7 @@ MapView::MapView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 MapView::~MapView() = default;
 
 std::uint64_t MapView::version() const { return impl_->version; }
+bool MapView::expired() const { return impl_->ledger->expired(impl_->version); }
 const MapFacts& MapView::state() const { return impl_->state; }
 std::size_t MapView::pending_frames() const { return impl_->pending_frames; }
 std::shared_ptr<const EngineSnapshot> MapView::committed() const { return impl_->snapshot; }

@@ -1,6 +1,6 @@
-// Accounts for the bytes that only old views hold. When a part is replaced, each view that can still see it (versions
-// [created, retired)) keeps it. Its bytes are charged to Share::kViews until the last of these views is released. When
-// the share exceeds its allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED.
+// Accounts for the bytes that only old views hold. When a part is replaced, each view that can still see it keeps it.
+// Its bytes are charged to Share::kViews until the last of these views is released. When the share exceeds its
+// allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED, and who keeps them lets them go.
 #pragma once
 
 #include <atomic>
@@ -30,17 +30,26 @@ class ViewLedger {
 
  private:
   struct Retired {
-    std::uint64_t created, retired;
+    std::uint64_t created;
     std::size_t bytes;
   };
-  bool held(const Retired& part, std::uint64_t from) const
-      RELMAP_REQUIRES(mutex_);  // by a live view not older than `from`
+  // A view, and the parts of which it is the newest holder: when it ends, they are freed, or pass to the next older
+  // view. So each part is counted once, however many views see it.
+  struct LiveView {
+    std::uint64_t version = 0;
+    std::vector<Retired> parts;
+    std::size_t bytes = 0;  // of `parts`
+  };
+  // The first of live_ whose version is at least this.
+  std::vector<LiveView>::iterator from(std::uint64_t version) RELMAP_REQUIRES(mutex_);
+  // Gives the part to the view before `end` in live_, if that one sees it. False if it does not: nobody holds the part.
+  bool hold_before(std::vector<LiveView>::iterator end, const Retired& part) RELMAP_REQUIRES(mutex_);
   void expire() RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<Budget> budget_;
   Mutex mutex_;
-  std::vector<std::uint64_t> live_ RELMAP_GUARDED_BY(mutex_);  // ascending
-  std::vector<Retired> retired_ RELMAP_GUARDED_BY(mutex_);
+  std::vector<LiveView> live_ RELMAP_GUARDED_BY(mutex_);  // ascending
+  std::vector<Retired> spare_ RELMAP_GUARDED_BY(mutex_);  // memory of a view that ended, for the next
   std::atomic<std::uint64_t> expired_below_{0};
 };
 
