@@ -39,7 +39,8 @@ void BackgroundWork::submit_next() {
     relax = relaxation_pending_ && !relaxation_on_its_way_;
     remove = !removal_on_its_way_;
   }
-  if (relax && hooks_.is_quiet()) submit(storage::IdleWorkRecord{slice_}, &BackgroundWork::relaxation_on_its_way_);
+  if (relax && hooks_.is_quiet() && hooks_.lookups_keep_up())
+    submit(storage::IdleWorkRecord{slice_}, &BackgroundWork::relaxation_on_its_way_);
   if (!remove || !hooks_.is_quiet()) return;
   if (const auto removal = next_removal()) submit(*removal, &BackgroundWork::removal_on_its_way_);
 }
@@ -72,6 +73,11 @@ std::optional<storage::RemoveChunkRecord> BackgroundWork::next_removal() {
     going_.erase(session);
   }
   return std::nullopt;
+}
+
+bool BackgroundWork::relaxation_waits() const {
+  const MutexLock lock(mutex_);
+  return relaxation_pending_ && !relaxation_on_its_way_;
 }
 
 bool BackgroundWork::done() const {

@@ -24,6 +24,9 @@ class BackgroundWork {
     std::function<Status(storage::JournalRecord, Done)> submit;
     // Whether no record waits for the worker. Records from outside go first.
     std::function<bool()> is_quiet;
+    // Whether no more frames wait for their lookup than are being looked up. While lookups fall behind, the processor's
+    // time is theirs: relaxation of what is pending can wait, and robots wait for lookups.
+    std::function<bool()> lookups_keep_up;
     // The session as the worker sees it.
     std::function<std::optional<storage::Session>(SessionNumber)> session;
     // Whether frames of the session still wait for their lookup. Its removal waits for these.
@@ -54,6 +57,9 @@ class BackgroundWork {
   void submit_next();
   // The next chunk to take out; nullopt if there is none, or it has to wait. Forgets sessions without frames.
   std::optional<storage::RemoveChunkRecord> next_removal();
+
+  // Whether relaxation is pending of which no record is on its way: submit_next() should be called again soon.
+  bool relaxation_waits() const;
 
   // Whether no work is left. Thread-safe.
   bool done() const;

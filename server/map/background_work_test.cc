@@ -30,7 +30,7 @@ class BackgroundWorkTest : public ::testing::Test {
   std::map<SessionNumber, storage::Session> sessions_;
   std::set<SessionNumber> looked_up_;
   std::vector<SessionNumber> gone_;
-  bool may_remove_ = true, quiet_ = true;
+  bool may_remove_ = true, quiet_ = true, lookups_keep_up_ = true;
   Status queue_takes_;
   std::vector<std::pair<storage::JournalRecord, BackgroundWork::Done>> submitted_;
   BackgroundWork work_{1000,
@@ -40,6 +40,7 @@ class BackgroundWorkTest : public ::testing::Test {
                               return queue_takes_;
                             },
                         .is_quiet = [this] { return quiet_; },
+                        .lookups_keep_up = [this] { return lookups_keep_up_; },
                         .session = [this](SessionNumber number) { return std::optional(sessions_.at(number)); },
                         .has_waiting_lookups = [this](SessionNumber number) { return looked_up_.contains(number); },
                         .may_remove = [this] { return may_remove_; },
@@ -72,6 +73,22 @@ TEST_F(BackgroundWorkTest, RecordsFromOutsideGoFirst) {
   quiet_ = true;
   work_.submit_next();
   EXPECT_EQ(2u, submitted_.size());
+}
+
+TEST_F(BackgroundWorkTest, RelaxationWaitsForLookupsThatHaveFallenBehindAndRemovalDoesNot) {
+  add_session(3, 10);
+  work_.delete_session(3);
+  work_.resume(true);
+  lookups_keep_up_ = false;
+  EXPECT_TRUE(work_.relaxation_waits());
+  work_.submit_next();
+  EXPECT_EQ(0u, submitted<storage::IdleWorkRecord>());
+  EXPECT_EQ(1u, submitted<storage::RemoveChunkRecord>());
+  EXPECT_TRUE(work_.relaxation_waits());
+  lookups_keep_up_ = true;
+  work_.submit_next();
+  EXPECT_EQ(1u, submitted<storage::IdleWorkRecord>());
+  EXPECT_FALSE(work_.relaxation_waits());
 }
 
 TEST_F(BackgroundWorkTest, RefusedRecordsAreSubmittedAgain) {

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <exception>
 #include <iterator>
@@ -19,7 +20,7 @@ namespace {
 constexpr std::size_t kBytesPerFrame = 256;      // of an open frame, here and in the map's state
 constexpr std::size_t kBytesPushed = 32;         // of a frame in pushed_, which may be closed already
 constexpr int kViews = 3;                        // attempts in a row, each on a new view
-constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memory
+constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memory, or for the disk
 
 }  // namespace
 
@@ -149,43 +150,63 @@ void LookupQueue::run() {
   MutexLock lock(mutex_);
   for (;;) {
     changed_.wait(mutex_, [&]() RELMAP_REQUIRES(mutex_) { return stopping_ || !queue_.empty(); });
+    changed_.wait_until(mutex_, not_before_, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; });
     if (stopping_) return;
+    if (queue_.empty()) continue;
     const Pushed pushed = queue_.front();
-    const FrameId frame = pushed.frame;
     queue_.pop_front();
     lock.unlock();
-    const End end = look_up_and_journal(pushed);
-    lock.lock();
-    if (end != End::kAgain) forget_pushed(pushed.ticket);
-    if (end == End::kDone) close_locked(frame);
-    if (end == End::kFailed) failed_.insert(frame);
-    if (end == End::kAgain) {
-      queue_.push_back(pushed);
-      changed_.wait_for(mutex_, kRetry, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; });
-    }
-    lock.unlock();
-    on_change_();
+    end(pushed, look_up_and_journal(pushed));
     lock.lock();
   }
 }
 
-LookupQueue::End LookupQueue::look_up_and_journal(const Pushed& pushed) const {
-  const FrameId frame = pushed.frame;
+void LookupQueue::end(const Pushed& pushed, End how) {
+  if (how == End::kJournalled) return;
+  {
+    const MutexLock lock(mutex_);
+    if (how != End::kAgain) forget_pushed(pushed.ticket);
+    if (how == End::kDone) close_locked(pushed.frame);
+    if (how == End::kFailed) failed_.insert(pushed.frame);
+    if (how == End::kAgain) {
+      queue_.push_back(pushed);
+      not_before_ = std::chrono::steady_clock::now() + kRetry;
+      changed_.notify_all();
+    }
+  }
+  on_change_();
+}
+
+LookupQueue::End LookupQueue::look_up_and_journal(const Pushed& pushed) {
   const LaterFrames later = [&] { return later_than(pushed); };
   for (int attempt = 0; attempt < kViews; ++attempt) {
     try {
-      for (const storage::JournalRecord& record : look_up_(frame, later))
-        if (!journal_(record)) return End::kStopped;
-      return End::kDone;
+      return journal(pushed, look_up_(pushed.frame, later));
     } catch (const std::exception& error) {
       const auto* status = dynamic_cast<const StatusError*>(&error);
       if (status && status->status().reason() == Reason::VIEW_EXPIRED) continue;
-      spdlog::error("frame {} is not looked up before the next start: {}", frame.to_string(), error.what());
+      spdlog::error("frame {} is not looked up before the next start: {}", pushed.frame.to_string(), error.what());
       return End::kFailed;
     }
   }
-  spdlog::warn("the lookup of frame {} waits: its view was cut off {} times", frame.to_string(), kViews);
+  spdlog::warn("the lookup of frame {} waits: its view was cut off {} times", pushed.frame.to_string(), kViews);
   return End::kAgain;
+}
+
+LookupQueue::End LookupQueue::journal(const Pushed& pushed, const std::vector<storage::JournalRecord>& found) {
+  if (found.empty()) return End::kDone;
+  struct Outcome {
+    std::atomic<std::size_t> left;
+    std::atomic<bool> durable = true;
+  };
+  const auto outcome = std::make_shared<Outcome>(found.size());
+  const Durable done = [this, pushed, outcome](bool durable) {
+    if (!durable) outcome->durable = false;
+    if (--outcome->left == 0) end(pushed, outcome->durable ? End::kDone : End::kAgain);
+  };
+  for (const storage::JournalRecord& record : found)
+    if (!journal_(record, done)) return End::kStopped;  // its share of `left` stays, so the frame stays open
+  return End::kJournalled;
 }
 
 }  // namespace relmap::map

@@ -36,8 +36,11 @@ class LookupQueue {
   // Throws StatusError VIEW_EXPIRED if its view was cut off under memory pressure: the lookup is tried again. After any
   // other exception the frame stays open until the next start.
   using LookUp = std::function<std::vector<storage::JournalRecord>(FrameId, const LaterFrames& later)>;
-  // Waits until the record is durable. False if the daemon stops before. Called by several threads at a time.
-  using Journal = std::function<bool(const storage::JournalRecord&)>;
+  // Hands a record to the journal, and calls `done`, from any thread, once it is durable or the disk refused it. Waits
+  // only while the journal has no room. False if the daemon stops before, or the map is read-only; `done` is then not
+  // called. Called by several threads at a time.
+  using Durable = std::function<void(bool)>;
+  using Journal = std::function<bool(const storage::JournalRecord&, Durable done)>;
 
   explicit LookupQueue(std::shared_ptr<storage::Budget> budget);
   // Calls stop().
@@ -49,7 +52,8 @@ class LookupQueue {
   // order in which these were pushed. `on_change` is called by them, without a lock held, whenever waiting() has
   // changed.
   void start(std::size_t threads, LookUp look_up, Journal journal, std::function<void()> on_change);
-  // Ends each thread after its present lookup. Open frames stay open.
+  // Ends each thread after its present lookup. Open frames stay open; those whose records the journal has taken close
+  // when these are durable.
   void stop();
 
   // Opens the frame and lets a thread look it up.
@@ -74,7 +78,7 @@ class LookupQueue {
   bool is_full(std::size_t queued) const;
 
  private:
-  enum class End : std::uint8_t { kDone, kAgain, kFailed, kStopped };
+  enum class End : std::uint8_t { kDone, kJournalled, kAgain, kFailed, kStopped };
 
   // A pushed frame. Tickets count up from push to push.
   struct Pushed {
@@ -83,7 +87,11 @@ class LookupQueue {
   };
 
   void run();
-  End look_up_and_journal(const Pushed& pushed) const;
+  End look_up_and_journal(const Pushed& pushed);
+  // Hands over all that a lookup found. Returns kJournalled if there was something; it ends when that is durable.
+  End journal(const Pushed& pushed, const std::vector<storage::JournalRecord>& found);
+  // Ends a lookup, or puts the frame in the queue again.
+  void end(const Pushed& pushed, End how);
   std::vector<storage::FrameRange> later_than(const Pushed& pushed) const;
   void forget_pushed(std::uint64_t ticket) RELMAP_REQUIRES(mutex_);
   void open_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
@@ -100,6 +108,8 @@ class LookupQueue {
   std::map<SessionNumber, std::deque<Pushed>> pushed_ RELMAP_GUARDED_BY(mutex_);
   std::set<FrameId> open_ RELMAP_GUARDED_BY(mutex_);  // those queued, those being looked up, and those that failed
   std::set<FrameId> failed_ RELMAP_GUARDED_BY(mutex_);
+  // No lookup begins before: what one found could not be written, or its view was cut off.
+  std::chrono::steady_clock::time_point not_before_ RELMAP_GUARDED_BY(mutex_);
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
   LookUp look_up_;
   Journal journal_;

@@ -29,9 +29,16 @@ class LookupQueueTest : public ::testing::Test {
           look_up_(frame);
           return std::vector<storage::JournalRecord>{storage::SetLabelRecord{frame, "found", true}};
         },
-        [this](const storage::JournalRecord& record) {
-          const std::lock_guard lock(mutex_);
-          journalled_.push_back(std::get<storage::SetLabelRecord>(record).frame);
+        [this](const storage::JournalRecord& record, LookupQueue::Durable done) {
+          {
+            const std::lock_guard lock(mutex_);
+            journalled_.push_back(std::get<storage::SetLabelRecord>(record).frame);
+            if (holds_back_) {
+              held_back_.push_back(std::move(done));
+              return true;
+            }
+          }
+          if (journal_takes_) done(true);
           return journal_takes_.load();
         },
         [this] {
@@ -42,6 +49,19 @@ class LookupQueueTest : public ::testing::Test {
   void wait() {
     std::unique_lock lock(mutex_);
     EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [this] { return queue_.waiting() == 0; }));
+  }
+  // Waits until `count` lookups have been handed over, and tells that what they found is durable, or was refused.
+  void tell(std::size_t count, bool durable) {
+    for (;; std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
+      std::vector<LookupQueue::Durable> done;
+      {
+        const std::lock_guard lock(mutex_);
+        if (held_back_.size() < count) continue;
+        done.swap(held_back_);
+      }
+      for (const LookupQueue::Durable& told : done) told(durable);
+      return;
+    }
   }
   int lookups_of(FrameId frame) {
     const std::lock_guard lock(mutex_);
@@ -56,6 +76,8 @@ class LookupQueueTest : public ::testing::Test {
   std::map<FrameId, int> lookups_;
   std::map<FrameId, std::vector<storage::FrameRange>> later_;  // as the last lookup of the frame was told
   std::vector<FrameId> journalled_;
+  bool holds_back_ = false;  // the journal does not write what it takes before tell() is called
+  std::vector<LookupQueue::Durable> held_back_;
   LookupQueue queue_{budget_};
 };
 
@@ -163,6 +185,33 @@ TEST_F(LookupQueueTest, TheLagIsThatOfTheFrameThatWaitsLongest) {
   ends = true;
   wait();
   EXPECT_EQ(queue_.lag_s(), 0);
+}
+
+TEST_F(LookupQueueTest, LookupsGoOnWhileWhatTheOthersFoundIsWritten) {
+  holds_back_ = true;
+  for (std::uint32_t i = 0; i < 3; ++i) queue_.push({1, i});
+  start();
+  while (lookups_of({1, 2}) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(queue_.open_frames().size(), 3u) << "nothing is durable yet";
+  EXPECT_GT(queue_.lag_s(), 0);
+  tell(3, true);
+  wait();
+  EXPECT_TRUE(queue_.open_frames().empty());
+  EXPECT_EQ(queue_.lag_s(), 0);
+  EXPECT_EQ(budget_->used(storage::Share::kQueues), 0u);
+}
+
+TEST_F(LookupQueueTest, AFrameIsLookedUpAgainIfTheDiskRefusedWhatWasFound) {
+  holds_back_ = true;
+  queue_.push({1, 0});
+  queue_.push({2, 0});
+  start();
+  tell(2, false);
+  tell(2, true);
+  wait();
+  EXPECT_EQ(lookups_of({1, 0}), 2);
+  EXPECT_EQ(lookups_of({2, 0}), 2);
+  EXPECT_TRUE(queue_.open_frames().empty());
 }
 
 TEST_F(LookupQueueTest, AFrameStaysOpenIfItsRecordsAreNotDurableWhenTheQueueStops) {

@@ -36,6 +36,7 @@ using Clock = std::chrono::steady_clock;
 // Pauses before a record is submitted again.
 constexpr std::chrono::milliseconds kQueueFull{5};
 constexpr std::chrono::milliseconds kDiskFails{200};
+constexpr std::chrono::milliseconds kLookAgain{50};  // whether lookups leave time for background work
 
 storage::WordFunction words_of(const std::shared_ptr<const place::Vocabulary>& vocabulary) {
   if (!vocabulary) return {};
@@ -70,6 +71,7 @@ struct Mapper::Impl {
 
   // Worker thread.
   void work();
+  Clock::time_point next_due() const;
   void apply_one(RecordQueue::Next next);
   void apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record,
                          std::optional<PreparedKeyframe> prepared);
@@ -81,7 +83,7 @@ struct Mapper::Impl {
   std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
 
   // Lookup threads.
-  bool journal_patiently(const storage::JournalRecord& record);
+  bool submit_patiently(const storage::JournalRecord& record, const LookupQueue::Durable& durable);
 
   void tell_waiting() const {
     const MutexLock lock(mutex);
@@ -164,6 +166,7 @@ BackgroundWork::Hooks Mapper::Impl::background_hooks() {
             const MutexLock lock(mutex);
             return durable.empty() && !stopping && !failed;
           },
+      .lookups_keep_up = [this] { return lookups.waiting() <= lookup_threads(); },
       .session = [this](SessionNumber session) { return map->session(session); },
       .has_waiting_lookups = [this](SessionNumber session) { return lookups.is_waiting(session); },
       .may_remove =
@@ -279,7 +282,10 @@ void Mapper::Impl::start() {
     lookups.start(
         lookup_threads(),
         [this](FrameId frame, const LaterFrames& later) { return recognition->look_up(*map->view(), frame, later); },
-        [this](const storage::JournalRecord& record) { return journal_patiently(record); }, [this] { tell_waiting(); });
+        [this](const storage::JournalRecord& record, const LookupQueue::Durable& done) {
+          return submit_patiently(record, done);
+        },
+        [this] { tell_waiting(); });
 }
 
 // Deterministic mode: does what an interruption may have left undone.
@@ -292,10 +298,16 @@ void Mapper::Impl::catch_up() {
   if (open.empty()) follow_up(map->state().applied_sequence, std::nullopt, DeterministicDriver::kSlices - done);
 }
 
+// When the worker looks for something to do even if no record comes.
+Clock::time_point Mapper::Impl::next_due() const {
+  const Clock::time_point commit = commits.next_due();
+  return background.relaxation_waits() ? std::min(commit, Clock::now() + kLookAgain) : commit;
+}
+
 void Mapper::Impl::work() {
   MutexLock lock(mutex);
   for (;;) {
-    changed.wait_until(mutex, commits.next_due(),
+    changed.wait_until(mutex, next_due(),
                        [&]() RELMAP_REQUIRES(mutex) { return !durable.empty() || stopping || commits.wants_worker(); });
     if (durable.empty() && stopping) break;
     if (!durable.empty()) {
@@ -413,15 +425,12 @@ void Mapper::Impl::begin_deletion(const storage::Session& session) {
   if (session.frames > 0) background.delete_session(session.number);
 }
 
-// Waits until the record is durable, because only then is the lookup done. The queue may be full of robots' keyframes,
-// or the disk may take nothing for a while. False if the daemon stops or the map becomes read-only first.
-bool Mapper::Impl::journal_patiently(const storage::JournalRecord& record) {
+// The queue may be full of robots' keyframes, or the disk may take nothing for a while. False if the daemon stops or
+// the map becomes read-only first.
+bool Mapper::Impl::submit_patiently(const storage::JournalRecord& record, const LookupQueue::Durable& done) {
   for (;;) {
-    auto durable_at = std::make_shared<std::promise<bool>>();
-    auto written = durable_at->get_future();
-    const Status submitted = writer->submit(
-        record, [durable_at](const Result<std::uint64_t>& result) { durable_at->set_value(result.ok()); });
-    if (submitted.ok() && written.get()) return true;
+    const Status submitted = writer->submit(record, [done](const Result<std::uint64_t>& result) { done(result.ok()); });
+    if (submitted.ok()) return true;
     if (failed || submitted.reason() == Reason::SHUTTING_DOWN) return false;
     MutexLock lock(mutex);
     const auto pause = submitted.reason() == Reason::BUDGET_EXCEEDED ? kQueueFull : kDiskFails;

@@ -204,7 +204,7 @@ TEST(OpenLookups, OpenFramesAndThoseOfTheJournalAreLookedUpInTheOrderInWhichThey
         if (looked_up.size() == 4) fourth.set_value();
         return std::vector<storage::JournalRecord>{};
       },
-      [](const storage::JournalRecord&) { return true; }, [] {});
+      [](const storage::JournalRecord&, const LookupQueue::Durable&) { return true; }, [] {});
   EXPECT_EQ(fourth.get_future().wait_for(std::chrono::minutes(10)), std::future_status::ready);
   lookups.stop();
   EXPECT_THAT(looked_up, ElementsAre(frame(1), frame(2), frame(3), InTurns::kOther)) << "each once";

@@ -2,23 +2,17 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 namespace relmap::place {
-namespace {
-
-constexpr std::uint32_t kMaxSquared = kDescriptorBytes * 255 * 255;
-
-}  // namespace
 
 WordSearch::WordSearch(std::span<const Descriptor> branches, std::span<const std::uint32_t> branch_begin,
                        std::span<const Descriptor> centroids)
-    : branches_(branches), centroids_(centroids), branch_begin_(branch_begin) {
-  std::vector<const Descriptor*> words;
+    : branches_(branches), branch_begin_(branch_begin), most_(branches.size()) {
   for (std::size_t branch = 0; branch < branches.size(); ++branch) {
-    words.clear();
-    for (std::uint32_t word = branch_begin[branch]; word < branch_begin[branch + 1]; ++word)
-      words.push_back(&centroids[word]);
-    of_words_.emplace_back(words);
+    const std::size_t count = branch_begin[branch + 1] - branch_begin[branch];
+    words_.emplace_back(centroids.subspan(branch_begin[branch], count));
+    most_ = std::max(most_, count);
   }
 }
 
@@ -29,9 +23,9 @@ std::uint32_t WordSearch::nearest(const Descriptor& descriptor) const {
   };
   std::array<Near, kBranchesSearched> near;  // ascending
   std::size_t found = 0;
-  std::vector<std::int32_t> distances(branches_.size());
-  branches_.compare(descriptor, distances);
-  for (std::uint32_t b = 0; b < distances.size(); ++b) {
+  std::vector<std::int32_t> distances(most_);
+  branches_.compare(descriptor, std::span(distances).first(branches_.size()));
+  for (std::uint32_t b = 0; b < branches_.size(); ++b) {
     const std::int32_t distance = distances[b];
     if (found == near.size() && distance >= near.back().distance) continue;
     std::size_t i = found < near.size() ? found++ : found - 1;
@@ -39,20 +33,15 @@ std::uint32_t WordSearch::nearest(const Descriptor& descriptor) const {
     near[i] = {distance, b};
   }
 
-  const DescriptorSketch sketched = sketch(descriptor);
-  std::uint32_t best = 0, max = kMaxSquared;  // the squared distance that a nearer word may have at most
-  std::vector<std::uint32_t> possible;
+  std::uint32_t best = 0;
+  auto least = std::numeric_limits<std::int32_t>::max();
   for (std::size_t i = 0; i < found; ++i) {
-    const std::uint32_t branch = near[i].branch;
-    possible.clear();
-    of_words_[branch].find_near(sketched, max, possible);
-    for (const std::uint32_t number : possible) {
-      const std::uint32_t word = branch_begin_[branch] + number;
-      const std::uint32_t distance = squared_distance(descriptor, centroids_[word]);
-      if (distance > max) continue;
-      best = word;
-      if (distance == 0) return best;
-      max = distance - 1;
+    const DescriptorTable& words = words_[near[i].branch];
+    words.compare(descriptor, std::span(distances).first(words.size()));
+    for (std::uint32_t number = 0; number < words.size(); ++number) {
+      if (distances[number] >= least) continue;
+      least = distances[number];
+      best = branch_begin_[near[i].branch] + number;
     }
   }
   return best;

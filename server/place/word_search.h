@@ -1,5 +1,5 @@
 // Finds the nearest word of a descriptor in two levels: words are sorted by branch, and only those of the nearest
-// branches are searched. Of these, sketches rule out most.
+// branches are searched.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "server/place/descriptor.h"
-#include "server/place/descriptor_sketch.h"
 #include "server/place/descriptor_table.h"
 
 namespace relmap::place {
@@ -15,7 +14,7 @@ namespace relmap::place {
 // With so many branches, 99.6 % of the answers are those of an exhaustive search (docs/decisions/recognition.md).
 inline constexpr std::size_t kBranchesSearched = 8;
 
-// Immutable and thread-safe. The tables must outlive it.
+// Immutable and thread-safe. `branch_begin` must outlive it.
 class WordSearch {
  public:
   WordSearch(std::span<const Descriptor> branches, std::span<const std::uint32_t> branch_begin,
@@ -26,9 +25,9 @@ class WordSearch {
 
  private:
   DescriptorTable branches_;
-  std::span<const Descriptor> centroids_;
   std::span<const std::uint32_t> branch_begin_;
-  std::vector<DescriptorSketches> of_words_;  // by branch
+  std::vector<DescriptorTable> words_;  // by branch
+  std::size_t most_ = 0;                // descriptors in one table
 };
 
 }  // namespace relmap::place

@@ -74,7 +74,8 @@ std::span<const LocalStep> LocalGraph::steps(std::int32_t of) {
 
 void LocalGraph::extend(std::int32_t root, Walk& walk) {
   if (walk.grown < 0) {
-    walk.nodes.assign(1, {root, -1, -1, false, 0});
+    walk.nodes.assign(1, {root, -1, -1, false, true, 0});
+    walk.first_loop = Walk::kNoLoop;
     walk.level[0] = 0;
     walk.level[1] = 1;
     walk.grown = 0;
@@ -86,7 +87,9 @@ void LocalGraph::extend(std::int32_t root, Walk& walk) {
     for (const LocalStep step : steps(walk.nodes[n].frame)) {
       if (visited_[step.frame] == visit_ || walk.nodes.size() == kWalkFrames) continue;
       visited_[step.frame] = visit_;
-      walk.nodes.push_back({step.frame, n, step.edge, step.forward, walk.grown + 1});
+      const bool by_motion = walk.nodes[n].by_motion && edges[step.edge].id.ordinal == 0;
+      if (!by_motion) walk.first_loop = std::min(walk.first_loop, walk.grown + 1);
+      walk.nodes.push_back({step.frame, n, step.edge, step.forward, by_motion, walk.grown + 1});
     }
   ++walk.grown;
   walk.level[walk.grown + 1] = static_cast<std::int32_t>(walk.nodes.size());
@@ -147,10 +150,15 @@ LocalGraph::Turn LocalGraph::find_turn(std::int32_t base, std::int32_t observer)
   }
   Turn best;
   auto min_edges = static_cast<std::int32_t>(kPathDepth) + 1;
+  // Motion is walked in both directions. So a path that turns at a frame which the observer reaches by motion is itself
+  // a walk up from the base, and not shorter than the one that is known.
+  const bool leads_there = node_of_[observer] >= 0;
   for (std::int32_t depth = 0; depth <= static_cast<std::int32_t>(kWalkDepth) && depth < min_edges; ++depth) {
     const Walk& down = walk(observer, depth);
+    if (leads_there && depth > 0 && depth < down.first_loop) continue;
     const Walk& up = walks_[walk_of_[base]];
     for (std::int32_t n = down.level[depth]; n < down.level[depth + 1]; ++n) {
+      if (leads_there && depth > 0 && down.nodes[n].by_motion) continue;
       const std::int32_t met = node_of_[down.nodes[n].frame];
       if (met < 0 || up.nodes[met].depth + depth >= min_edges) continue;
       min_edges = up.nodes[met].depth + depth;

@@ -66,7 +66,8 @@ class LocalGraph {
     std::int32_t frame = -1;
     std::int32_t parent = -1;
     std::int32_t edge = -1;
-    bool forward = false;  // from the parent, the edge is walked a -> b
+    bool forward = false;   // from the parent, the edge is walked a -> b
+    bool by_motion = true;  // reached by motion alone, along the root's session
     std::int32_t depth = 0;
   };
   // The whole walk up from a frame. Valid until the next call.
@@ -103,6 +104,8 @@ class LocalGraph {
     std::vector<WalkNode> nodes;
     std::array<std::int32_t, kWalkDepth + 2> level{};  // nodes of depth d: from level[d] to level[d + 1]
     std::int32_t grown = -1;                           // levels known: 0 .. grown
+    std::int32_t first_loop = kNoLoop;                 // the first known level with a node that is not by_motion
+    static constexpr std::int32_t kNoLoop = kWalkDepth + 1;
   };
   // Where a path turns: nodes of the walks of its base and its observer; -1: out of reach.
   struct Turn {
