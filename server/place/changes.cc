@@ -7,7 +7,7 @@
 
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
-#include "server/place/pixels_by_row.h"
+#include "server/place/pixel_grid.h"
 
 namespace relmap::place {
 namespace {
@@ -67,7 +67,7 @@ float differing_share(const storage::Graph& graph, const QueryPicture& query, co
   for (const AppearanceFeature& feature : query.features) ++cell_of(feature.u, feature.v).features;
   std::vector<Vector2> pixels;
   for (const AppearanceFeature& feature : query.features) pixels.emplace_back(feature.u, feature.v);
-  const PixelsByRow by_row(pixels);
+  const PixelGrid grid(pixels);
 
   const MapPoints map = gather_points(graph, place.match, kViewReach);
   const SE3 T_query_match = place.T_match_query.inverse();
@@ -81,9 +81,11 @@ float differing_share(const storage::Graph& graph, const QueryPicture& query, co
     Cell& cell = cell_of(at.x(), at.y());
     const auto there = [&](const Vector2& other) { return (other - at).norm() < kOnePointPixels; };
     if (std::none_of(cell.expected.begin(), cell.expected.end(), there)) cell.expected.push_back(at);
-    by_row.visit_near(at, radius, [&](std::uint32_t f) {
+    grid.visit_near(at, radius, [&](std::uint32_t f) {
+      Cell& of_feature = cell_of(pixels[f].x(), pixels[f].y());
+      if (cell.found && of_feature.found) return;
       if (squared_distance(query.features[f].descriptor, *point.descriptor) <= kMaxDescriptorDistance)
-        cell.found = cell_of(pixels[f].x(), pixels[f].y()).found = true;
+        cell.found = of_feature.found = true;
     });
   }
   int both = 0, differ = 0;

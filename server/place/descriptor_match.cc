@@ -6,7 +6,7 @@
 
 #include "proto/geometry/covariance.h"
 #include "server/place/descriptor_sketch.h"
-#include "server/place/pixels_by_row.h"
+#include "server/place/pixel_grid.h"
 
 namespace relmap::place {
 namespace {
@@ -78,12 +78,12 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
                                                const ExpectedPoints* expected) {
   // Where few points are possible, their distances cost less than sketches do.
   if (expected) {
-    const PixelsByRow by_row(expected->at);
+    const PixelGrid grid(expected->at);
     std::vector<std::uint32_t> near;
     return match(features, points, same, [&](std::uint32_t, std::uint32_t f) {
       near.clear();
       const Vector2 seen(features[f].u, features[f].v);
-      by_row.visit_near(seen, expected->radius, [&](std::uint32_t p) { near.push_back(p); });
+      grid.visit_near(seen, expected->radius, [&](std::uint32_t p) { near.push_back(p); });
       std::sort(near.begin(), near.end());
       return std::span<const std::uint32_t>(near);
     });

@@ -12,7 +12,7 @@
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
-#include "server/place/pixels_by_row.h"
+#include "server/place/pixel_grid.h"
 #include "server/place/verify.h"
 #include "storage/graph/binding.h"
 
@@ -48,7 +48,7 @@ class Bindable {
     for (const std::unique_ptr<const Level>& level : levels_) {
       const double variance = level->sigma * level->sigma;  // at least 1: the gate is never under 3 px
       const double radius = std::sqrt(kChi2With3At99 * (expected(0, 0) + expected(1, 1) + variance));
-      level->by_row.visit_near(target.expected.pixel.head<2>(), radius, [&](std::uint32_t at) {
+      level->grid.visit_near(target.expected.pixel.head<2>(), radius, [&](std::uint32_t at) {
         if (inside_gate(measured_[level->features[at]], variance, target)) found.push_back(level->features[at]);
       });
     }
@@ -70,7 +70,7 @@ class Bindable {
     const double sigma;
     const std::vector<std::uint32_t> features;
     const std::vector<Vector2> pixels;
-    const PixelsByRow by_row{pixels};
+    const PixelGrid grid{pixels};
   };
 
   static bool inside_gate(const StereoPixel& z, double variance, const Target& target) {
