@@ -196,6 +196,21 @@ struct Fit {
   std::vector<vision::Correspondence> matched, alike;
 };
 
+// Matches features again near where `T_match_query` predicts them. With the right pose that gains inliers; with a
+// chance pose it does not.
+Result<Fit> fit_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query,
+                     vision::MotionOptions options) {
+  options.enough = 1;  // a large share of inliers is no evidence here, since the pose selected the matches
+  Fit found;
+  found.matches = match_near(query, map, T_match_query);
+  found.matched = correspond(query, map, found.matches);
+  auto motion = vision::estimate_motion(found.matched, query.camera, options, &T_match_query);
+  if (!motion.ok()) return motion.status();
+  found.pose.motion = *std::move(motion);
+  found.pose.lens = {query.camera.f, query.camera.cx, query.camera.cy};
+  return found;
+}
+
 // Estimates the pose from `alike`, matches by descriptors alone. With fewer than `sure_inliers`, kGrown must be found
 // when features are matched again near where the pose predicts them.
 Result<Fit> fit(const QueryPicture& query, const MapPoints& map, std::vector<DescriptorMatch> alike,
@@ -209,21 +224,15 @@ Result<Fit> fit(const QueryPicture& query, const MapPoints& map, std::vector<Des
   if (!pose.ok()) return pose.status();
   Fit found{*std::move(pose), std::move(alike), correspondences, correspondences};
   if (query.camera.f == 0) return found;
-  // With the right pose, matching again near the predicted positions gains inliers; with a chance pose it does not.
-  vision::Motion& motion = found.pose.motion;
-  const bool few = motion.inliers.size() < sure_inliers;
-  auto near = match_near(query, map, motion.T_reference_camera);
-  auto closer = correspond(query, map, near);
-  options.enough = 1;  // a large share of inliers is no evidence here, since the pose selected the matches
-  auto again = vision::estimate_motion(closer, query.camera, options, &motion.T_reference_camera);
-  if (again.ok() && again->inliers.size() > motion.inliers.size()) {
-    motion = std::move(*again);
-    found.matches = std::move(near);
-    found.matched = std::move(closer);
+  const std::size_t inliers = found.pose.motion.inliers.size();
+  if (auto again = fit_near(query, map, found.pose.motion.T_reference_camera, options);
+      again.ok() && again->pose.motion.inliers.size() > inliers) {
+    again->alike = std::move(found.alike);
+    found = *std::move(again);
   }
-  if (few && motion.inliers.size() < kGrown)
+  if (inliers < sure_inliers && found.pose.motion.inliers.size() < kGrown)
     return Status(Reason::TOO_FEW_INLIERS,
-                  std::to_string(motion.inliers.size()) +
+                  std::to_string(found.pose.motion.inliers.size()) +
                       " matches near the positions that a few inliers predict agree; at least " +
                       std::to_string(kGrown) + " must");
   return found;
@@ -256,31 +265,29 @@ Result<Fit> fit_around(const storage::Graph& graph, const QueryPicture& query, F
 struct StereoPlace {
   VerifiedPlace place;
   FrameId main_frame;             // the frame from which most of the inliers come
+  SE3 T_main_query;               // as that frame's transform to place.match predicts it
   Matrix6 way = Matrix6::Zero();  // the part of place.covariance that comes from the transforms between the frames
   // Matches by descriptors alone; the matches among which the pose was found; and the inliers.
   std::vector<vision::Correspondence> alike, matched, agree;
 };
 
-Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
-                                  std::uint64_t seed) {
-  MapPoints map;
-  auto found = fit_around(graph, query, candidate, seed, map);
-  if (!found.ok()) return found.status();
-  const vision::Motion& motion = found->pose.motion;
+// What a pose that was found among the points around the candidate tells. POOR_SPREAD.
+Result<StereoPlace> judge(const QueryPicture& query, FrameId candidate, const MapPoints& map, Fit found) {
+  const vision::Motion& motion = found.pose.motion;
 
   VerifiedPlace place;
   place.match = candidate;
-  place.focal_length = found->pose.lens.f;
+  place.focal_length = found.pose.lens.f;
   place.T_match_query = motion.T_reference_camera;
   place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;
   std::vector<vision::Correspondence> agree;
   std::size_t with_disparity = 0;
   for (const std::uint32_t i : motion.inliers) {
-    inliers.push_back(found->matches[i]);
-    agree.push_back(found->matched[i]);
-    place.features.push_back(found->matches[i].feature);
-    with_disparity += !is_mono(found->matched[i].pixel);
+    inliers.push_back(found.matches[i]);
+    agree.push_back(found.matched[i]);
+    place.features.push_back(found.matches[i].feature);
+    with_disparity += !is_mono(found.matched[i].pixel);
   }
   std::sort(place.features.begin(), place.features.end());
   place.spread = picture_spread(query.features, place.features, query.camera);
@@ -294,8 +301,32 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
   const auto main = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
-  return StereoPlace{std::move(place),        map.frames[main].frame,    way,
-                     std::move(found->alike), std::move(found->matched), std::move(agree)};
+  const SE3 T_main_query = map.frames[main].T_centre_frame.inverse() * place.T_match_query;
+  return StereoPlace{std::move(place),       map.frames[main].frame,   T_main_query,    way,
+                     std::move(found.alike), std::move(found.matched), std::move(agree)};
+}
+
+Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
+                                  std::uint64_t seed) {
+  MapPoints map;
+  auto found = fit_around(graph, query, candidate, seed, map);
+  if (!found.ok()) return found.status();
+  return judge(query, candidate, map, *std::move(found));
+}
+
+// The same in the frame that saw most of the inliers. Where it stands is known already, so features are matched only
+// near where that predicts them.
+Result<StereoPlace> verify_in_main_frame(const storage::Graph& graph, const QueryPicture& query,
+                                         const StereoPlace& found, std::uint64_t seed) {
+  if (query.camera.f == 0) return verify_stereo(graph, query, found.main_frame, seed);  // it was not matched again
+  const MapPoints map = gather_points(graph, found.main_frame, kViewReach);
+  vision::MotionOptions options;
+  options.seed = seed;
+  options.max_trials = kQuickTrials;
+  options.min_inliers = kMinInliers;  // that it is the place is known
+  auto again = fit_near(query, map, found.T_main_query, options);
+  if (!again.ok()) return again.status();
+  return judge(query, found.main_frame, map, *std::move(again));
 }
 
 // NOT_STEREO if the right picture does not show what it should of the points in the left one. In good pairs it showed
@@ -398,12 +429,12 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
 
   auto found = verify_stereo(graph, query, candidate, seed);
   if (!found.ok()) return {candidate, {}, found.status()};
+  if (Status status = check_place(*found, query, session->header.camera); !status.ok())
+    return {found->place.match, std::move(found->place.features), std::move(status)};
   // The pose is expressed in the frame that saw most of the inliers, since the transform between the two frames may be
   // uncertain or wrong.
   if (found->main_frame != candidate && may_answer(graph, query, found->main_frame))
-    if (auto nearer = verify_stereo(graph, query, found->main_frame, seed); nearer.ok()) found = std::move(nearer);
-  if (Status status = check_place(*found, query, session->header.camera); !status.ok())
-    return {found->place.match, std::move(found->place.features), std::move(status)};
+    if (auto nearer = verify_in_main_frame(graph, query, *found, seed); nearer.ok()) found = std::move(nearer);
   const bool is_other = query.known == CameraKnown::kSupposed ||
                         (query.known == CameraKnown::kNamed && !is_same_lens(query.camera, session->header.camera));
   if (is_other && query.camera.f > 0)
