@@ -65,16 +65,18 @@ Sightings sightings(const storage::Graph& graph, const std::set<FrameId>& frames
   std::ranges::sort(all, {}, ends);
   storage::LocalGraph local(graph);
   std::vector<storage::LocalStep> steps;
-  std::map<std::int32_t, int> uses;  // by local edge
+  std::vector<int> uses;  // by local edge
   for (auto begin = all.begin(); begin != all.end();) {
     const auto end = std::ranges::upper_bound(begin, all.end(), ends(*begin), {}, ends);
     const bool reached = local.path(local.frame(begin->landmark.base), local.frame(begin->frame), &steps);
+    uses.resize(local.edges.size());
     for (const storage::LocalStep& step : steps) uses[step.edge] += sign * static_cast<int>(end - begin);
     auto& list = reached ? found.reached : found.unreached;
     list.insert(list.end(), begin, end);
     begin = end;
   }
-  for (const auto& [edge, count] : uses) delta.add(local.edges[static_cast<std::size_t>(edge)].id, count);
+  for (std::size_t edge = 0; edge < uses.size(); ++edge)
+    if (uses[edge] != 0) delta.add(local.edges[edge].id, uses[edge]);
   std::sort(found.reached.begin(), found.reached.end());
   std::sort(found.unreached.begin(), found.unreached.end());
   return found;
