@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <set>
+#include <span>
 
 #include "client/map_colours.h"
 #include "client/text_wrap.h"
@@ -45,6 +48,16 @@ std::string length_name(double metres) {
   else
     std::snprintf(text, sizeof text, "%g m", metres);
   return text;
+}
+
+// Without the points that lie so near to the one before that nobody sees the difference. A drive of 100 km has
+// hundreds of thousands of points, several on each point of the page.
+std::vector<Vector2> thinned(std::span<const Vector2> points) {
+  constexpr double kSeen = 0.3;
+  std::vector<Vector2> kept;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    if (kept.empty() || k + 1 == points.size() || (points[k] - kept.back()).norm() >= kSeen) kept.push_back(points[k]);
+  return kept;
 }
 
 }  // namespace
@@ -241,12 +254,11 @@ class MapPanel::Pen {
     }
     constexpr std::size_t kShades = 48;  // number of pieces of different shade, which show time
     const std::size_t piece = std::max<std::size_t>(1, of / kShades);
-    out_.polyline(points, {kWhiteColour, 4.8, 0.85, 0});
+    out_.polyline(thinned(points), {kWhiteColour, 4.8, 0.85, 0});
     for (std::size_t k = 0; k + 1 < run.size(); k += piece) {
       const std::size_t end = std::min(k + piece, run.size() - 1);
-      out_.polyline(
-          {points.begin() + static_cast<std::ptrdiff_t>(k), points.begin() + static_cast<std::ptrdiff_t>(end) + 1},
-          motion_stroke(MapPicture::EdgeKind::kMotion, contents_.shade(run[k])));
+      out_.polyline(thinned(std::span(points).subspan(k, end - k + 1)),
+                    motion_stroke(MapPicture::EdgeKind::kMotion, contents_.shade(run[k])));
     }
     double travelled = 60;
     for (std::size_t k = 1; k < run.size(); ++k) {
@@ -263,8 +275,12 @@ class MapPanel::Pen {
     for (ClosureStyle style : closure_styles()) {
       // Hundreds of closures of full width would hide the route.
       if (picture_.route) style.stroke.width *= 0.4;
-      for (const MapPicture::Edge& edge : picture_.edges)
-        if (edge.kind == style.kind && find(edge.a, a) && find(edge.b, b)) draw_closure(out_, style, a, b);
+      std::set<std::array<std::int64_t, 4>> drawn;  // the points of the page that closures of this style join already
+      for (const MapPicture::Edge& edge : picture_.edges) {
+        if (edge.kind != style.kind || !find(edge.a, a) || !find(edge.b, b)) continue;
+        if (drawn.insert({std::llround(a.x()), std::llround(a.y()), std::llround(b.x()), std::llround(b.y())}).second)
+          draw_closure(out_, style, a, b);
+      }
     }
   }
 

@@ -302,6 +302,19 @@ TEST_F(MapPictureFile, TheSmallestOfVeryManyPartsAreOnlyCounted) {
   expect_nothing_cut_off(svg);
 }
 
+TEST_F(MapPictureFile, OfAVastMapOnlyWhatCanBeToldApartIsWritten) {
+  constexpr int kFrames = 40'000;
+  MapPicture picture = circle(kFrames);
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    picture.edges.push_back({{1, a % kFrames}, {1, b % kFrames}, MapPicture::EdgeKind::kLoopAccepted});
+  };
+  for (std::uint32_t k = 0; k < kFrames; ++k) join(k, k + 1000);
+  ASSERT_TRUE(write_map_picture(picture, path("vast.svg")).ok());
+  const std::string svg = contents(path("vast.svg"));
+  EXPECT_LT(svg.size(), 2'000'000u) << "all of it takes 13 MB";
+  EXPECT_GT(count(svg, "<polyline"), 500) << "closures all around the circle";
+}
+
 TEST_F(MapPictureFile, ASingleFrameIsFine) {
   ASSERT_TRUE(write_map_picture(circle(1), path("one.svg")).ok());
   expect_nothing_cut_off(contents(path("one.svg")));

@@ -22,20 +22,31 @@ struct Link {
   bool robust = false;
 };
 
-Result<Link> make_link(const RelaxationEdge& edge, const std::unordered_map<FrameId, int>& number) {
+Status check_edge(const RelaxationEdge& edge, const std::unordered_map<FrameId, int>& number) {
   const auto name = [&] { return "edge " + edge.a.to_string() + " -> " + edge.b.to_string(); };
-  const auto a = number.find(edge.a), b = number.find(edge.b);
-  if (a == number.end() || b == number.end()) return {Reason::INVALID_ARGUMENT, name() + " leads out of the frames"};
-  if (a == b) return {Reason::INVALID_ARGUMENT, name() + " joins a frame to itself"};
+  if (!number.contains(edge.a) || !number.contains(edge.b))
+    return {Reason::INVALID_ARGUMENT, name() + " leads out of the frames"};
+  if (edge.a == edge.b) return {Reason::INVALID_ARGUMENT, name() + " joins a frame to itself"};
   if (!edge.T_ab.R.allFinite() || !edge.T_ab.t.allFinite() || !edge.covariance.allFinite())
     return {Reason::NOT_FINITE, name()};
   if ((edge.T_ab.R * edge.T_ab.R.transpose() - Matrix3::Identity()).norm() > 1e-6)
     return {Reason::BAD_ROTATION, name()};
-  const Eigen::LLT<Matrix6> cholesky(edge.covariance);
-  if (cholesky.info() != Eigen::Success || !edge.covariance.isApprox(edge.covariance.transpose(), 1e-6))
+  if (Eigen::LLT<Matrix6>(edge.covariance).info() != Eigen::Success ||
+      !edge.covariance.isApprox(edge.covariance.transpose(), 1e-6))
     return {Reason::BAD_COVARIANCE, name()};
-  return Link{a->second, b->second, edge.T_ab.inverse(), cholesky.solve(Matrix6::Identity()),
-              edge.kind == RelaxationEdgeKind::kLoop};
+  return {};
+}
+
+// Numbers the frames from 0, in their order, and checks them and the edges.
+Result<std::unordered_map<FrameId, int>> number_frames(const std::vector<FrameId>& frames,
+                                                       const std::vector<RelaxationEdge>& edges) {
+  std::unordered_map<FrameId, int> number;
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    if (!number.emplace(frames[k], static_cast<int>(k)).second)
+      return {Reason::INVALID_ARGUMENT, "frame " + frames[k].to_string() + " is given twice"};
+  for (const RelaxationEdge& edge : edges)
+    if (Status sound = check_edge(edge, number); !sound.ok()) return sound;
+  return number;
 }
 
 struct Robust {
@@ -200,19 +211,20 @@ std::vector<int> find_components(int frames, const std::vector<Link>& links, int
 
 }  // namespace
 
+Status check_graph(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges) {
+  return number_frames(frames, edges).status();
+}
+
 Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges,
                          const RelaxationOptions& options) {
-  std::unordered_map<FrameId, int> number;
-  for (std::size_t k = 0; k < frames.size(); ++k)
-    if (!number.emplace(frames[k], static_cast<int>(k)).second)
-      return {Reason::INVALID_ARGUMENT, "frame " + frames[k].to_string() + " is given twice"};
+  const auto number = number_frames(frames, edges);
+  if (!number.ok()) return number.status();
   std::vector<Link> links;
   links.reserve(edges.size());
-  for (const RelaxationEdge& edge : edges) {
-    Result<Link> link = make_link(edge, number);
-    if (!link.ok()) return link.status();
-    links.push_back(*link);
-  }
+  for (const RelaxationEdge& edge : edges)
+    links.push_back({number->at(edge.a), number->at(edge.b), edge.T_ab.inverse(),
+                     Eigen::LLT<Matrix6>(edge.covariance).solve(Matrix6::Identity()),
+                     edge.kind == RelaxationEdgeKind::kLoop});
 
   Relaxation out;
   const std::vector<int> component = find_components(static_cast<int>(frames.size()), links, out.components);

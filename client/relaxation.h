@@ -49,9 +49,12 @@ struct Relaxation {
   bool converged = true;    // false: max_iterations were not enough
 };
 
+// What is wrong with a graph. INVALID_ARGUMENT: a frame is given twice, or an edge leads to a frame that is not given
+// or to itself. NOT_FINITE, BAD_ROTATION, BAD_COVARIANCE: for an edge.
+Status check_graph(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges);
+
 // Relaxes each connected component by Levenberg-Marquardt on SE(3) from a breadth-first start.
-// INVALID_ARGUMENT: a frame is given twice, or an edge leads to a frame that is not given or to itself. NOT_FINITE,
-// BAD_ROTATION, BAD_COVARIANCE: for an edge. NUMERICAL: the damped system is singular.
+// The reasons of check_graph(); NUMERICAL: the damped system is singular.
 Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges,
                          const RelaxationOptions& options = {});
 

@@ -16,6 +16,7 @@
 namespace relmap::testing {
 namespace {
 
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -172,18 +173,33 @@ TEST_F(Exports, AChainIsNotTheRobotsOwnOdometry) {
   EXPECT_THAT(said, Not(HasSubstr("\nodometry")));
 }
 
-TEST_F(Exports, MoreThanCanBeRelaxedIsRefusedByNameWithWaysOut) {
+TEST_F(Exports, OfALargeMapSomeFramesAreRelaxedAndTheOthersFollow) {
   std::filesystem::create_directory(folder_ / "out");
-  std::ofstream(folder_ / "out/map.tum") << "old";
-  const Finished refused = relmap({"export", "--max-frames", "100", "--out", folder_ / "out/map.tum"});
-  EXPECT_EQ(refused.exit_code, 1);
-  EXPECT_THAT(refused.standard_error,
-              StartsWith("BUDGET_EXCEEDED: 160 frames are too many to be relaxed (100 at most)"));
-  EXPECT_THAT(refused.standard_error, HasSubstr("--session NAME"));
-  EXPECT_THAT(refused.standard_error, HasSubstr("--chain"));
-  EXPECT_EQ(out("map.tum"), "old");
-  EXPECT_EQ(relmap({"export", "--max-frames", "100", "--session", "2"}).exit_code, 0);
-  EXPECT_EQ(relmap({"export", "--max-frames", "100", "--chain"}).exit_code, 0);
+  const Finished whole = relmap({"export", "--out", folder_ / "out/whole.tum"});
+  EXPECT_THAT(whole.standard_error, Not(HasSubstr("frames were relaxed")));
+  const Finished contracted = relmap({"export", "--max-frames", "40", "--out", folder_ / "out/map.tum"});
+  EXPECT_EQ(contracted.exit_code, 0) << contracted.standard_error;
+  EXPECT_THAT(contracted.standard_error, ContainsRegex("4[0-9] of 160 frames were relaxed; the others follow"));
+  EXPECT_THAT(relmap({"--json", "export", "--max-frames", "40", "--out", folder_ / "out/map.tum"}).standard_output,
+              ContainsRegex("\"relaxedFrames\":4[0-9]"));
+  // The poses are about those of the whole map.
+  std::istringstream exact(out("whole.tum")), about(out("map.tum"));
+  const auto next = [](std::istream& in, std::string& time, Vector3& t) {
+    std::string line;
+    while (std::getline(in, line))
+      if (!line.starts_with('#')) return static_cast<bool>(std::istringstream(line) >> time >> t.x() >> t.y() >> t.z());
+    return false;
+  };
+  std::string time, same_time;
+  Vector3 t, near;
+  std::size_t frames = 0;
+  for (; next(exact, time, t); ++frames) {
+    ASSERT_TRUE(next(about, same_time, near));
+    EXPECT_EQ(same_time, time);
+    EXPECT_LT((near - t).norm(), 0.1) << "frame " << frames;
+  }
+  EXPECT_GT(frames, 100u);
+  EXPECT_FALSE(next(about, same_time, near));
 }
 
 TEST_F(Exports, PlyHasTheLandmarks) {

@@ -48,5 +48,23 @@ TEST(Vast, AnInterruptedRunGoesOnAndAnotherOneCannotUseItsFolder) {
   EXPECT_NE(other.standard_error.find("holds another run"), std::string::npos) << other.standard_error;
 }
 
+// The run of docs/vast.md. It takes 20 minutes on two idle cores.
+TEST(LongVast, AHundredThousandKeyframesAreOneMap) {
+  const BenchFigures figures({"vast", "--keyframes", "100000", "--robots", "12", "--kills", "4"},
+                             std::chrono::hours(3));
+  EXPECT_EQ(figures["kills"], 4);
+  EXPECT_EQ(figures["lost"], 0);
+  EXPECT_EQ(figures["doubled"], 0);
+  EXPECT_EQ(figures["disconnected"], 0);
+  EXPECT_GT(figures["revisits"], 30'000);
+  EXPECT_GE(figures["revisits_bound_share"], 0.9);
+  EXPECT_LE(figures["closures_wrong"], 0.002 * figures["closures_right"]);
+  EXPECT_LE(figures["places_wrong"], 0.01 * figures["places_found"]);
+  EXPECT_EQ(figures["carried_wrongly"], 0);
+  EXPECT_GE(figures["rides_closed"], 0.8 * figures["rides_returned"]);
+  EXPECT_LT(figures["map_error_p50_m"], 0.05);
+  EXPECT_LE(figures["update_p99_last_us"], 1.5 * figures["update_p99_first_us"]) << "constant time";
+}
+
 }  // namespace
 }  // namespace relmap::testing

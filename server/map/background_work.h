@@ -3,6 +3,7 @@
 // applied.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -18,14 +19,15 @@ namespace relmap::map {
 
 class BackgroundWork {
  public:
+  static constexpr std::chrono::seconds kLeastOften{5};
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   struct Hooks {
     // Queues a record for the journal, as JournalWriter::submit() does.
     std::function<Status(storage::JournalRecord, Done)> submit;
     // Whether no record waits for the worker. Records from outside go first.
     std::function<bool()> is_quiet;
-    // Whether no more frames wait for their lookup than are being looked up. While lookups fall behind, the processor's
-    // time is theirs: relaxation of what is pending can wait, and robots wait for lookups.
+    // Whether each frame that is to be looked up is being looked up. While some wait, the processor's time is theirs,
+    // since robots wait for them: pending frames are then relaxed only once in kLeastOften.
     std::function<bool()> lookups_keep_up;
     // The session as the worker sees it.
     std::function<std::optional<storage::Session>(SessionNumber)> session;
@@ -72,6 +74,7 @@ class BackgroundWork {
   const Hooks hooks_;
 
   mutable Mutex mutex_;
+  std::chrono::steady_clock::time_point relaxed_at_ RELMAP_GUARDED_BY(mutex_);  // when the last record was submitted
   bool relaxation_pending_ RELMAP_GUARDED_BY(mutex_) = false;
   // A record of that kind is submitted, and neither applied nor refused yet.
   bool relaxation_on_its_way_ RELMAP_GUARDED_BY(mutex_) = false, removal_on_its_way_ RELMAP_GUARDED_BY(mutex_) = false;

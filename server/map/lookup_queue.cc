@@ -107,6 +107,11 @@ std::size_t LookupQueue::waiting() const {
   return open_.size() - failed_.size();
 }
 
+std::size_t LookupQueue::queued() const {
+  const MutexLock lock(mutex_);
+  return queue_.size();
+}
+
 bool LookupQueue::is_waiting(SessionNumber session) const {
   const MutexLock lock(mutex_);
   for (auto frame = open_.lower_bound({session, 0}); frame != open_.end() && frame->session == session; ++frame)
@@ -156,8 +161,10 @@ void LookupQueue::run() {
     const Pushed pushed = queue_.front();
     queue_.pop_front();
     lock.unlock();
-    end(pushed, look_up_and_journal(pushed));
+    const End how = look_up_and_journal(pushed);
+    end(pushed, how);
     lock.lock();
+    if (how == End::kAgain) changed_.wait_for(mutex_, kRetry, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; });
   }
 }
 
@@ -165,14 +172,15 @@ void LookupQueue::end(const Pushed& pushed, End how) {
   if (how == End::kJournalled) return;
   {
     const MutexLock lock(mutex_);
-    if (how != End::kAgain) forget_pushed(pushed.ticket);
+    if (how == End::kAgain || how == End::kRefused) {
+      if (how == End::kRefused) not_before_ = std::chrono::steady_clock::now() + kRetry;
+      queue_.push_back(pushed);
+      changed_.notify_all();
+    } else {
+      forget_pushed(pushed.ticket);
+    }
     if (how == End::kDone) close_locked(pushed.frame);
     if (how == End::kFailed) failed_.insert(pushed.frame);
-    if (how == End::kAgain) {
-      queue_.push_back(pushed);
-      not_before_ = std::chrono::steady_clock::now() + kRetry;
-      changed_.notify_all();
-    }
   }
   on_change_();
 }
@@ -202,7 +210,7 @@ LookupQueue::End LookupQueue::journal(const Pushed& pushed, const std::vector<st
   const auto outcome = std::make_shared<Outcome>(found.size());
   const Durable done = [this, pushed, outcome](bool durable) {
     if (!durable) outcome->durable = false;
-    if (--outcome->left == 0) end(pushed, outcome->durable ? End::kDone : End::kAgain);
+    if (--outcome->left == 0) end(pushed, outcome->durable ? End::kDone : End::kRefused);
   };
   for (const storage::JournalRecord& record : found)
     if (!journal_(record, done)) return End::kStopped;  // its share of `left` stays, so the frame stays open

@@ -49,8 +49,8 @@ class LookupQueue {
   LookupQueue& operator=(const LookupQueue&) = delete;
 
   // Starts the threads, or as many as can be started; throws std::system_error if none can. They take the frames in the
-  // order in which these were pushed. `on_change` is called by them, without a lock held, whenever waiting() has
-  // changed.
+  // order in which these were pushed. `on_change` is called, without a lock held, whenever waiting() has changed: by
+  // these threads, and by those that call `done`, also after stop(). So the journal must end before the queue does.
   void start(std::size_t threads, LookUp look_up, Journal journal, std::function<void()> on_change);
   // Ends each thread after its present lookup. Open frames stay open; those whose records the journal has taken close
   // when these are durable.
@@ -70,6 +70,7 @@ class LookupQueue {
   bool is_open(FrameId frame) const;
   // Open frames whose lookup has not failed since the start.
   std::size_t waiting() const;
+  std::size_t queued() const;  // those whose lookup has not begun
   bool is_waiting(SessionNumber session) const;
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
@@ -78,7 +79,8 @@ class LookupQueue {
   bool is_full(std::size_t queued) const;
 
  private:
-  enum class End : std::uint8_t { kDone, kJournalled, kAgain, kFailed, kStopped };
+  // kAgain: the view was cut off. kRefused: the disk did not take what was found.
+  enum class End : std::uint8_t { kDone, kJournalled, kAgain, kRefused, kFailed, kStopped };
 
   // A pushed frame. Tickets count up from push to push.
   struct Pushed {
@@ -108,7 +110,7 @@ class LookupQueue {
   std::map<SessionNumber, std::deque<Pushed>> pushed_ RELMAP_GUARDED_BY(mutex_);
   std::set<FrameId> open_ RELMAP_GUARDED_BY(mutex_);  // those queued, those being looked up, and those that failed
   std::set<FrameId> failed_ RELMAP_GUARDED_BY(mutex_);
-  // No lookup begins before: what one found could not be written, or its view was cut off.
+  // No lookup begins before, since what one found could not be written.
   std::chrono::steady_clock::time_point not_before_ RELMAP_GUARDED_BY(mutex_);
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
   LookUp look_up_;

@@ -214,6 +214,20 @@ TEST_F(LookupQueueTest, AFrameIsLookedUpAgainIfTheDiskRefusedWhatWasFound) {
   EXPECT_TRUE(queue_.open_frames().empty());
 }
 
+TEST_F(LookupQueueTest, WhatIsBeingWrittenWhenTheQueueStopsMayStillBecomeDurable) {
+  holds_back_ = true;
+  queue_.push({1, 0});
+  queue_.push({2, 0});
+  start();
+  while (lookups_of({2, 0}) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  queue_.stop();
+  ASSERT_EQ(held_back_.size(), 2u);
+  held_back_[0](true);
+  held_back_[1](false);
+  EXPECT_FALSE(queue_.is_open({1, 0}));
+  EXPECT_TRUE(queue_.is_open({2, 0})) << "it is looked up after the next start";
+}
+
 TEST_F(LookupQueueTest, AFrameStaysOpenIfItsRecordsAreNotDurableWhenTheQueueStops) {
   journal_takes_ = false;
   queue_.push({1, 0});

@@ -36,7 +36,7 @@ using Clock = std::chrono::steady_clock;
 // Pauses before a record is submitted again.
 constexpr std::chrono::milliseconds kQueueFull{5};
 constexpr std::chrono::milliseconds kDiskFails{200};
-constexpr std::chrono::milliseconds kLookAgain{50};  // whether lookups leave time for background work
+constexpr std::chrono::milliseconds kLookAgain{100};  // before the worker asks again whether lookups keep up
 
 storage::WordFunction words_of(const std::shared_ptr<const place::Vocabulary>& vocabulary) {
   if (!vocabulary) return {};
@@ -166,7 +166,7 @@ BackgroundWork::Hooks Mapper::Impl::background_hooks() {
             const MutexLock lock(mutex);
             return durable.empty() && !stopping && !failed;
           },
-      .lookups_keep_up = [this] { return lookups.waiting() <= lookup_threads(); },
+      .lookups_keep_up = [this] { return lookups.queued() == 0; },
       .session = [this](SessionNumber session) { return map->session(session); },
       .has_waiting_lookups = [this](SessionNumber session) { return lookups.is_waiting(session); },
       .may_remove =
@@ -301,7 +301,7 @@ void Mapper::Impl::catch_up() {
 // When the worker looks for something to do even if no record comes.
 Clock::time_point Mapper::Impl::next_due() const {
   const Clock::time_point commit = commits.next_due();
-  return background.relaxation_waits() ? std::min(commit, Clock::now() + kLookAgain) : commit;
+  return background.relaxation_waits() && !failed ? std::min(commit, Clock::now() + kLookAgain) : commit;
 }
 
 void Mapper::Impl::work() {

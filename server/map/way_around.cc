@@ -17,9 +17,9 @@ namespace relmap::map {
 
 namespace {
 
-// The search ends there: it takes about 50 ms of a lookup's thread, whatever the size of the map. In a town that was
-// driven eight times these are the ways of some 400 m.
-constexpr std::size_t kMaxFrames = std::size_t{1} << 15;
+// The search ends there: it takes 200 ms of a lookup's thread, and in a town that was driven eight times it comes 800 m
+// far. With a quarter of this, rides by train are not noticed (docs/decisions/closures.md).
+constexpr std::size_t kMaxFrames = std::size_t{1} << 17;
 // A way without a stop is preferred to one that is shorter by so much.
 constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};  // metres
 

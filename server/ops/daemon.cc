@@ -276,6 +276,9 @@ void Daemon::tick() {
   impl_->core->views.expire();
   impl_->core->routes.found.expire();
   give_back_free_memory();
+  storage::Budget& budget = impl_->mapper->budget();
+  budget.set(storage::Share::kAllocator,
+             std::min(allocator_holes_bytes(), budget.allowance(storage::Share::kAllocator)));
   if (now - impl_->reported >= kReportInterval) {
     impl_->reported = now;
     impl_->report();

@@ -1,5 +1,7 @@
 #include "server/ops/process.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <fstream>
 #include <string>
 
@@ -27,6 +29,18 @@ std::size_t status_field(const char* field) {
 
 std::size_t resident_bytes() { return status_field("VmRSS:"); }
 std::size_t peak_resident_bytes() { return status_field("VmHWM:"); }
+
+std::size_t allocator_holes_bytes() {
+  if (!mallctl) return 0;
+  std::uint64_t epoch = 1;  // any value: it makes the statistics those of now
+  if (mallctl("epoch", nullptr, nullptr, &epoch, sizeof epoch) != 0) return 0;
+  const auto read = [](const char* name) {
+    std::size_t bytes = 0, size = sizeof bytes;
+    return mallctl(name, &bytes, &size, nullptr, 0) == 0 ? bytes : 0;
+  };
+  const std::size_t in_use = read("stats.allocated");
+  return std::max(read("stats.active"), in_use) - in_use;
+}
 
 void give_back_free_memory() {
   if (mallctl) (void)mallctl("arena.4096.decay", nullptr, nullptr, nullptr, 0);  // 4096: all arenas

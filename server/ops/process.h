@@ -8,6 +8,9 @@ namespace relmap::ops {
 std::size_t resident_bytes();
 std::size_t peak_resident_bytes();
 
+// What the allocator's pages in use hold beyond what was asked for: holes between what is in use. 0 without jemalloc.
+std::size_t allocator_holes_bytes();
+
 // Returns free memory to the system if the program uses jemalloc, which by itself does so only while it is being used.
 void give_back_free_memory();
 

@@ -9,6 +9,7 @@ namespace relmap::place {
 namespace {
 
 TEST(DescriptorTable, DistancesDifferFromThoseOfPairsByTheSquaredLength) {
+  RecordProperty("kernels", static_cast<int>(DescriptorTable::kernels().size()));  // those of this processor
   std::mt19937 random(1);
   for (const std::size_t size : {0u, 1u, 15u, 16u, 17u, 100u}) {
     std::vector<Descriptor> descriptors(size);

@@ -20,7 +20,7 @@ class PixelGrid {
   explicit PixelGrid(std::span<const Vector2> pixels) : pixels_(pixels), sorted_(pixels.size()) {
     std::vector<std::uint32_t> bucket_of(pixels.size(), kNone);
     for (std::size_t p = 0; p < pixels.size(); ++p) {
-      if (!(pixels[p].cwiseAbs().maxCoeff() < kFar)) continue;
+      if (!(pixels[p].array().abs() < kFar).all()) continue;
       bucket_of[p] = bucket(cell(pixels[p].x()), cell(pixels[p].y()));
       ++first_[bucket_of[p] + 1];
     }
@@ -31,10 +31,10 @@ class PixelGrid {
       if (bucket_of[p] != kNone) sorted_[next[bucket_of[p]]++] = p;
   }
 
-  // Calls visit(number) for each pixel less than `radius` from `at`, in no particular order.
+  // Calls visit(number) for each pixel less than `radius`, below a billion, from `at`, in no particular order.
   template <typename Visit>
   void visit_near(const Vector2& at, double radius, const Visit& visit) const {
-    if (!(at.cwiseAbs().maxCoeff() + radius < kFar)) return;
+    if (!(at.array().abs() + radius < kFar).all()) return;
     const std::int64_t left = cell(at.x() - radius), top = cell(at.y() - radius);
     // Cells that are kAcross apart share a bucket, which is looked through once.
     const std::int64_t right = std::min(cell(at.x() + radius), left + kAcross - 1);

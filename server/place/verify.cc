@@ -314,11 +314,10 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
   return judge(query, candidate, map, *std::move(found));
 }
 
-// The same in the frame that saw most of the inliers. Where it stands is known already, so features are matched only
-// near where that predicts them.
+// The same in the frame that saw most of the inliers. Where the query stands in it is known already, so features are
+// matched only near where that predicts them.
 Result<StereoPlace> verify_in_main_frame(const storage::Graph& graph, const QueryPicture& query,
                                          const StereoPlace& found, std::uint64_t seed) {
-  if (query.camera.f == 0) return verify_stereo(graph, query, found.main_frame, seed);  // it was not matched again
   const MapPoints map = gather_points(graph, found.main_frame, kViewReach);
   vision::MotionOptions options;
   options.seed = seed;
@@ -429,14 +428,22 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
 
   auto found = verify_stereo(graph, query, candidate, seed);
   if (!found.ok()) return {candidate, {}, found.status()};
-  if (Status status = check_place(*found, query, session->header.camera); !status.ok())
-    return {found->place.match, std::move(found->place.features), std::move(status)};
-  // The pose is expressed in the frame that saw most of the inliers, since the transform between the two frames may be
-  // uncertain or wrong.
-  if (found->main_frame != candidate && may_answer(graph, query, found->main_frame))
-    if (auto nearer = verify_in_main_frame(graph, query, *found, seed); nearer.ok()) found = std::move(nearer);
   const bool is_other = query.known == CameraKnown::kSupposed ||
                         (query.known == CameraKnown::kNamed && !is_same_lens(query.camera, session->header.camera));
+  // What tells a lens that is not the one that was named is far from where that lens predicts it, and no lens is known
+  // at first of an unknown camera. So only the place of the map's own cameras is verified near the prediction, and they
+  // are checked by what was matched before.
+  const bool is_own = query.camera.f > 0 && !is_other;
+  Status camera = is_own ? check_place(*found, query, session->header.camera) : Status();
+  // The pose is expressed in the frame that saw most of the inliers, since the transform between the two frames may be
+  // uncertain or wrong.
+  if (camera.ok() && found->main_frame != candidate && may_answer(graph, query, found->main_frame))
+    if (auto nearer = is_own ? verify_in_main_frame(graph, query, *found, seed)
+                             : verify_stereo(graph, query, found->main_frame, seed);
+        nearer.ok())
+      found = std::move(nearer);
+  if (!is_own) camera = check_place(*found, query, session->header.camera);
+  if (!camera.ok()) return {found->place.match, std::move(found->place.features), std::move(camera)};
   if (is_other && query.camera.f > 0)
     if (Status status = allow_for_calibration(query, session->header.camera, &*found); !status.ok())
       return {found->place.match, std::move(found->place.features), std::move(status)};

@@ -468,7 +468,7 @@ TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
       EXPECT_EQ(step.SerializeAsString(), whole[at++].SerializeAsString());
   }
   EXPECT_EQ(at, whole.size());
-  EXPECT_EQ(call(core, find_route, rest_of_it, deadline_).reason(), Reason::VIEW_EXPIRED) << "it was sent to its end";
+  EXPECT_TRUE(call(core, find_route, rest_of_it, deadline_).ok()) << "its end may not have arrived";
 }
 
 TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {

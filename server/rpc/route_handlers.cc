@@ -91,7 +91,7 @@ class RouteStream {
 
   Result<std::optional<v1::FindRouteReply>> take() {
     if (summarised_ && next_ >= route_.steps()) {
-      routes_.found.forget(found_->number);  // and with it the view, which would hold memory for as long as it is kept
+      routes_.found.end(found_->number);  // with its view, which holds memory for as long as the route is kept
       return std::optional<v1::FindRouteReply>();
     }
     v1::FindRouteReply reply;

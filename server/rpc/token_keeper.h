@@ -32,10 +32,11 @@ template <typename T>
 class TokenKeeper {
  public:
   static constexpr std::chrono::seconds kMaxAge{120};  // since a token for it was last made or opened
+  static constexpr std::chrono::seconds kLinger{3};    // after its end
 
   // `name` is what is kept, for messages. At most `max_kept` are kept.
-  TokenKeeper(std::string_view boot_id, std::string name, std::size_t max_kept)
-      : boot_(boot_id.substr(0, 8)), name_(std::move(name)), max_kept_(max_kept) {}
+  TokenKeeper(std::string_view boot_id, std::string name, std::size_t max_kept, std::chrono::seconds linger = kLinger)
+      : boot_(boot_id.substr(0, 8)), name_(std::move(name)), max_kept_(max_kept), linger_(linger) {}
 
   // Keeps an object under this number and returns a token for `position` in it.
   std::string token(std::uint64_t number, std::shared_ptr<const T> kept, std::string_view position) {
@@ -67,10 +68,11 @@ class TokenKeeper {
     return Continuation<T>{std::move(kept), token.substr(second + 1)};
   }
 
-  // Drops an object: nobody will continue there.
-  void forget(std::uint64_t number) {
+  // Tells that all of an object was sent. It is kept a little longer, since what was sent last may not have arrived.
+  void end(std::uint64_t number) {
     const MutexLock lock(mutex_);
-    kept_.remove_if([&](const Kept& k) { return k.number == number; });
+    for (Kept& kept : kept_)
+      if (kept.number == number) kept.used = Clock::now() - kMaxAge + linger_;
   }
   // Drops the least recently used object. False if nothing is kept.
   bool drop_oldest() {
@@ -95,7 +97,7 @@ class TokenKeeper {
   };
   void expire_locked() RELMAP_REQUIRES(mutex_) {
     const Clock::time_point oldest = Clock::now() - kMaxAge;
-    kept_.remove_if([&](const Kept& k) { return k.used < oldest || is_cut_off(*k.kept); });
+    kept_.remove_if([&](const Kept& k) { return k.used <= oldest || is_cut_off(*k.kept); });
   }
   void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) RELMAP_REQUIRES(mutex_) {
     kept_.remove_if([&](const Kept& k) { return k.number == number; });
@@ -105,6 +107,7 @@ class TokenKeeper {
 
   const std::string boot_, name_;
   const std::size_t max_kept_;
+  const std::chrono::seconds linger_;
   Mutex mutex_;
   std::list<Kept> kept_ RELMAP_GUARDED_BY(mutex_);  // most recently used first
 };

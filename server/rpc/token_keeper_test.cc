@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,19 @@
 
 namespace relmap::rpc {
 namespace {
+
+struct Kept {};
+bool is_cut_off(const Kept&) { return false; }
+
+TEST(TokenKeeper, LetsGoOfWhatWasSentToItsEnd) {
+  TokenKeeper<Kept> keeper("boot", "list", 8, std::chrono::seconds(0));
+  const auto first = std::make_shared<const Kept>(), second = std::make_shared<const Kept>();
+  const std::string token = keeper.token(1, first, "a"), other = keeper.token(2, second, "b");
+  keeper.end(1);
+  EXPECT_EQ(keeper.open(token).reason(), Reason::VIEW_EXPIRED);
+  EXPECT_EQ(keeper.open(other).or_throw().position, "b");
+  EXPECT_EQ(first.use_count(), 1);
+}
 
 // Whoever never comes back for the rest of a list must not keep the memory of the map's old versions.
 TEST(TokenKeeper, LetsAViewThatWasCutOffGo) {

@@ -33,6 +33,8 @@ std::string_view share_name(Share share) {
       return "sessions";
     case Share::kRoutes:
       return "routes";
+    case Share::kAllocator:
+      return "allocator";
     case Share::kPictures:
       return "pictures";
   }
@@ -45,9 +47,10 @@ Budget::Budget(std::size_t limit_bytes) : limit_(limit_bytes) {}
 std::size_t Budget::sum(bool with_cache, bool with_routes) const {
   std::size_t sum = 0;
   for (std::size_t i = 0; i < kShares; ++i) {
-    const bool counts = i == index(Share::kCache)    ? with_cache
-                        : i == index(Share::kRoutes) ? with_routes
-                                                     : i != index(Share::kPictures);
+    const bool counts = i == index(Share::kCache)       ? with_cache
+                        : i == index(Share::kRoutes)    ? with_routes
+                        : i == index(Share::kAllocator) ? with_cache || with_routes
+                                                        : i != index(Share::kPictures);
     if (counts) sum += used_[i].load(std::memory_order_relaxed);
   }
   return sum;
@@ -65,6 +68,7 @@ std::size_t Budget::allowance(Share share) const {
       return limit_ / 4;
     case Share::kDirty:
     case Share::kViews:
+    case Share::kAllocator:
       return limit_ / 8;
     case Share::kQueues:
     case Share::kReassembly:
@@ -78,7 +82,7 @@ std::size_t Budget::allowance(Share share) const {
       return limit_ > others ? limit_ - others : 0;
     }
     case Share::kRoutes: {
-      const std::size_t others = sum(false, false);
+      const std::size_t others = sum(false, false) + used(Share::kAllocator);
       return limit_ > others ? (limit_ - others) / 4 * 3 : 0;
     }
   }

@@ -23,11 +23,12 @@ enum class Share : std::uint8_t {
   kQueues,      // keyframes between the journal and the worker
   kReassembly,  // keyframes of which parts are missing
   kReplies,
-  kSessions,  // what is known of each session beside its frames, and which frames wait for relaxation
-  kRoutes,    // cells (server/route/overlay): they can all be read again, or made again, from disk
-  kPictures,  // a fixed reserve beside the limit, not part of it
+  kSessions,   // what is known of each session beside its frames, and which frames wait for relaxation
+  kRoutes,     // cells (server/route/overlay): they can all be read again, or made again, from disk
+  kAllocator,  // what the allocator's pages hold beyond what was asked for: holes that nobody fills
+  kPictures,   // a fixed reserve beside the limit, not part of it
 };
-inline constexpr std::size_t kShares = 11;
+inline constexpr std::size_t kShares = 12;
 std::string_view share_name(Share share);
 
 inline constexpr std::size_t kPictureReserve = std::size_t{120} << 20;
@@ -44,7 +45,8 @@ class Budget {
 
   // The bytes that a share may take at most. Fixed parts of the limit: engine and place index 1/4 each, dirty and views
   // 1/8 each, queues, reassembly, replies and sessions 1/16 each. The cache may take what the others leave, routes 3/4
-  // of what all others but the cache leave, and pictures their reserve.
+  // of what all others but the cache leave, and pictures their reserve. At most 1/8 is counted of the allocator's
+  // holes, for which cache and routes make room; nothing else is refused for their sake.
   std::size_t allowance(Share share) const;
 
   // Returns false and charges nothing if the share would exceed its allowance, or if the limit would be exceeded even
@@ -53,7 +55,7 @@ class Budget {
   // Charges whatever the limit says: for memory that already exists. The caller evicts next.
   void charge(Share share, std::size_t bytes);
   void release(Share share, std::size_t bytes);
-  // Sets the bytes of a share that is measured rather than counted (engine, place index).
+  // Sets the bytes of a share that is measured rather than counted (engine, place index, allocator).
   void set(Share share, std::size_t bytes);
 
   // `evict` is called, from any thread, when the growth of another share has taken the total over the limit: the cache

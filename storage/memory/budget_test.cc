@@ -56,6 +56,18 @@ TEST(Budget, TheCacheTakesWhatIsLeftAndGivesWay) {
   budget.remove_evictor(&budget);
 }
 
+TEST(Budget, CacheAndRoutesMakeRoomForTheAllocatorsHolesAndNothingElseDoes) {
+  Budget budget(1600);
+  budget.set(Share::kAllocator, 200);
+  EXPECT_EQ(budget.used(), 200u);
+  EXPECT_EQ(budget.allowance(Share::kCache), 1400u);
+  EXPECT_EQ(budget.allowance(Share::kRoutes), 1050u) << "three quarters of that";
+  budget.charge(Share::kDirty, 1500);
+  EXPECT_TRUE(budget.try_charge(Share::kQueues, 100));
+  EXPECT_FALSE(budget.try_charge(Share::kReplies, 1)) << "the others fill the limit";
+  EXPECT_EQ(budget.allowance(Share::kCache), 0u);
+}
+
 TEST(Budget, RoutesTakeThreeQuartersOfWhatAllButTheCacheLeave) {
   Budget budget(1600);
   budget.charge(Share::kDirty, 600);

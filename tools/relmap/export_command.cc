@@ -1,5 +1,6 @@
 // relmap export: writes the relaxed graph, or the chain of each session's odometry edges, as files for other programs.
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <ostream>
 
@@ -53,6 +54,10 @@ class Report {
     for (const std::string& note : part.notes) err_ << "  " << note << '\n';
     tell(part.tears, "tear ");
     tell(part.doubtful, "");
+  }
+  void tell_relaxed(const RelaxedMap& map) {
+    whole_.add("relaxedFrames", map.relaxed_frames);
+    if (const std::string text = contraction_text(map); !text.empty()) advise(text);
   }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
     if (json_)
@@ -179,15 +184,12 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
   }
   auto begun = files.begin("");  // so that a file that cannot be written fails early
   if (!begun.ok()) return begun.status();
-  auto graph = read_map_graph(
-      {options.sessions, options.max_frames,
-       "--session NAME exports some of them, --chain each session's odometry edges, chained and unrelaxed"},
-      client, console);
+  auto graph = read_map_graph(options.sessions, client, console);
   if (!graph.ok()) return graph.status();
   if (graph->frames.empty()) return nothing_to_place(*graph, "export", "exported");
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
-  const auto map = relax_map(std::move(graph).value(), *labels, root);
+  const auto map = relax_map(std::move(graph).value(), *labels, root, options.max_frames);
   if (!map.ok()) return map.status();
 
   const std::size_t written = files.takes_one() ? 1 : map->parts.size();
@@ -206,6 +208,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
   }
 
   Report report(options, files, console);
+  report.tell_relaxed(*map);
   for (std::size_t i = 0; i < map->parts.size(); ++i) {
     const MapPart& part = map->parts[i];
     if (i >= written) {
@@ -347,7 +350,9 @@ void add_export(CLI::App& app, Action& action) {
   chain->excludes(root);
   command->add_flag("!--no-landmarks", options->landmarks, "ply: write frames and edges only");
   command
-      ->add_option("--max-frames", options->max_frames, "refuse to relax more frames than this; 200,000 take minutes")
+      ->add_option("--max-frames", options->max_frames,
+                   "relax about so many frames at most; those of a larger map follow from these along the odometry")
+      ->check(CLI::Range(std::size_t{1}, std::numeric_limits<std::size_t>::max()))
       ->capture_default_str();
   auto* latitude = command->add_option("--latitude", options->place.latitude, "geojson: latitude of the root, degrees")
                        ->check(CLI::Range(-85.0, 85.0));

@@ -90,7 +90,7 @@ Status add_query_to(client::MapPicture& picture, const MapOptions& options, clie
 
 Status draw(const MapOptions& options, client::Client& client, terminal::Console& console) {
   const terminal::Console::Aside aside(console);
-  auto graph = read_map_graph({options.sessions, kMaxRelaxedFrames, "--only NAME draws some of them"}, client, console);
+  auto graph = read_map_graph(options.sessions, client, console);
   if (!graph.ok()) return graph.status();
   if (graph->frames.empty()) return nothing_to_place(*graph, "draw", "drawn");
   const auto labels = client.labels();
@@ -106,6 +106,7 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
   console.err() << options.out << ": " << picture.subtitle;
   if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
   console.err() << '\n';
+  if (const std::string text = contraction_text(*map); !text.empty()) console.err() << text << '\n';
   if (const std::size_t mono = map->graph.mono_sessions; mono > 0)
     console.err() << not_placed_text(mono, "drawn") << '\n';
   if (picture.query && !map->graph.frames.contains(picture.query->frame))

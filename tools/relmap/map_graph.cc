@@ -23,9 +23,10 @@ Status nothing_to_place(const MapGraph& graph, const std::string& verb, const st
   return {Reason::EMPTY_MAP, text};
 }
 
-Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, terminal::Console& console) {
+Result<MapGraph> read_map_graph(const std::vector<std::string>& choice, client::Client& client,
+                                terminal::Console& console) {
   std::set<SessionNumber> chosen;
-  for (const std::string& text : choice.sessions) {
+  for (const std::string& text : choice) {
     const auto session = find_session(client, console, text);
     if (!session.ok()) return session.status();
     chosen.insert(*session);
@@ -33,7 +34,6 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
   MapGraph graph;
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
-  std::size_t frames = 0;
   std::set<SessionNumber> missing = chosen;
   for (const client::Session& session : *sessions) {
     if (!chosen.empty() && !chosen.contains(session.number)) continue;
@@ -48,13 +48,9 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
     }
     graph.names[session.number] = session.name;
     graph.cameras[session.number] = session.camera;
-    frames += session.frames;
     if (session.frames > 0) graph.frames.insert({session.number, session.first});
   }
   if (!missing.empty()) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(*missing.begin())};
-  if (frames > choice.max_frames)
-    return {Reason::BUDGET_EXCEEDED, count_text(frames) + " frames are too many to be relaxed (" +
-                                         count_text(choice.max_frames) + " at most); " + choice.advice};
   // Of a large map, only the edges of the chosen sessions are read.
   std::set<SessionNumber> listed;
   std::vector<client::EdgeFilter> questions(chosen.empty() ? 1 : 0);

@@ -23,13 +23,8 @@ struct MapGraph {
 
 inline bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }
 
-struct GraphChoice {
-  std::vector<std::string> sessions;  // numbers or names; empty: all except mono sessions
-  std::size_t max_frames = 0;         // more are refused, since relaxation would take too long
-  std::string advice;                 // what to do if there are more: "choose sessions with --only"
-};
-// With more frames a picture shows nothing useful, and relaxation takes minutes.
-inline constexpr std::size_t kMaxRelaxedFrames = 200000;
+// To relax more takes minutes and gigabytes. Of a larger map about so many frames are relaxed (relaxed_map.h).
+inline constexpr std::size_t kMaxRelaxedFrames = 100000;
 
 // "3 mono sessions (photographs) have no scale of their own and are not drawn"; `done` is "drawn".
 std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
@@ -37,8 +32,9 @@ std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
 // `verb` is "draw", `done` is "drawn".
 Status nothing_to_place(const MapGraph& graph, const std::string& verb, const std::string& done);
 
-// Reads the graph of the chosen sessions. NO_SUCH_SESSION; NOT_STEREO if a mono session was chosen; BUDGET_EXCEEDED if
-// there are more than `max_frames` frames.
-Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, terminal::Console& console);
+// Reads the graph of the chosen sessions (numbers or names; none: all except mono sessions). NO_SUCH_SESSION;
+// NOT_STEREO if a mono session was chosen.
+Result<MapGraph> read_map_graph(const std::vector<std::string>& choice, client::Client& client,
+                                terminal::Console& console);
 
 }  // namespace relmap::cli

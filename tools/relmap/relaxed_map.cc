@@ -63,13 +63,13 @@ class Measured {
   std::unordered_map<FrameId, FrameId> parent_;
 };
 
-std::optional<Tear> tear_of(const RelaxedMap::Spring& spring, const MapPart& part) {
-  const client::RelaxationEdge& edge = spring.relaxed;
+// Of an edge that was relaxed, and which stands for that of `spring`.
+std::optional<Tear> tear_of(const client::RelaxationEdge& edge, const RelaxedMap::Spring& spring, const MapPart& part) {
   const SE3 off = edge.T_ab.inverse() * (part.find(edge.a)->inverse() * *part.find(edge.b));
   const Vector6 xi = off.log();
   const double sigmas = std::sqrt(std::max(0.0, mahalanobis_squared(xi, edge.covariance)));
   if (sigmas <= kTearSigmas) return std::nullopt;
-  return Tear{spring.edge, edge.a, edge.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
+  return Tear{spring.edge, spring.relaxed.a, spring.relaxed.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
 }
 
 // One part for each component of the relaxation, with frames and root only.
@@ -138,6 +138,12 @@ std::string DoubtfulStep::words() const {
   return text;
 }
 
+std::string contraction_text(const RelaxedMap& map) {
+  if (map.relaxed_frames == map.graph.frames.size()) return {};
+  return count_text(map.relaxed_frames) + " of " + count_text(map.graph.frames.size()) +
+         " frames were relaxed; the others follow from these along the odometry";
+}
+
 const SE3* MapPart::find(FrameId frame) const {
   const auto found = std::lower_bound(frames.begin(), frames.end(), frame,
                                       [](const PlacedFrame& placed, FrameId id) { return placed.frame < id; });
@@ -152,31 +158,37 @@ std::vector<SessionNumber> MapPart::sessions() const {
 }
 
 Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledFrames>& labels,
-                             std::optional<FrameId> root) {
+                             std::optional<FrameId> root, std::size_t max_frames) {
   if (graph.frames.empty()) return {Reason::EMPTY_MAP, "the graph has no frames"};
   if (root && !graph.frames.contains(*root))
     return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the chosen sessions"};
-  RelaxedMap map{std::move(graph), {}, {}};
+  RelaxedMap map;
+  map.graph = std::move(graph);
   map.springs = springs_of(map.graph);
   std::vector<client::RelaxationEdge> edges;
+  std::vector<const RelaxedMap::Spring*> spring_of;  // by edge
   edges.reserve(map.springs.size());
   Measured measured(map.graph.frames, map.springs);
   for (RelaxedMap::Spring& spring : map.springs) {
     spring.pulls = !spring.doubtful || !measured.join(spring.relaxed.a, spring.relaxed.b);
-    if (spring.pulls) edges.push_back(spring.relaxed);
+    if (!spring.pulls) continue;
+    edges.push_back(spring.relaxed);
+    spring_of.push_back(&spring);
   }
-  const auto relaxation = client::relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
-  if (!relaxation.ok()) return relaxation.status();
-  map.parts = parts_of(*relaxation, root);
+  const auto relaxed = client::relax_contracted({map.graph.frames.begin(), map.graph.frames.end()}, edges, max_frames);
+  if (!relaxed.ok()) return relaxed.status();
+  map.relaxed_frames = relaxed->kept;
+  map.parts = parts_of(relaxed->relaxation, root);
 
   std::unordered_map<FrameId, MapPart*> part_of;
   for (MapPart& part : map.parts)
     for (const PlacedFrame& placed : part.frames) part_of[placed.frame] = &part;
-  for (std::size_t i = 0; i < map.springs.size(); ++i) {
-    MapPart& part = *part_of.at(map.springs[i].relaxed.a);
-    part.edges.push_back(i);
-    if (map.springs[i].doubtful) continue;
-    if (const auto tear = tear_of(map.springs[i], part)) part.tears.push_back(*tear);
+  for (std::size_t i = 0; i < map.springs.size(); ++i) part_of.at(map.springs[i].relaxed.a)->edges.push_back(i);
+  for (std::size_t e = 0; e < relaxed->edges.size(); ++e) {
+    const RelaxedMap::Spring& spring = *spring_of[relaxed->stands_for[e]];
+    if (spring.doubtful) continue;
+    MapPart& part = *part_of.at(spring.relaxed.a);
+    if (const auto tear = tear_of(relaxed->edges[e], spring, part)) part.tears.push_back(*tear);
   }
   for (const client::Edge& edge : map.graph.edges) {
     if (!in_graph(edge) || !is_doubtful(edge)) continue;

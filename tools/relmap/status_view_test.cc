@@ -28,7 +28,7 @@ StatusMoment moment() {
   s.memory_budget = 1 << 30;
   s.memory_used = 100 << 20;
   for (const char* name : {"dirty", "cache", "views", "engine", "place_index", "queues", "reassembly", "replies",
-                           "sessions", "routes", "pictures"})
+                           "sessions", "routes", "allocator", "pictures"})
     s.memory_shares.push_back({name, 1 << 20, 64 << 20});
   s.vocabulary_words = 10000;
   s.vocabulary_source = "relmap's shipped vocabulary. Made from: (1) photographs by many, CC-BY-SA-4.0; (2) GPL-2+.";
