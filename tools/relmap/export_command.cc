@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "proto/base/json.h"
@@ -56,7 +57,7 @@ class Report {
     tell(part.doubtful, "");
   }
   void tell_relaxed(const RelaxedMap& map) {
-    whole_.add("relaxedFrames", map.relaxed_frames);
+    relaxed_frames_ = map.relaxed_frames;
     if (const std::string text = contraction_text(map); !text.empty()) advise(text);
   }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
@@ -73,7 +74,9 @@ class Report {
     for (const std::string& file : stale)
       advise(file + " was written by an earlier export and is no part of this one.");
     if (!stale.empty()) whole_.add("stale", stale);
-    if (json_) out_ << whole_.add("files", files_).add("leftOut", left_out_).text() << '\n';
+    whole_.add("files", files_).add("leftOut", left_out_);
+    if (relaxed_frames_) whole_.add("relaxedFrames", *relaxed_frames_);
+    if (json_) out_ << whole_.text() << '\n';
   }
 
  private:
@@ -117,6 +120,7 @@ class Report {
   std::ostream& err_;
   Json whole_;
   std::vector<Json> files_, left_out_;
+  std::optional<std::size_t> relaxed_frames_;  // nullopt if nothing was relaxed
 };
 
 std::string title_of(const RelaxedMap& map, std::size_t number) {
