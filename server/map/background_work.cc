@@ -33,14 +33,13 @@ void BackgroundWork::delete_session(SessionNumber session) {
 }
 
 void BackgroundWork::submit_next() {
-  bool relax = false, overdue = false, remove = false;
+  bool overdue = false, remove = false;
   {
     const MutexLock lock(mutex_);
-    relax = relaxation_pending_ && !relaxation_on_its_way_;
     overdue = std::chrono::steady_clock::now() - relaxed_at_ > kLeastOften;
     remove = !removal_on_its_way_;
   }
-  if (relax && hooks_.is_quiet() && (overdue || hooks_.lookups_keep_up())) {
+  if (relaxation_waits() && hooks_.is_quiet() && (overdue || hooks_.lookups_keep_up())) {
     submit(storage::IdleWorkRecord{slice_}, &BackgroundWork::relaxation_on_its_way_);
     const MutexLock lock(mutex_);
     relaxed_at_ = std::chrono::steady_clock::now();

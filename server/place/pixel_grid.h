@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -22,13 +23,12 @@ class PixelGrid {
     for (std::size_t p = 0; p < pixels.size(); ++p) {
       if (!(pixels[p].array().abs() < kFar).all()) continue;
       bucket_of[p] = bucket(cell(pixels[p].x()), cell(pixels[p].y()));
-      ++first_[bucket_of[p] + 1];
+      ++first_[bucket_of[p]];
     }
-    for (std::size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
-    std::array<std::uint32_t, kAcross * kAcross> next;
-    std::copy_n(first_.begin(), next.size(), next.begin());
-    for (std::uint32_t p = 0; p < pixels.size(); ++p)
-      if (bucket_of[p] != kNone) sorted_[next[bucket_of[p]]++] = p;
+    // Each begin is the end of its bucket first, and moves down while the bucket is filled.
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    for (std::size_t p = pixels.size(); p-- > 0;)
+      if (bucket_of[p] != kNone) sorted_[--first_[bucket_of[p]]] = static_cast<std::uint32_t>(p);
   }
 
   // Calls visit(number) for each pixel less than `radius`, below a billion, from `at`, in no particular order.
