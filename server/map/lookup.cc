@@ -160,7 +160,6 @@ storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::Pi
   if (!aligned)
     add_new(proposal.bindings,
             place::propose_bindings(view, query, frame, found.match, found.T_match_query, found.covariance, recent));
-  proposal.around = way_around(view, proposal);
   return proposal;
 }
 
@@ -188,7 +187,7 @@ storage::FrameRange recent_past(const storage::Graph& graph, FrameId query) {
 }
 
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
-               FrameId frame, const LaterFrames& later) {
+               FrameId frame, const LaterFrames& later, const RouteMap& newest) {
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
   const storage::Session session = *view.session(frame.session);
@@ -243,6 +242,7 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
     proposal.probability = probability_of(standing->best);
     if (const auto unseen = find_unseen(view, query, frame, proposal.match, ransac_seed(view, frame)))
       proposal.unseen = unseen->closure;
+    proposal.around = way_around(view, proposal, newest);
     return {{std::move(proposal)}, {}};
   }
 

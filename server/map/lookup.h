@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/map/way_around.h"
 #include "server/place/picture_cache.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
@@ -46,9 +47,10 @@ using LaterFrames = std::function<std::vector<storage::FrameRange>()>;
 // Returns nothing for a frame of a mono session, since its closures would have no metres and could not be edges
 // (Map.MatchImage tells what such a frame recognises).
 // What is `later` is left out of the question to the index, where it would count as a part of the known world, and what
-// the map took in later of the answers: of two frames that show one place, the later finds the earlier.
+// the map took in later of the answers: of two frames that show one place, the later finds the earlier. Ways around
+// stops are sought in the newest map if `newest` is given, and otherwise in the view.
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
-               FrameId frame, const LaterFrames& later = {});
+               FrameId frame, const LaterFrames& later = {}, const RouteMap& newest = {});
 
 // verify_place() for what `frame` saw, with a random seed that depends on the frame alone.
 Result<place::VerifiedPlace> verify_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,

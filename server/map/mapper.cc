@@ -83,6 +83,10 @@ struct Mapper::Impl {
   std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
 
   // Lookup threads.
+  RouteMap newest_map() const {
+    const MutexLock lock(mutex);
+    return route_map;
+  }
   bool submit_patiently(const storage::JournalRecord& record, const LookupQueue::Durable& durable);
 
   void tell_waiting() const {
@@ -119,7 +123,8 @@ struct Mapper::Impl {
   bool shutting_down RELMAP_GUARDED_BY(mutex) = false;  // waits for the disk are broken off
   Status storage RELMAP_GUARDED_BY(mutex);
   std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes
-      RELMAP_GUARDED_BY(mutex);  // by sequence, the last kRemembered
+      RELMAP_GUARDED_BY(mutex);                 // by sequence, the last kRemembered
+  RouteMap route_map RELMAP_GUARDED_BY(mutex);  // empty until use_route_map()
   Timings timings RELMAP_GUARDED_BY(mutex);
   std::uint64_t relaxations RELMAP_GUARDED_BY(mutex) = 0, active_frames RELMAP_GUARDED_BY(mutex) = 0;
   std::atomic<bool> failed = false;
@@ -281,7 +286,9 @@ void Mapper::Impl::start() {
   if (recognises_places() && !options.deterministic)
     lookups.start(
         lookup_threads(),
-        [this](FrameId frame, const LaterFrames& later) { return recognition->look_up(*map->view(), frame, later); },
+        [this](FrameId frame, const LaterFrames& later) {
+          return recognition->look_up(*map->view(), frame, later, newest_map());
+        },
         [this](const storage::JournalRecord& record, const LookupQueue::Durable& done) {
           return submit_patiently(record, done);
         },
@@ -585,6 +592,11 @@ void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
 
 std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
 const MapIdentity& Mapper::identity() const { return impl_->identity; }
+void Mapper::use_route_map(RouteMap newest) {
+  const MutexLock lock(impl_->mutex);
+  impl_->route_map = std::move(newest);
+}
+
 const place::PlaceIndex& Mapper::places() const { return impl_->recognition->places(); }
 const place::Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
 storage::Budget& Mapper::budget() const { return *impl_->budget; }

@@ -17,6 +17,7 @@
 
 #include "server/map/camera_doubts.h"
 #include "server/map/edge_changes.h"
+#include "server/map/way_around.h"
 #include "server/place/place_index.h"
 #include "server/place/vocabulary.h"
 #include "server/rba/rba.h"
@@ -109,6 +110,10 @@ class Mapper {
   // at once, from the caller's thread, with all chunks edited since the map was opened. Replaces the watcher; an empty
   // function unregisters it. When this returns, the previous watcher is no longer running.
   void watch_edits(storage::Map::EditWatcher watcher);
+
+  // Lookups seek ways around stops in this map from now on, unless they are deterministic: then the answer must not
+  // depend on which cells exist. It must be there until stop() returns.
+  void use_route_map(RouteMap newest);
 
   std::shared_ptr<const storage::MapView> view() const;
   // The map's identity. It is not known() while it could not be made durable, because the map cannot be written.

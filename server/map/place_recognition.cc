@@ -29,10 +29,10 @@ Status PlaceRecognition::load(const storage::MapView& view) {
 }
 
 std::vector<storage::JournalRecord> PlaceRecognition::look_up(const storage::MapView& view, FrameId frame,
-                                                              const LaterFrames& later) {
+                                                              const LaterFrames& later, const RouteMap& newest) {
   const auto session = view.session(frame.session);
   if (!session || storage::is_going(*session)) return {};  // it is no place any more
-  Lookup found = map::look_up(view, places_, pictures_, frame, later);
+  Lookup found = map::look_up(view, places_, pictures_, frame, later, newest);
   count_doubts(frame.session, found);
   return std::move(found.records);
 }

@@ -39,10 +39,10 @@ class PlaceRecognition {
   // two robots that pass a place at the same time one finds the other.
   void add(FrameId frame, std::span<const std::uint32_t> words);
 
-  // Looks the frame up among all places but later ones, and notes which calibrations it contradicts or confirms.
-  // Returns the records of what was found. Throws StatusError.
+  // Looks the frame up among all places but later ones, and notes which calibrations it contradicts or confirms;
+  // `newest` is that of map::look_up(). Returns the records of what was found. Throws StatusError.
   std::vector<storage::JournalRecord> look_up(const storage::MapView& view, FrameId frame,
-                                              const LaterFrames& later = {});
+                                              const LaterFrames& later = {}, const RouteMap& newest = {});
 
   // The session is being deleted: its frames are places no more.
   void forget(SessionNumber session);

@@ -7,6 +7,7 @@
 #include "proto/geometry/camera.h"
 #include "server/map/closures.h"
 #include "server/map/lookup.h"
+#include "server/map/way_around.h"
 #include "server/place/place_neighbours.h"
 
 namespace relmap::map {
@@ -94,6 +95,7 @@ class Proposer {
         proposal_of(view_, pictures_, query.picture, query.frame, std::move(found), {}, query.own_past.first);
     if (Status status = check_not_there(view_, proposal.query, proposal.match); !status.ok()) return status;
     proposal.probability = static_cast<float>(probability_of(view_, places_, query, proposal.match));
+    proposal.around = way_around(view_, proposal);
     return proposal;
   }
 

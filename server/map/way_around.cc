@@ -10,6 +10,7 @@
 #include "server/map/stops.h"
 #include "server/map/uncertain.h"
 #include "server/route/dijkstra.h"
+#include "server/route/overlay/route_search.h"
 #include "storage/graph/compounded_chain.h"
 #include "storage/graph/precision.h"
 
@@ -17,11 +18,9 @@ namespace relmap::map {
 
 namespace {
 
-// The search ends there: it takes 200 ms of a lookup's thread, and in a town that was driven eight times it comes 800 m
-// far. With a quarter of this, rides by train are not noticed (docs/decisions/closures.md).
+// A search frame by frame ends there: it takes 200 ms of a lookup's thread, and in a town that was driven eight times
+// it comes 800 m far. With a quarter of this, rides by train are not noticed (docs/decisions/closures.md).
 constexpr std::size_t kMaxFrames = std::size_t{1} << 17;
-// A way without a stop is preferred to one that is shorter by so much.
-constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};  // metres
 
 bool is_closure_in_force(const storage::Edge& edge) {
   return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted;
@@ -85,25 +84,51 @@ std::optional<Uncertain> transform_along(const storage::Graph& graph, const rout
   return Uncertain({path.to, chain.T(), chain.covariance(), metres}, Drift{rules.drift_share, rules.drift_radians});
 }
 
-// The transform along the shortest way or, if that does not tell it, along the one with the least standing.
-std::optional<Uncertain> measured_way(const storage::Graph& graph, FrameId from, FrameId to) {
-  route::RouteOptions options;
-  options.filter.against_oneway = true;
-  for (const route::RouteWeights& weights : {route::kByDistance, kWithoutStops}) {
-    options.weights = weights;
-    const auto route =
-        route::find_route(graph, {&from, 1}, {&to, 1}, options, {.max_frames = kMaxFrames, .proceed = {}});
-    if (!route.ok()) return std::nullopt;  // no way, whatever it costs
-    if (auto told = transform_along(graph, route->path)) return told;
+// The map through which a way is sought: the newest, with its cells, or `graph`.
+class Ways {
+ public:
+  Ways(const storage::Graph& graph, const RouteMap& newest) : graph_(graph) {
+    if (newest) newest_ = newest();
   }
-  return std::nullopt;
-}
+
+  // The transform along the shortest way or, if that does not tell it, along the one with the least standing.
+  std::optional<Uncertain> measured(FrameId from, FrameId to) const {
+    route::RouteOptions options;
+    options.filter.against_oneway = true;
+    for (const route::RouteWeights& weights : {route::kByDistance, kWithoutStops}) {
+      options.weights = weights;
+      const auto way = cheapest(from, to, options);
+      if (!way.ok()) return std::nullopt;  // no way, whatever it costs
+      if (auto told = transform_along(newest_ ? *newest_->view : graph_, *way)) return told;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  Result<route::Path> cheapest(FrameId from, FrameId to, const route::RouteOptions& options) const {
+    const route::WorkLimit work{.max_frames = kMaxFrames, .proceed = {}};
+    if (!newest_) return path_of(route::find_route(graph_, {&from, 1}, {&to, 1}, options, work));
+    auto answer = route::search_route(*newest_, {&from, 1}, {&to, 1}, options, 0, work);
+    if (answer.reason() == Reason::VIEW_EXPIRED) throw StatusError(answer.status());
+    if (!answer.ok()) return answer.status();
+    return path_of(std::move(answer->route));
+  }
+  static Result<route::Path> path_of(Result<route::Route> route) {
+    if (!route.ok()) return route.status();
+    return std::move(route->path);
+  }
+
+  const storage::Graph& graph_;
+  std::optional<route::RouteIndex::Snapshot> newest_;
+};
 
 std::shared_ptr<const storage::WayAround> find_way_around(const storage::Graph& graph,
-                                                          const storage::ClosureProposalRecord& proposal) {
+                                                          const storage::ClosureProposalRecord& proposal,
+                                                          const RouteMap& newest) {
   if (within_motion_reach(proposal.match, proposal.query)) return nullptr;
   const auto from = joined_before_stop(graph, proposal.query);
-  const auto to_match = from ? measured_way(graph, *from, proposal.match) : std::nullopt;
+  if (!from) return nullptr;
+  const auto to_match = Ways(graph, newest).measured(*from, proposal.match);
   if (!to_match) return nullptr;
   const Uncertain way = *to_match * Uncertain(proposal.T_match_query, proposal.covariance);
   return std::make_shared<const storage::WayAround>(
@@ -113,8 +138,9 @@ std::shared_ptr<const storage::WayAround> find_way_around(const storage::Graph& 
 }  // namespace
 
 std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
-                                                     const storage::ClosureProposalRecord& proposal) try {
-  return find_way_around(graph, proposal);
+                                                     const storage::ClosureProposalRecord& proposal,
+                                                     const RouteMap& newest) try {
+  return find_way_around(graph, proposal, newest);
 } catch (const StatusError& error) {
   if (error.status().reason() == Reason::VIEW_EXPIRED) throw;
   // The search reads much of the map. What is damaged somewhere there must not cost this frame its closure.

@@ -4,12 +4,22 @@
 // (docs/method.md, 7).
 #pragma once
 
+#include <functional>
 #include <memory>
 
+#include "server/route/overlay/route_index.h"
+#include "server/route/weight.h"
 #include "storage/graph/graph.h"
 #include "storage/journal/journal_record.h"
 
 namespace relmap::map {
+
+// Tells the newest view of the map, and cells that a search passes instead of frame after frame. Thread-safe.
+using RouteMap = std::function<route::RouteIndex::Snapshot()>;
+
+// A way without a stop is preferred to one that is shorter by 1,000 m for each second of standing. Cells for these
+// weights, and for distance, make searches short.
+inline constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};
 
 // Finds the way for a proposal; null if
 //   - the proposal is with its session's own past, at most kMotionReach keyframes back, which tells the same;
@@ -19,8 +29,10 @@ namespace relmap::map {
 //   - the map has no way from that frame to the match, or both the shortest way and the one with the least standing
 //     lead through such a stop themselves, along a carried stretch, over motion that was not measured or through a
 //     deleted session, so that they tell nothing.
-// A search (Dijkstra) gives up after 2^17 frames, and where the map is damaged. Throws StatusError VIEW_EXPIRED.
+// The stop is sought in `graph`, the way in the newest map if `newest` is given. A search without cells (Dijkstra)
+// gives up after 2^17 frames, and any where the map is damaged. Throws StatusError VIEW_EXPIRED.
 std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
-                                                     const storage::ClosureProposalRecord& proposal);
+                                                     const storage::ClosureProposalRecord& proposal,
+                                                     const RouteMap& newest = {});
 
 }  // namespace relmap::map

@@ -30,7 +30,7 @@ struct Config {
   std::vector<route::RouteWeights> route_mixes{route::kByTimeStandingToo, route::kByCertainty};
 
   std::vector<route::RouteWeights> route_metrics() const {
-    std::vector<route::RouteWeights> metrics{route::kByDistance, route::kByTime};
+    std::vector<route::RouteWeights> metrics{route::kByDistance, route::kByTime, map::kWithoutStops};
     metrics.insert(metrics.end(), route_mixes.begin(), route_mixes.end());
     return metrics;
   }

@@ -171,6 +171,7 @@ Status Daemon::Impl::serve() {
     core->routes.index->changed(version, chunks);
   });
   core->routes.index->start();
+  mapper->use_route_map([this] { return core->routes.index->snapshot(); });
 
   auto where = parse_host_port(config.listen);
   if (!where.ok()) return where.status();

@@ -27,12 +27,13 @@ void add_slots(const std::uint8_t* at, const std::uint8_t* end, LogLikelihood in
 BlockScores::BlockScores(const FabMapModel& model)
     : model_(model), increments_(model.size()), padded_(kPlacesPerBlock) {}
 
-void BlockScores::ask(std::span<const std::uint32_t> query) {
+void BlockScores::ask(std::span<const std::uint32_t> query, Counts counts) {
   for (const Increment& t : touched_) increments_[t.word] = 0;
   touched_.clear();
   const std::vector<TouchedWord> touched = model_.touched_by(query);
   empty_place_ = model_.empty_place(touched);
   for (const TouchedWord& t : touched) {
+    if (counts == Counts::kShown && t.seen == WordCase::kOnlyParent) continue;
     touched_.push_back({t.word, model_.increment(t)});
     increments_[t.word] = touched_.back().value;
   }

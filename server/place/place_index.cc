@@ -220,6 +220,7 @@ struct PlaceIndex::Impl {
     for (std::size_t i = 0; i < queries; ++i) idle.push_back(std::make_unique<QueryMemory>(model));
   }
 
+  class Question;
   std::unique_ptr<QueryMemory> take_memory();
   void give_memory(std::unique_ptr<QueryMemory> memory);
 
@@ -252,6 +253,35 @@ void PlaceIndex::Impl::give_memory(std::unique_ptr<QueryMemory> memory) {
   idle.push_back(std::move(memory));
   query_ended.notify_all();
 }
+
+// One question, with memory that no other uses meanwhile.
+class PlaceIndex::Impl::Question {
+ public:
+  Question(Impl& index, std::vector<std::uint32_t> words, std::span<const storage::FrameRange> masked)
+      : index_(index), words_(std::move(words)), masked_(masked.begin(), masked.end()), memory_(index.take_memory()) {
+    const MutexLock lock(index.query_mutex);
+    masked_.insert(masked_.end(), index.sessions_left_out.begin(), index.sessions_left_out.end());
+  }
+  ~Question() { index_.give_memory(std::move(memory_)); }
+  Question(const Question&) = delete;
+  Question& operator=(const Question&) = delete;
+
+  const PlaceScores& score(BlockScores::Counts counts) {
+    memory_->blocks.ask(words_, counts);
+    index_.places.score(memory_->blocks, masked_, memory_->scores);
+    return memory_->scores;
+  }
+  // Answers by the scores that were computed last.
+  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph) {
+    return place::by_words(*memory_, index_.samples, expected, graph);
+  }
+
+ private:
+  Impl& index_;
+  const std::vector<std::uint32_t> words_;  // sorted and unique
+  std::vector<storage::FrameRange> masked_;
+  std::unique_ptr<QueryMemory> memory_;
+};
 
 void most_probable_first(std::vector<PlaceCandidate>& candidates) {
   std::sort(candidates.begin(), candidates.end(), [](const PlaceCandidate& x, const PlaceCandidate& y) {
@@ -301,25 +331,28 @@ bool PlaceIndex::contains(FrameId frame) const { return impl_->places.contains(f
 PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const storage::Graph& graph,
                               std::span<const storage::FrameRange> masked, std::optional<FrameId> near,
                               std::span<const AppearanceFeature> features) const {
-  const std::vector<std::uint32_t> unique = sorted_unique(words);
-  if (unique.empty()) return {};
-
+  if (words.empty()) return {};
   Shortlist likeliest;
   {
-    const auto give = [this](QueryMemory* memory) { impl_->give_memory(std::unique_ptr<QueryMemory>(memory)); };
-    const std::unique_ptr<QueryMemory, decltype(give)> memory(impl_->take_memory().release(), give);
-    std::vector<storage::FrameRange> all_masked(masked.begin(), masked.end());
-    {
-      const MutexLock lock(impl_->query_mutex);
-      all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
+    Impl::Question question(*impl_, sorted_unique(words), masked);
+    if (features.size() == words.size()) {
+      const PlaceScores& scores = question.score(BlockScores::Counts::kShown);
+      likeliest = shortlist(scores, expected_places(scores, graph, near), graph);
     }
-    memory->blocks.ask(unique);
-    impl_->places.score(memory->blocks, all_masked, memory->scores);
-    const std::vector<std::uint32_t> expected = expected_places(memory->scores, graph, near);
-    if (features.size() == words.size()) likeliest = shortlist(memory->scores, expected, graph);
-    if (likeliest.groups < kMinGroups) return by_words(*memory, impl_->samples, expected, graph);
+    if (likeliest.groups < kMinGroups) {
+      const PlaceScores& scores = question.score(BlockScores::Counts::kTouched);
+      return question.by_words(expected_places(scores, graph, near), graph);
+    }
   }
   return compare_places({features, words}, likeliest, graph);
+}
+
+std::vector<PlaceCandidate> PlaceIndex::look_alikes(std::span<const std::uint32_t> words, const storage::Graph& graph,
+                                                    std::span<const storage::FrameRange> masked) const {
+  if (words.empty()) return {};
+  Impl::Question question(*impl_, sorted_unique(words), masked);
+  question.score(BlockScores::Counts::kShown);
+  return question.by_words({}, graph).candidates;
 }
 
 std::size_t PlaceIndex::size() const { return impl_->places.size(); }

@@ -32,6 +32,9 @@ void Region::clear() {
   free_landmarks_.clear();
   loaded_landmarks_ = 0;
   loaded_around_ = 0;
+  tree_nodes_.clear();
+  ends_.clear();
+  paths_.clear();
 }
 
 template <typename Key>
@@ -101,10 +104,7 @@ void Region::sort_observations() {
       },
       &first_of_base_, &by_base_);
   const std::size_t bases = local_.frames.size();
-  tree_nodes_.clear();
-  first_of_tree_.assign(1, 0);
-  ends_.clear();
-  first_end_.assign(1, 0);
+  paths_.resize(bases);
   node_at_.assign(bases, -1);
   for (std::size_t base = 0; base < bases; ++base) {
     observers_.clear();
@@ -113,16 +113,13 @@ void Region::sort_observations() {
         const std::int32_t observer = local_.observations[by_landmark_[o]].frame;
         if (std::exchange(node_at_[observer], 0) < 0) observers_.push_back(observer);
       }
-    if (!observers_.empty()) {
-      observer_ends_.clear();
-      local_.path_tree(static_cast<std::int32_t>(base), observers_, &tree_nodes_, &observer_ends_);
-      for (std::size_t k = 0; k < observers_.size(); ++k) {
-        ends_.push_back({observers_[k], observer_ends_[k]});
-        node_at_[observers_[k]] = -1;
-      }
-    }
-    first_of_tree_.push_back(tree_nodes_.size());
-    first_end_.push_back(ends_.size());
+    for (const std::int32_t observer : observers_) node_at_[observer] = -1;
+    if (paths_[base].ends == observers_.size()) continue;  // observers never go
+    const std::size_t first_node = tree_nodes_.size(), first_end = ends_.size();
+    observer_ends_.clear();
+    local_.path_tree(static_cast<std::int32_t>(base), observers_, &tree_nodes_, &observer_ends_);
+    for (std::size_t k = 0; k < observers_.size(); ++k) ends_.push_back({observers_[k], observer_ends_[k]});
+    paths_[base] = {first_node, tree_nodes_.size() - first_node, first_end, observers_.size()};
   }
   // path_tree() may have loaded more frames; none of them has observations here.
   active_.resize(local_.frames.size());
@@ -131,7 +128,7 @@ void Region::sort_observations() {
 bool Region::free_what_moves() {
   const std::size_t before = free_landmarks_.size();
   node_at_.assign(local_.frames.size(), -1);
-  for (std::size_t base = 0; base + 1 < first_of_tree_.size(); ++base) {
+  for (std::size_t base = 0; base < paths_.size(); ++base) {
     const Tree nodes = tree(base);
     if (nodes.empty()) continue;
     moves_.assign(nodes.size(), 0);
@@ -172,7 +169,7 @@ void Region::build(Problem* problem) {
   landmark_of_problem_.clear();
   edge_of_problem_.clear();
   problem_edge_.assign(local_.edges.size(), -1);
-  for (std::size_t base = 0; base + 1 < first_of_tree_.size(); ++base)
+  for (std::size_t base = 0; base < paths_.size(); ++base)
     if (!tree(base).empty()) lay_out_base(static_cast<std::int32_t>(base), problem);
   choose_measurements(problem);
   choose_columns(problem);

@@ -61,6 +61,11 @@ class Region {
     std::int32_t node = -1;  // in the base's tree; -1: out of reach
   };
 
+  // Where the paths from a base are in tree_nodes_ and ends_.
+  struct Paths {
+    std::size_t first_node = 0, nodes = 0, first_end = 0, ends = 0;  // one end for each observer
+  };
+
   void load();
   void load_along_motion(std::int32_t frame, bool forward);
   bool is_held(std::int32_t landmark) const {
@@ -77,11 +82,9 @@ class Region {
   // Counts observations of held landmarks only where a moving edge is on their path.
   void count_across_columns(Problem* problem);
   // The paths from a base to all observers of its landmarks; empty if no landmark is based there.
-  Tree tree(std::size_t base) const {
-    return Tree(tree_nodes_).subspan(first_of_tree_[base], first_of_tree_[base + 1] - first_of_tree_[base]);
-  }
+  Tree tree(std::size_t base) const { return Tree(tree_nodes_).subspan(paths_[base].first_node, paths_[base].nodes); }
   std::span<const End> ends(std::size_t base) const {
-    return std::span<const End>(ends_).subspan(first_end_[base], first_end_[base + 1] - first_end_[base]);
+    return std::span<const End>(ends_).subspan(paths_[base].first_end, paths_[base].ends);
   }
   // Counting sort of 0 .. count - 1 by key(item) in 0 .. size - 1: the items with key k are items[first[k] ..
   // first[k + 1]), ascending. Items with a negative key are left out.
@@ -101,10 +104,11 @@ class Region {
   // Local observations sorted by landmark, and observed landmarks sorted by base.
   std::vector<std::int32_t> first_of_landmark_, by_landmark_;
   std::vector<std::int32_t> first_of_base_, by_base_;
+  // The paths from bases, which are found again only when observers have been added. What was found before stays in
+  // these two until clear().
   std::vector<LocalMap::TreeNode> tree_nodes_;
-  std::vector<std::size_t> first_of_tree_;  // by local frame
   std::vector<End> ends_;
-  std::vector<std::size_t> first_end_;  // by local frame
+  std::vector<Paths> paths_;  // by local frame
 
   // Of the problem last built:
   std::vector<std::int32_t> landmark_of_problem_;

@@ -29,6 +29,11 @@ Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const Rou
     return without("more than a tenth of the map has changed, which the cells do not know yet" +
                    (map.late_because.empty() ? "" : ": " + map.late_because));
   query.stale = map.stale;
+  const auto sessions = map.view->sessions();
+  if (options.filter.against_oneway &&
+      std::any_of(sessions.begin(), sessions.end(),
+                  [](const storage::Session& session) { return session.header.oneway; }))
+    return without("cells keep to the directions of one-way sessions");
   auto opened = cells_to_open(*map.overlay, options.filter);
   if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");
   query.opened = *std::move(opened);
