@@ -112,7 +112,7 @@ class Mapper {
   void watch_edits(storage::Map::EditWatcher watcher);
 
   // Lookups seek ways around stops in this map from now on, unless they are deterministic: then the answer must not
-  // depend on which cells exist. It must be there until stop() returns.
+  // depend on which cells exist. What `newest` uses must exist until stop() returns.
   void use_route_map(RouteMap newest);
 
   std::shared_ptr<const storage::MapView> view() const;

@@ -98,24 +98,25 @@ class Ways {
     for (const route::RouteWeights& weights : {route::kByDistance, kWithoutStops}) {
       options.weights = weights;
       const auto way = cheapest(from, to, options);
-      if (!way.ok()) return std::nullopt;  // no way, whatever it costs
+      if (!way) return std::nullopt;  // no way, whatever it costs
       if (auto told = transform_along(newest_ ? *newest_->view : graph_, *way)) return told;
     }
     return std::nullopt;
   }
 
  private:
-  Result<route::Path> cheapest(FrameId from, FrameId to, const route::RouteOptions& options) const {
+  std::optional<route::Path> cheapest(FrameId from, FrameId to, const route::RouteOptions& options) const {
     const route::WorkLimit work{.max_frames = kMaxFrames, .proceed = {}};
     if (!newest_) return path_of(route::find_route(graph_, {&from, 1}, {&to, 1}, options, work));
     auto answer = route::search_route(*newest_, {&from, 1}, {&to, 1}, options, 0, work);
-    if (answer.reason() == Reason::VIEW_EXPIRED) throw StatusError(answer.status());
-    if (!answer.ok()) return answer.status();
-    return path_of(std::move(answer->route));
+    return path_of(answer.ok() ? Result(std::move(answer->route)) : answer.status());
   }
-  static Result<route::Path> path_of(Result<route::Route> route) {
-    if (!route.ok()) return route.status();
-    return std::move(route->path);
+  static std::optional<route::Path> path_of(Result<route::Route> route) {
+    if (route.ok()) return std::move(route->path);
+    const Reason reason = route.reason();
+    if (reason != Reason::NOT_CONNECTED && reason != Reason::OUT_OF_REACH && reason != Reason::NO_SUCH_FRAME)
+      throw StatusError(route.status());
+    return std::nullopt;
   }
 
   const storage::Graph& graph_;

@@ -14,11 +14,11 @@
 
 namespace relmap::map {
 
-// Tells the newest view of the map, and cells that a search passes instead of frame after frame. Thread-safe.
+// Returns the newest view of the map, and cells that a search passes instead of frame after frame. Thread-safe.
 using RouteMap = std::function<route::RouteIndex::Snapshot()>;
 
-// A way without a stop is preferred to one that is shorter by 1,000 m for each second of standing. Cells for these
-// weights, and for distance, make searches short.
+// By these weights a way without stops is preferred to one that is shorter by up to 1,000 m for each second of
+// standing.
 inline constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};
 
 // Finds the way for a proposal; null if
@@ -29,8 +29,9 @@ inline constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};
 //   - the map has no way from that frame to the match, or both the shortest way and the one with the least standing
 //     lead through such a stop themselves, along a carried stretch, over motion that was not measured or through a
 //     deleted session, so that they tell nothing.
-// The stop is sought in `graph`, the way in the newest map if `newest` is given. A search without cells (Dijkstra)
-// gives up after 2^17 frames, and any where the map is damaged. Throws StatusError VIEW_EXPIRED.
+// The stop is sought in `graph`. The way is sought in the newest map if `newest` is given, by its cells for distance
+// and kWithoutStops; without them, frame by frame through at most 2^17 frames. Where the map is damaged, the result is
+// null. Throws StatusError VIEW_EXPIRED.
 std::shared_ptr<const storage::WayAround> way_around(const storage::Graph& graph,
                                                      const storage::ClosureProposalRecord& proposal,
                                                      const RouteMap& newest = {});

@@ -10,6 +10,7 @@
 #include "server/map/stops.h"
 #include "server/map/testing/ridden_drive.h"
 #include "server/place/testing/hand_made_graph.h"
+#include "server/route/overlay/route_search.h"
 
 namespace relmap::map {
 namespace {
@@ -48,6 +49,40 @@ TEST(WayAround, LeadsOverWhatOthersDrove) {
   EXPECT_LT((around->T.t - drive.T_true(kJoined, 60).t).norm(), 0.1);
   EXPECT_LT(around->covariance.diagonal().maxCoeff(), 0.05);
   EXPECT_GT(around->covariance.diagonal().minCoeff(), 0);
+}
+
+// The daemon searches the newest map by its cells.
+TEST(WayAround, IsTheSameByCells) {
+  GuidedRide drive;
+  // The way leads through a whole chunk of the guide.
+  const storage::ClosureProposalRecord proposal = drive.closure_with_guide(130);
+  ASSERT_GT(storage::chunk_id(proposal.match), storage::chunk_id({kGuideSession, kJoined + storage::kFramesPerChunk}));
+  const auto frame_by_frame = way_around(drive.map(), proposal);
+  ASSERT_TRUE(frame_by_frame);
+
+  drive.map().publish();
+  route::RouteIndex::Snapshot newest{drive.map().view(), nullptr, "there are none yet", {}, {}};
+  const auto without_cells = way_around(drive.map(), proposal, [&] { return newest; });
+  ASSERT_TRUE(without_cells);
+  route::Overlay overlay({route::kByDistance, kWithoutStops}, route::CellStore::open_temporary().or_throw());
+  overlay.build(*newest.view);
+  newest.overlay = std::make_shared<const route::Overlay>(std::move(overlay));
+  for (const route::RouteWeights& weights : {route::kByDistance, kWithoutStops}) {
+    const FrameId from = frame_by_frame->from;
+    route::RouteOptions options;
+    options.weights = weights;
+    options.filter.against_oneway = true;
+    const auto answer = route::search_route(newest, {&from, 1}, {&proposal.match, 1}, options, 0, {});
+    ASSERT_TRUE(answer.ok()) << answer.status().to_string();
+    EXPECT_EQ(answer->frame_by_frame, "");
+  }
+  const auto by_cells = way_around(drive.map(), proposal, [&] { return newest; });
+  ASSERT_TRUE(by_cells);
+  for (const storage::WayAround& way : {*without_cells, *by_cells}) {
+    EXPECT_EQ(way.from, frame_by_frame->from);
+    EXPECT_LT((frame_by_frame->T.inverse() * way.T).log().norm(), 1e-6);
+    EXPECT_LT((frame_by_frame->covariance - way.covariance).norm(), 1e-6);
+  }
 }
 
 TEST(WayAround, IsSoughtBehindAStopOnly) {

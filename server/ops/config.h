@@ -8,6 +8,7 @@
 
 #include "proto/base/status.h"
 #include "server/map/mapper.h"
+#include "server/map/way_around.h"
 #include "server/route/weight.h"
 #include "server/rpc/limits.h"
 
@@ -26,11 +27,12 @@ struct Config {
   std::string log_level = "info";
   rpc::RpcLimits rpc;
   map::MapperOptions map;
-  // Metrics, beside distance and time, for which routes are found in milliseconds. Each takes memory.
+  // Metrics, beside distance and time, for which operators get routes in milliseconds. Each takes memory.
   std::vector<route::RouteWeights> route_mixes{route::kByTimeStandingToo, route::kByCertainty};
 
   std::vector<route::RouteWeights> route_metrics() const {
-    std::vector<route::RouteWeights> metrics{route::kByDistance, route::kByTime, map::kWithoutStops};
+    std::vector<route::RouteWeights> metrics{route::kByDistance, route::kByTime};
+    if (map.closures && !map.deterministic) metrics.push_back(map::kWithoutStops);  // lookups ask for it
     metrics.insert(metrics.end(), route_mixes.begin(), route_mixes.end());
     return metrics;
   }

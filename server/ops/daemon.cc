@@ -241,6 +241,7 @@ Status Daemon::Impl::stop() {
   const Status stopped_in_order = mapper ? mapper->stop() : Status();
   if (core && core->routes.index) {
     mapper->watch_edits({});
+    mapper->use_route_map({});
     const Status saved = stopped_in_order.ok() ? core->routes.index->save() : Status();
     if (!saved.ok()) spdlog::warn("cells of routes will be made anew: {}", saved.to_string());
     core->routes.index.reset();

@@ -17,10 +17,11 @@ class BlockScores {
  public:
   explicit BlockScores(const FabMapModel& model);
 
-  // Sets the query: words, sorted and unique. kShown leaves out of the scores what words tell that the query does not
-  // show although it shows their parents in the Chow-Liu tree: there are as many of them as of the query's own words,
-  // and each tells a tenth as much. That is enough to rank places, and takes half the time.
+  // Which words of a place count: all that the query touches (FabMapModel::touched_by()), or only those that it shows.
+  // The others, of which it shows only the parent, are as many, and each tells a tenth as much: without them, which is
+  // enough to rank places, a query takes half of the time.
   enum class Counts : std::uint8_t { kTouched, kShown };
+  // Sets the query: words, sorted and unique.
   void ask(std::span<const std::uint32_t> query, Counts counts = Counts::kTouched);
 
   // Writes the score of each place of the block.

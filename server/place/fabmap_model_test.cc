@@ -54,10 +54,11 @@ class Indexed {
   void add(std::vector<std::uint32_t> words) {
     places_.push_back({{1, static_cast<std::uint32_t>(places_.size())}, std::move(words)});
   }
-  std::vector<double> log_likelihoods(const std::vector<std::uint32_t>& query) {
+  std::vector<double> log_likelihoods(const std::vector<std::uint32_t>& query,
+                                      BlockScores::Counts counts = BlockScores::Counts::kTouched) {
     if (block_.empty()) block_ = encode_place_block(model_, nullptr, places_);
     std::vector<LogLikelihood> values(places_.size());
-    scores_.ask(query);
+    scores_.ask(query, counts);
     scores_.of_block(PlaceBlock::parse(block_, model_.size()).or_throw(), values.data());
     std::vector<double> nats;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -65,6 +66,15 @@ class Indexed {
       nats.push_back(in_nats(values[i]));
     }
     return nats;
+  }
+
+  // What words tell the place that the query does not show, although it shows their parents.
+  double told_by_parents(const std::vector<std::uint32_t>& query, std::size_t place) const {
+    double sum = 0;
+    for (const TouchedWord& touched : model_.touched_by(query))
+      if (touched.seen == WordCase::kOnlyParent && std::ranges::binary_search(places_[place].words, touched.word))
+        sum += in_nats(model_.increment(touched));
+    return sum;
   }
 
  private:
@@ -101,6 +111,20 @@ TEST(FabMap, IndexedLikelihoodEqualsTheDenseOne) {
 
 TEST(LongFabMap, IndexedLikelihoodEqualsTheDenseOne) {
   for (const std::uint64_t seed : {4, 5, 6, 7, 8}) expect_as_dense(2000, seed);
+}
+
+TEST(FabMap, AScoreMayLeaveOutWordsThatTheQueryDoesNotShow) {
+  const auto vocabulary = random_vocabulary(600, 1, 3);
+  std::mt19937_64 random(4);
+  Indexed index(*vocabulary);
+  for (int i = 0; i < 20; ++i) index.add(random_words(*vocabulary, 0.3, random));
+  const auto query = random_words(*vocabulary, 0.3, random);
+  const auto whole = index.log_likelihoods(query), shown = index.log_likelihoods(query, BlockScores::Counts::kShown);
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    const double told = index.told_by_parents(query, i);
+    EXPECT_NE(told, 0);
+    EXPECT_NEAR(whole[i] - shown[i], told, 1e-8);
+  }
 }
 
 TEST(FabMap, LikelihoodsOfAllQueriesSumToOne) {

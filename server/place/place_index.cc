@@ -188,22 +188,6 @@ std::vector<LogLikelihood> at_samples(std::span<const Bytes> samples, BlockScore
   return values;
 }
 
-// Answers a query by its words alone, once `memory` has its scores.
-PlaceAnswer by_words(QueryMemory& memory, std::span<const Bytes> samples, std::span<const std::uint32_t> expected,
-                     const storage::Graph& graph) {
-  const PlaceScores& scores = memory.scores;
-  const Posterior posterior(scores, at_samples(samples, memory.blocks), places_near_the_best(scores, graph), expected);
-  const PlaceMasses masses(scores, posterior, expected);
-  PlaceAnswer answer;
-  answer.new_place = posterior.new_place();
-  for (const Group& group : group(scores, posterior, masses, expected, graph)) {
-    const double mass = total(group, masses);
-    if (mass >= kMinProbability) answer.candidates.push_back({scores.frame(group.best), mass});
-  }
-  most_probable_first(answer.candidates);
-  return answer;
-}
-
 }  // namespace
 
 struct PlaceIndex::Impl {
@@ -221,6 +205,7 @@ struct PlaceIndex::Impl {
   }
 
   class Question;
+  std::vector<storage::FrameRange> with_sessions_left_out(std::span<const storage::FrameRange> masked);
   std::unique_ptr<QueryMemory> take_memory();
   void give_memory(std::unique_ptr<QueryMemory> memory);
 
@@ -258,10 +243,10 @@ void PlaceIndex::Impl::give_memory(std::unique_ptr<QueryMemory> memory) {
 class PlaceIndex::Impl::Question {
  public:
   Question(Impl& index, std::vector<std::uint32_t> words, std::span<const storage::FrameRange> masked)
-      : index_(index), words_(std::move(words)), masked_(masked.begin(), masked.end()), memory_(index.take_memory()) {
-    const MutexLock lock(index.query_mutex);
-    masked_.insert(masked_.end(), index.sessions_left_out.begin(), index.sessions_left_out.end());
-  }
+      : index_(index),
+        words_(std::move(words)),
+        masked_(index.with_sessions_left_out(masked)),
+        memory_(index.take_memory()) {}
   ~Question() { index_.give_memory(std::move(memory_)); }
   Question(const Question&) = delete;
   Question& operator=(const Question&) = delete;
@@ -271,17 +256,37 @@ class PlaceIndex::Impl::Question {
     index_.places.score(memory_->blocks, masked_, memory_->scores);
     return memory_->scores;
   }
-  // Answers by the scores that were computed last.
-  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph) {
-    return place::by_words(*memory_, index_.samples, expected, graph);
-  }
+  // Answers by the scores that were computed last alone.
+  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph);
 
  private:
   Impl& index_;
   const std::vector<std::uint32_t> words_;  // sorted and unique
-  std::vector<storage::FrameRange> masked_;
+  const std::vector<storage::FrameRange> masked_;
   std::unique_ptr<QueryMemory> memory_;
 };
+
+PlaceAnswer PlaceIndex::Impl::Question::by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph) {
+  const PlaceScores& scores = memory_->scores;
+  const Posterior posterior(scores, at_samples(index_.samples, memory_->blocks), places_near_the_best(scores, graph),
+                            expected);
+  const PlaceMasses masses(scores, posterior, expected);
+  PlaceAnswer answer;
+  answer.new_place = posterior.new_place();
+  for (const Group& group : group(scores, posterior, masses, expected, graph)) {
+    const double mass = total(group, masses);
+    if (mass >= kMinProbability) answer.candidates.push_back({scores.frame(group.best), mass});
+  }
+  most_probable_first(answer.candidates);
+  return answer;
+}
+
+std::vector<storage::FrameRange> PlaceIndex::Impl::with_sessions_left_out(std::span<const storage::FrameRange> masked) {
+  std::vector<storage::FrameRange> all(masked.begin(), masked.end());
+  const MutexLock lock(query_mutex);
+  all.insert(all.end(), sessions_left_out.begin(), sessions_left_out.end());
+  return all;
+}
 
 void most_probable_first(std::vector<PlaceCandidate>& candidates) {
   std::sort(candidates.begin(), candidates.end(), [](const PlaceCandidate& x, const PlaceCandidate& y) {
@@ -347,8 +352,9 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const storag
   return compare_places({features, words}, likeliest, graph);
 }
 
-std::vector<PlaceCandidate> PlaceIndex::look_alikes(std::span<const std::uint32_t> words, const storage::Graph& graph,
-                                                    std::span<const storage::FrameRange> masked) const {
+std::vector<PlaceCandidate> PlaceIndex::by_shown_words(std::span<const std::uint32_t> words,
+                                                       const storage::Graph& graph,
+                                                       std::span<const storage::FrameRange> masked) const {
   if (words.empty()) return {};
   Impl::Question question(*impl_, sorted_unique(words), masked);
   question.score(BlockScores::Counts::kShown);

@@ -86,10 +86,10 @@ class PlaceIndex {
                     std::span<const storage::FrameRange> masked = {}, std::optional<FrameId> near = {},
                     std::span<const AppearanceFeature> features = {}) const;
 
-  // Returns what query() finds by words alone, in half the time: what words tell that this picture does not show does
+  // Returns what query() finds by words alone, in half of the time: words of which the picture shows only the parent do
   // not count (BlockScores::Counts::kShown). For callers that do not need exact probabilities.
-  std::vector<PlaceCandidate> look_alikes(std::span<const std::uint32_t> words, const storage::Graph& graph,
-                                          std::span<const storage::FrameRange> masked) const;
+  std::vector<PlaceCandidate> by_shown_words(std::span<const std::uint32_t> words, const storage::Graph& graph,
+                                             std::span<const storage::FrameRange> masked) const;
 
   std::size_t size() const;          // places
   std::size_t left_out() const;      // places for which there was no room

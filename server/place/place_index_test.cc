@@ -82,6 +82,19 @@ TEST(PlaceIndex, AnEmptyMapHoldsNoPlace) {
   EXPECT_EQ(answer.new_place, 1);
 }
 
+TEST(PlaceIndex, WhereWordsAreIndependentOnlyThoseThatAreShownTell) {
+  Chain chain(200);
+  for (const std::uint32_t i : {20, 90, 150}) {
+    const std::vector<std::uint32_t> words = chain.seen_again(i);
+    const PlaceAnswer answer = chain.index.query(words, chain.graph);
+    ASSERT_FALSE(answer.candidates.empty());
+    EXPECT_TRUE(same({chain.index.by_shown_words(words, chain.graph, {}), answer.new_place}, answer)) << i;
+    const storage::FrameRange left_out[] = {{1, 0, 200}};
+    EXPECT_TRUE(chain.index.by_shown_words(words, chain.graph, left_out).empty());
+  }
+  EXPECT_TRUE(chain.index.by_shown_words({}, chain.graph, {}).empty());
+}
+
 TEST(PlaceIndex, APictureWithoutWordsIsANewPlace) {
   Chain chain(20);
   const PlaceAnswer answer = chain.index.query({}, chain.graph);

@@ -163,7 +163,7 @@ std::vector<PlaceCandidate> look_alikes(const storage::Graph& graph, const Place
   if (!cold || cold->words.empty()) return {};
   std::vector<storage::FrameRange> left_out = place_ranges(graph, frame);
   left_out.insert(left_out.end(), masked.begin(), masked.end());
-  return places.look_alikes(cold->words, graph, left_out);
+  return places.by_shown_words(cold->words, graph, left_out);
 }
 
 bool is_ambiguous(const storage::Uniqueness& uniqueness, std::uint32_t inliers) {

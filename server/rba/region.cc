@@ -114,7 +114,7 @@ void Region::sort_observations() {
         if (std::exchange(node_at_[observer], 0) < 0) observers_.push_back(observer);
       }
     for (const std::int32_t observer : observers_) node_at_[observer] = -1;
-    if (paths_[base].ends == observers_.size()) continue;  // observers never go
+    if (paths_[base].ends == observers_.size()) continue;  // the same ones: until clear() they are only added
     const std::size_t first_node = tree_nodes_.size(), first_end = ends_.size();
     observer_ends_.clear();
     local_.path_tree(static_cast<std::int32_t>(base), observers_, &tree_nodes_, &observer_ends_);

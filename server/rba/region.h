@@ -104,8 +104,8 @@ class Region {
   // Local observations sorted by landmark, and observed landmarks sorted by base.
   std::vector<std::int32_t> first_of_landmark_, by_landmark_;
   std::vector<std::int32_t> first_of_base_, by_base_;
-  // The paths from bases, which are found again only when observers have been added. What was found before stays in
-  // these two until clear().
+  // The paths from bases. They are found again only when observers have been added; what was found before stays in
+  // these two until clear(). No path is found more often than its base has observers.
   std::vector<LocalMap::TreeNode> tree_nodes_;
   std::vector<End> ends_;
   std::vector<Paths> paths_;  // by local frame

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
+#include <utility>
 
 #include "tests/support/simulated_drive.h"
 
@@ -74,6 +76,41 @@ TEST_F(RegionTest, IsClosedUnderThePathsOfItsObservations) {
   for (const LocalLandmark& landmark : local_.landmarks)
     if (landmark.observers_loaded) stored += landmark.record->observers.size();
   EXPECT_EQ(seen, stored);
+}
+
+// By frame and pixel, the number of steps from the landmark's base to each counted observation, and that of moving
+// ones.
+std::map<std::pair<FrameId, double>, std::pair<int, int>> steps_of(const Problem& problem, const LocalMap& local) {
+  std::map<std::pair<FrameId, double>, std::pair<int, int>> steps;
+  for (const ProblemObservation& seen : problem.observations) {
+    auto& [all, moving] = steps[{local.frames[seen.frame].id, seen.z.x()}];
+    for (std::int32_t n = seen.node; problem.nodes[n].parent >= 0; n = problem.nodes[n].parent) {
+      ++all;
+      moving += problem.edges[problem.nodes[n].edge].column >= 0;
+    }
+    if (!seen.counted) all = -1;
+  }
+  return steps;
+}
+
+TEST_F(RegionTest, GrowsToTheProblemThatItWouldHaveMadeAtOnce) {
+  for (const std::uint32_t i : {62U, 63U}) region_.activate(local_.frame(drive_.frame(i)));
+  region_.build(&problem_);
+  const auto before = steps_of(problem_, local_);
+  for (const std::uint32_t i : {64U, 65U, 3U, 2U}) region_.activate(local_.frame(drive_.frame(i)));
+  region_.build(&problem_);
+  const auto grown = steps_of(problem_, local_);
+  EXPECT_GT(grown.size(), before.size());
+
+  // Cleared, it makes another map's problem, and then the same at once.
+  for (const bool same : {false, true}) {
+    region_.clear();
+    local_.clear();
+    for (const std::uint32_t i : {62U, 63U, 64U, 65U, 3U, 2U})
+      region_.activate(local_.frame(drive_.frame(same ? i : i / 2 + 5)));
+    region_.build(&problem_);
+    EXPECT_EQ(steps_of(problem_, local_) == grown, same);
+  }
 }
 
 TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {

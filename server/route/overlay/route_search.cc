@@ -14,6 +14,13 @@ bool too_stale(const RouteIndex::Snapshot& map) {
   return map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10);
 }
 
+bool has_oneway(const storage::Graph& graph) {
+  const std::vector<storage::Session> sessions = graph.sessions();
+  return std::any_of(sessions.begin(), sessions.end(), [](const storage::Session& session) {
+    return session.header.oneway && !storage::is_deleted(session);
+  });
+}
+
 // The question to the cells, or UNSUPPORTED with the reason why cells cannot answer it.
 Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
   const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
@@ -29,15 +36,13 @@ Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const Rou
     return without("more than a tenth of the map has changed, which the cells do not know yet" +
                    (map.late_because.empty() ? "" : ": " + map.late_because));
   query.stale = map.stale;
-  const auto sessions = map.view->sessions();
-  if (options.filter.against_oneway &&
-      std::any_of(sessions.begin(), sessions.end(),
-                  [](const storage::Session& session) { return session.header.oneway; }))
+  if (options.filter.against_oneway && has_oneway(*map.view))
     return without("cells keep to the directions of one-way sessions");
   auto opened = cells_to_open(*map.overlay, options.filter);
   if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");
   query.opened = *std::move(opened);
   query.filter = options.filter;
+  query.filter.against_oneway = false;  // no session is one-way
   query.max_cost = options.max_cost;
   return query;
 }
@@ -83,10 +88,12 @@ class RouteSearch {
   Result<RouteAnswer> frame_by_frame() { return as_answer(find_route(*map_.view, from_, to_, options_, work_)); }
 
   // NOT_CONNECTED if the cells show that no edges join the ends, even though they cannot answer the question itself: a
-  // filter only removes edges. Closures that only bind, which every question supposes in addition, are followed around
-  // the start (with_near()).
+  // filter only removes edges, unless it allows ways against one-way sessions. Closures that only bind, which every
+  // question supposes in addition, are followed around the start (with_near()).
   Status check_joined() const {
-    if (!map_.overlay || too_stale(map_) || options_.filter.supposed.candidates || options_.filter.supposed.quarantined)
+    const RouteFilter& filter = options_.filter;
+    if (!map_.overlay || too_stale(map_) || filter.supposed.candidates || filter.supposed.quarantined ||
+        filter.against_oneway)
       return {};
     try {
       return route::check_joined(*map_.overlay, *map_.view, map_.stale, from_, to_, work_);

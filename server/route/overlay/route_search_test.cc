@@ -82,6 +82,13 @@ TEST_F(RouteSearchTest, QuestionsThatCellsCannotAnswerAreSearchedFrameByFrame) {
   ASSERT_TRUE(supposed.ok()) << supposed.status().to_string();
   EXPECT_THAT(supposed->frame_by_frame, HasSubstr("supposed"));
 
+  options = {};
+  options.filter.against_oneway = true;
+  const auto against = search(from, to, options);
+  ASSERT_TRUE(against.ok()) << against.status().to_string();
+  EXPECT_THAT(against->frame_by_frame, HasSubstr("one-way"));
+  EXPECT_NEAR(dijkstra(from, to, options)->cost, against->route.cost, 1e-9 * against->route.cost);
+
   map_.stale.resize(101);
   const auto stale = search(from, to);
   ASSERT_TRUE(stale.ok()) << stale.status().to_string();
