@@ -18,6 +18,7 @@ namespace {
 constexpr Colour kGrid{233, 233, 228}, kBorder{214, 214, 208};
 constexpr double kNarrow = 420;             // points; narrower panels have smaller margins and letters
 constexpr std::size_t kNamedSessions = 12;  // if there are more, they are labelled with their numbers
+constexpr std::size_t kCrowd = 2000;        // closures; of more, the ends are not marked
 
 double inset_of(double width) { return width < kNarrow ? 22 : 34; }
 
@@ -273,13 +274,14 @@ class MapPanel::Pen {
   void closures() {
     Vector2 a, b;
     for (ClosureStyle style : closure_styles()) {
-      // Hundreds of closures of full width would hide the route.
-      if (picture_.route) style.stroke.width *= 0.4;
+      // Hundreds of closures of full width would hide the route, and thousands all that was driven.
+      const bool crowded = contents_.count(style.kind) > kCrowd;
+      if (picture_.route || crowded) style.stroke.width *= 0.4;
       std::set<std::array<std::int64_t, 4>> drawn;  // the points of the page that closures of this style join already
       for (const MapPicture::Edge& edge : picture_.edges) {
         if (edge.kind != style.kind || !find(edge.a, a) || !find(edge.b, b)) continue;
         if (drawn.insert({std::llround(a.x()), std::llround(a.y()), std::llround(b.x()), std::llround(b.y())}).second)
-          draw_closure(out_, style, a, b);
+          crowded ? out_.line(a, b, style.stroke) : draw_closure(out_, style, a, b);
       }
     }
   }

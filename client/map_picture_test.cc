@@ -313,6 +313,7 @@ TEST_F(MapPictureFile, OfAVastMapOnlyWhatCanBeToldApartIsWritten) {
   const std::string svg = contents(path("vast.svg"));
   EXPECT_LT(svg.size(), 2'000'000u) << "all of it takes 13 MB";
   EXPECT_GT(count(svg, "<polyline"), 500) << "closures all around the circle";
+  EXPECT_LT(count(svg, "<circle"), 20) << "marks at the ends of closures would hide the circle";
 }
 
 TEST_F(MapPictureFile, ASingleFrameIsFine) {
