@@ -280,8 +280,12 @@ class MapPanel::Pen {
       std::set<std::array<std::int64_t, 4>> drawn;  // the points of the page that closures of this style join already
       for (const MapPicture::Edge& edge : picture_.edges) {
         if (edge.kind != style.kind || !find(edge.a, a) || !find(edge.b, b)) continue;
-        if (drawn.insert({std::llround(a.x()), std::llround(a.y()), std::llround(b.x()), std::llround(b.y())}).second)
-          crowded ? out_.line(a, b, style.stroke) : draw_closure(out_, style, a, b);
+        if (!drawn.insert({std::llround(a.x()), std::llround(a.y()), std::llround(b.x()), std::llround(b.y())}).second)
+          continue;
+        if (crowded)
+          out_.line(a, b, style.stroke);
+        else
+          draw_closure(out_, style, a, b);
       }
     }
   }

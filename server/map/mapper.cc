@@ -590,13 +590,13 @@ void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
   impl_->changed.wait(impl_->mutex, [&] { return view()->version() >= told || impl_->failed; });
 }
 
-std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
-const MapIdentity& Mapper::identity() const { return impl_->identity; }
 void Mapper::use_route_map(RouteMap newest) {
   const MutexLock lock(impl_->mutex);
   impl_->route_map = std::move(newest);
 }
 
+std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
+const MapIdentity& Mapper::identity() const { return impl_->identity; }
 const place::PlaceIndex& Mapper::places() const { return impl_->recognition->places(); }
 const place::Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
 storage::Budget& Mapper::budget() const { return *impl_->budget; }
