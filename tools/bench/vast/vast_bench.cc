@@ -94,6 +94,7 @@ void run(VastOptions options, Report& report) {
   const VastProgress progress = drive_town(town, options);
   const VastVerdict verdict = judge_town(town, options);
   for (const std::string& wrong : verdict.wrong) std::cerr << "wrong closure: " << wrong << '\n';
+  for (const std::string& ride : verdict.unnoticed) std::cerr << "ride that was not noticed: " << ride << '\n';
   report_run(progress, options, verdict, report);
   report_map(verdict, report);
   if (!options.page.empty()) write_page(options, progress, verdict, report);
@@ -117,6 +118,8 @@ Run declare_vast(CLI::App& app) {
   app.add_option("--seed", options->seed, "of the town and the drives")->capture_default_str();
   app.add_option("--picture", options->picture, "draw the map at the end: FILE.svg or FILE.png");
   app.add_option("--page", options->page, "write a page of results, FILE.html, with the picture if that is an SVG");
+  app.add_option("--closures", options->closures,
+                 "write a table of the closures in force with their errors at the end: FILE.tsv");
   app.add_flag("--light", options->light, "keyframes of 44 tracks and 45 features instead of 120 and 300");
   app.footer(
       "Examples:\n"

@@ -4,11 +4,13 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
 #include <random>
 #include <set>
+#include <stdexcept>
 #include <unordered_map>
 #include <utility>
 
@@ -70,7 +72,12 @@ class Ground {
 
 class TownJudge {
  public:
-  TownJudge(const VastTown& town, const storage::Graph& graph) : town_(town), graph_(graph) {
+  // The table of the closures is written to `closures` unless that is null.
+  TownJudge(const VastTown& town, const storage::Graph& graph, std::ostream* closures)
+      : town_(town), graph_(graph), closures_(closures) {
+    if (closures_)
+      *closures_ << "a\tb\tapart_m\terror_m\terror_rad\tsigma_m\tsigma_rad\tchi2\tinliers\tspread\tsupport\tbound\t"
+                    "carries\tcarried\n";
     for (const storage::Session& session : graph.sessions()) {
       const std::uint32_t robot = town.robot_of(session.header.name);
       if (robot == town.robots()) throw std::runtime_error("a session is of no robot: " + session.header.name);
@@ -136,7 +143,9 @@ class TownJudge {
       }
       if (edge.state != storage::EdgeState::kAccepted) continue;
       verdict.carried_wrongly += edge.carried.session != 0 && !rode(edge.carried);
-      const SE3 error = (truth(edge.a).inverse() * truth(edge.b)).inverse() * edge.T_ab;
+      const SE3 T = truth(edge.a).inverse() * truth(edge.b);
+      const SE3 error = T.inverse() * edge.T_ab;
+      if (closures_) tell(edge, T, error);
       if (!testing::is_wrong(error, edge.covariance)) {
         ++(testing::is_wrong(error) ? verdict.closures_vague : verdict.closures_right);
         continue;
@@ -147,6 +156,16 @@ class TownJudge {
                                 std::to_string(error.t.norm()) + " m off, " + std::to_string(edge.inliers) +
                                 " inliers");
     }
+  }
+
+  void tell(const storage::Edge& edge, const SE3& T, const SE3& error) {
+    const Vector6 off = error.log();
+    *closures_ << edge.a.to_string() << '\t' << edge.b.to_string() << '\t' << T.t.norm() << '\t' << error.t.norm()
+               << '\t' << rotation_angle(error.R) << '\t' << std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace())
+               << '\t' << std::sqrt(edge.covariance.bottomRightCorner<3, 3>().trace()) << '\t'
+               << off.dot(edge.covariance.ldlt().solve(off)) << '\t' << edge.inliers << '\t' << edge.spread << '\t'
+               << edge.support << '\t' << edge.bound << '\t' << edge.carries << '\t' << (edge.carried.session != 0)
+               << '\n';
   }
 
   // Whether a train ran somewhere along the stretch.
@@ -188,7 +207,12 @@ class TownJudge {
         if (back == returned_.end() || *back >= FrameId{number, end}) continue;
         ++verdict.rides_returned;
         const auto carried = carried_.lower_bound({number, ride->second[0]});
-        verdict.rides_closed += carried != carried_.end() && *carried <= FrameId{number, ride->second[1] + 1};
+        if (carried != carried_.end() && *carried <= FrameId{number, ride->second[1] + 1})
+          ++verdict.rides_closed;
+        else
+          verdict.unnoticed.push_back("session " + std::to_string(number) + ", frames " +
+                                      std::to_string(ride->second[0]) + " to " + std::to_string(ride->second[1]) +
+                                      "; a known place was seen in frame " + std::to_string(back->index));
       }
     }
   }
@@ -214,6 +238,7 @@ class TownJudge {
 
   const VastTown& town_;
   const storage::Graph& graph_;
+  std::ostream* closures_;
   std::map<SessionNumber, std::unique_ptr<const sim::CityRobot>> robots_;
   std::set<FrameId> returned_, carried_;
 };
@@ -235,7 +260,10 @@ VastVerdict judge_town(const VastTown& town, const VastOptions& options) {
   const std::uint64_t epoch = engine->acquire().or_throw();
   const auto map =
       storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(options.memory_budget_mb << 20)).or_throw();
-  TownJudge(town, *map->publish()).judge(verdict);
+  std::ofstream closures;
+  if (!options.closures.empty()) closures.open(options.closures);
+  TownJudge(town, *map->publish(), closures.is_open() ? &closures : nullptr).judge(verdict);
+  if (!options.closures.empty() && !closures.flush()) throw std::runtime_error("cannot write " + options.closures);
   return verdict;
 }
 

@@ -21,6 +21,7 @@ struct VastVerdict {
   // Rides in trains; after how many of them the robot came where somebody had been before; and for how many of these
   // the map knows over which steps the robot was carried.
   std::uint64_t rides = 0, rides_returned = 0, rides_closed = 0;
+  std::vector<std::string> unnoticed;  // the rides that are returned from and not closed, in words
   // Closures in force that say that the robot was carried where no train ran.
   std::uint64_t carried_wrongly = 0;
   double metres = 0, street_metres = 0;
