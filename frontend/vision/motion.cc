@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "frontend/vision/likeliest_point.h"
 #include "frontend/vision/robust_refinement.h"
 #include "frontend/vision/three_point.h"
 
@@ -19,6 +20,7 @@ namespace {
 constexpr double kMinDepth = 1e-3;  // metres; nothing nearer can be seen
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
+constexpr int kMaxRounds = 4;       // of refinement
 
 // The derivative is by the right perturbation of T_reference_camera; the covariance includes the point's own.
 using Residual = CorrespondenceResidual<6>;
@@ -280,21 +282,28 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   const auto min_inliers = std::max(kSample, static_cast<std::size_t>(std::max(0, options.min_inliers)));
   if (good.size() < min_inliers) return too_few(0, good.size());
 
-  const Problem problem(good, camera, options);
-  Best best = search(problem, options, guess);
-  auto inliers = problem.inliers(best.T);
+  Best best = search({good, camera, options}, options, guess);
 
-  // The inliers are counted once they no longer change: the first step of a refinement may lose some that the next ones
-  // find again.
+  // Uncertain points are where they most likely are if the pose is right. The inliers are counted once they no longer
+  // change: the first step of a refinement may lose some that the next ones find again.
+  std::vector<Correspondence> likeliest = good;
+  std::vector<std::uint32_t> uncertain;
+  for (std::uint32_t i = 0; i < good.size(); ++i)
+    if (!is_well_known(good[i])) uncertain.push_back(i);
+  const int min_rounds = uncertain.empty() ? 1 : 2;
+  const Problem problem(likeliest, camera, options);
+  std::vector<std::uint32_t> inliers;
   std::optional<Refined<PoseModel>> refined;
-  for (int round = 0; round < 4 && inliers.size() >= kSample; ++round) {
+  for (int round = 0;; ++round) {
+    const SE3 inverse = best.T.inverse();
+    for (const std::uint32_t i : uncertain) likeliest[i] = at_likeliest_point(good[i], camera, inverse);
+    auto again = problem.inliers(best.T);
+    const bool unchanged = round >= min_rounds && again == inliers;
+    inliers = std::move(again);
+    if (unchanged || round == kMaxRounds || inliers.size() < kSample) break;
     refined = refine_pose(problem, inliers, best.T, 10);
     if (!refined) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
     best.T = refined->state;
-    auto again = problem.inliers(best.T);
-    const bool unchanged = again == inliers;
-    inliers = std::move(again);
-    if (unchanged) break;
   }
   if (!refined || inliers.size() < min_inliers) return too_few(inliers.size(), good.size());
   if (options.limits && !options.limits->allow(best.T)) return too_few(0, good.size());
@@ -309,7 +318,7 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   int rows = 0;
   const SE3 inverse = best.T.inverse();
   for (const std::uint32_t i : inliers) {
-    const Residual r = problem.residual(inverse, good[i], false);
+    const Residual r = problem.residual(inverse, likeliest[i], false);
     squares += r.value.squaredNorm();
     rows += r.rows;
     motion.inliers.push_back(original[i]);

@@ -19,6 +19,9 @@ struct Correspondence {
   double sigma = 1;   // of each coordinate of `pixel`, in pixels
   // Covariance of `point` in the reference frame; zero if the point is exact. It widens the gate and lowers the weight.
   Matrix3 point_covariance = Matrix3::Zero();
+  // The eye that measured the point, in the reference frame: along the ray from there the inverse distance has a
+  // Gaussian error (likeliest_point.h).
+  Vector3 seen_from = Vector3::Zero();
 };
 
 // Limits the motion to poses within `metres` and `radians` of T_reference_camera.

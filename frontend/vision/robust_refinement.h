@@ -29,7 +29,7 @@ struct CorrespondenceResidual {
 // All values are finite (a right pixel may be NaN, for mono), and sigma is positive.
 inline bool usable(const Correspondence& c) {
   return c.point.allFinite() && std::isfinite(c.pixel.x()) && std::isfinite(c.pixel.y()) && !std::isinf(c.pixel.z()) &&
-         std::isfinite(c.sigma) && c.sigma > 0 && c.point_covariance.allFinite();
+         std::isfinite(c.sigma) && c.sigma > 0 && c.point_covariance.allFinite() && c.seen_from.allFinite();
 }
 
 // Each coordinate is within `gate_sigmas` of its prediction, and its sigma is at most `max_sigma` pixels: a point with

@@ -161,8 +161,8 @@ std::vector<vision::Correspondence> correspond(const QueryPicture& query, const 
   for (const DescriptorMatch& match : matches) {
     const AppearanceFeature& feature = query.features[match.feature];
     const MapPoint& point = map.points[match.point];
-    correspondences.push_back(
-        {point.point, pixel_of(feature, query.camera), pixel_sigma(level_of_scale(feature.scale)), point.covariance});
+    correspondences.push_back({point.point, pixel_of(feature, query.camera), pixel_sigma(level_of_scale(feature.scale)),
+                               point.covariance, map.frames[point.placed].T_centre_frame.t});
   }
   return correspondences;
 }
