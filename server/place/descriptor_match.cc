@@ -83,7 +83,11 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
     return match(features, points, same, [&](std::uint32_t, std::uint32_t f) {
       near.clear();
       const Vector2 seen(features[f].u, features[f].v);
-      grid.visit_near(seen, expected->radius, [&](std::uint32_t p) { near.push_back(p); });
+      grid.visit_near(seen, expected->radius, [&](std::uint32_t p) {
+        const Vector2 off = seen - expected->at[p];
+        if (expected->information.empty() || off.dot(expected->information[p] * off) < kNearSigmas * kNearSigmas)
+          near.push_back(p);
+      });
       std::sort(near.begin(), near.end());
       return std::span<const std::uint32_t>(near);
     });
@@ -117,6 +121,16 @@ std::vector<DescriptorMatch> match_points_by_word(std::span<const AppearanceFeat
     return std::span<const std::uint32_t>(found.begin(), found.end());
   };
   return nearest_of_all(match(features, descriptors_of(points), SamePoint{points}, of_word), points);
+}
+
+void drop_outdone(std::span<const AppearanceFeature> features, std::span<const MapPoint> points, std::size_t rivals,
+                  std::vector<DescriptorMatch>& matches) {
+  std::erase_if(matches, [&](const DescriptorMatch& match) {
+    const Descriptor& seen = features[match.feature].descriptor;
+    return std::ranges::any_of(points.first(rivals), [&](const MapPoint& rival) {
+      return squared_distance(seen, *rival.descriptor) < match.distance && !one_point(rival, points[match.point]);
+    });
+  });
 }
 
 std::vector<DescriptorMatch> nearest_of_all(std::vector<DescriptorMatch> matches, std::span<const MapPoint> points) {

@@ -22,16 +22,19 @@ struct DescriptorMatch {
 inline constexpr double kDescriptorRatio = 0.8;
 inline constexpr std::uint32_t kMaxDescriptorDistance = 270 * 270;  // squared; a descriptor's norm is 512
 
-// A feature that shows a point is at most this far from where a good pose projects the point, as a share of the
+// A feature that shows a point is at most this far from where an exact pose projects the exact point, as a share of the
 // picture's width.
 inline constexpr double kNearRadius = 0.02;
 
 // Where a model of the pictures, such as a pose, expects the points: a feature may be a point if it is less than
-// `radius` from there (pixels).
+// `radius` from there (pixels) and, if there are covariances (of pixels), within kNearSigmas of it.
 struct ExpectedPoints {
   std::vector<Vector2> at;  // by point
   double radius = 0;
+  std::vector<Eigen::Matrix2d> information =
+      {};  // by point, the inverse of its covariance; empty: the radius alone counts
 };
+inline constexpr double kNearSigmas = 3;
 
 // Returns mutual nearest neighbours that pass the ratio test, ascending by feature. `same(p, q)` says that points p and
 // q are one point of the world, so that they do not compete in the ratio test. If `expected` is null, every feature may
@@ -49,6 +52,12 @@ std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> fea
 // Of matches of the same features with the same points, found in several ways, keeps the nearest of each feature, point
 // and landmark. Ascending by feature.
 std::vector<DescriptorMatch> nearest_of_all(std::vector<DescriptorMatch> matches, std::span<const MapPoint> points);
+
+// Drops the matches whose feature looks more like one of the first `rivals` points, unless that is the same point of
+// the world. Among points that are expected near a feature one is always the nearest, whether or not it is the right
+// one; among all points of a picture it is the right one as a rule, or none.
+void drop_outdone(std::span<const AppearanceFeature> features, std::span<const MapPoint> points, std::size_t rivals,
+                  std::vector<DescriptorMatch>& matches);
 
 // match_points() among pairs of one word, which cost a hundredth of all pairs and hold a tenth to a quarter of the
 // matches. `words` are those of the features, one each.

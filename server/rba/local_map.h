@@ -16,8 +16,7 @@ namespace relmap::rba {
 
 struct EdgeEstimate {
   SE3 T_ab;
-  bool changed = false;   // T_ab changed since it was loaded
-  bool measured = false;  // so well, in the last solve, that its estimate may become its prior
+  bool changed = false;  // T_ab changed since it was loaded
   Matrix6 covariance = Matrix6::Zero();
   bool covariance_changed = false;
   std::int32_t previous = -1;               // the edge of with_previous; -1: with_previous has not been computed

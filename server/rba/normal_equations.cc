@@ -124,7 +124,7 @@ bool NormalEquations::assemble(const Problem& problem, const std::vector<SE3>& p
     sum_over_descendants(own);
     add_to_system(own);
   }
-  add_priors(problem);
+  add_priors(problem, huber);
   return true;
 }
 
@@ -270,12 +270,13 @@ void NormalEquations::add_to_system(const BaseGroups& base) {
   }
 }
 
-void NormalEquations::add_priors(const Problem& problem) {
+void NormalEquations::add_priors(const Problem& problem, double huber) {
   for (const ProblemEdge& edge : problem.edges) {
     if (edge.column < 0 || !edge.prior) continue;
     const Vector6 r = (edge.prior_T_ab.inverse() * edge.T_ab).log();
     const Matrix6 J = right_jacobian_inverse(r);
-    const Matrix6 JW = J.transpose() * edge.prior_information;
+    const double weight = edge.prior_doubted ? huber_weight(std::sqrt(r.dot(edge.prior_information * r)), huber) : 1;
+    const Matrix6 JW = weight * J.transpose() * edge.prior_information;
     system_.add(edge.column, edge.column, JW * J);
     system_.right_side(edge.column).noalias() -= JW * r;
   }
@@ -326,7 +327,8 @@ double true_cost(const Problem& problem, const std::vector<SE3>& poses, double h
   for (const ProblemEdge& edge : problem.edges) {
     if (edge.column < 0 || !edge.prior) continue;
     const Vector6 r = (edge.prior_T_ab.inverse() * edge.T_ab).log();
-    cost += r.dot(edge.prior_information * r);
+    const double squared = r.dot(edge.prior_information * r);
+    cost += edge.prior_doubted ? huber_loss(std::sqrt(squared), huber) : squared;
   }
   return cost;
 }

@@ -82,7 +82,7 @@ class NormalEquations {
                         double huber, double* v, double* r2);
   void sum_over_descendants(const BaseGroups& base);
   void add_to_system(const BaseGroups& base);
-  void add_priors(const Problem& problem);
+  void add_priors(const Problem& problem, double huber);
 
   std::vector<BaseGroups> bases_;
   std::vector<Group> groups_;

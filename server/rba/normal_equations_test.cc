@@ -86,8 +86,9 @@ Dense direct(const Problem& problem, double lambda) {
   }
   for (const auto& edge : problem.edges) {
     if (edge.column < 0 || !edge.prior) continue;
-    const Eigen::MatrixXd root = Eigen::LLT<Matrix6>(edge.prior_information).matrixU();
     const Vector6 e = (edge.prior_T_ab.inverse() * edge.T_ab).log();
+    const double w = edge.prior_doubted ? huber_weight(std::sqrt(e.dot(edge.prior_information * e)), kHuber) : 1;
+    const Eigen::MatrixXd root = std::sqrt(w) * Eigen::MatrixXd(Eigen::LLT<Matrix6>(edge.prior_information).matrixU());
     J.block<6, 6>(row, split + 6 * edge.column) = root * right_jacobian_inverse(e);
     r.segment<6>(row) = -root * e;
     row += 6;

@@ -21,6 +21,7 @@ struct ProblemEdge {
   SE3 T_ab;
   std::int32_t column = -1;  // of its 6 x 6 blocks in the reduced system; -1: the edge does not move
   bool prior = false;
+  bool prior_doubted = false;  // the prior has Huber's loss, as measurements have: others may outweigh it
   SE3 prior_T_ab;
   Matrix6 prior_information = Matrix6::Zero();
 };

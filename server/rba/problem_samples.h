@@ -53,7 +53,8 @@ struct ProblemSample {
       edge.prior_T_ab = truth[e.a].inverse() * truth[e.b];
       edge.T_ab = edge.prior_T_ab * disturbance(state_noise);
       if (moves(e.a) || moves(e.b)) edge.column = problem.columns++;
-      edge.prior = problem.edges.size() % 4 == 1;
+      edge.prior = problem.edges.size() % 4 <= 1;
+      edge.prior_doubted = problem.edges.size() % 4 == 0;
       edge.prior_information.diagonal() << 1e4, 2e4, 3e4, 4e5, 5e5, 6e5;
       problem.edges.push_back(edge);
     }

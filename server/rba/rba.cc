@@ -167,11 +167,6 @@ struct Relaxer::Impl {
       if (edge.previous >= 0)
         stored.correlation_with_previous =
             storage::to_correlation(edge.with_previous, edge.covariance, local.estimates[edge.previous].covariance);
-      // A closure keeps the prior that its verification measured, because a free loop edge fits any measurements.
-      if (edge.measured && stored.kind == storage::EdgeKind::kOdometry) {
-        stored.prior_T_ab = stored.T_ab;
-        stored.prior_covariance = stored.covariance;
-      }
     }
   }
 

@@ -15,6 +15,8 @@ const double kMinParallaxCosine = std::cos(std::numbers::pi / 180);  // one degr
 // Odometry steps to either side of an active frame within which frames may have landmarks on the other side of it: half
 // the spacing of loop edges.
 constexpr int kAround = 8;
+// What a prior counts, by information, where observations measure the edge: the same pictures made both.
+constexpr double kOfMeasured = 1.0 / 9;
 
 // Cosine of the angle between the ray to the landmark in the base and the measured ray in the observing frame.
 double parallax_cosine(const ProblemLandmark& landmark, const ProblemObservation& observation,
@@ -285,10 +287,12 @@ void Region::choose_columns(Problem* problem) {
   for (ProblemEdge& edge : problem->edges) {
     if (edge.column < 0) continue;
     const storage::Edge& record = *local_.edges[edge_of_column_[edge.column]].record;
-    if (!record.prior_active && is_measured(edge.column)) continue;
+    const bool measured = !record.prior_active && is_measured(edge.column);
     const Eigen::LLT<Matrix6> cholesky(record.prior_covariance);
     edge.prior_T_ab = record.prior_T_ab;
     edge.prior_information = cholesky.solve(Matrix6::Identity());
+    if (measured) edge.prior_information *= kOfMeasured;
+    edge.prior_doubted = measured;
     edge.prior = cholesky.info() == Eigen::Success && edge.prior_information.allFinite();
   }
 }
@@ -318,7 +322,6 @@ void Region::take(const Problem& problem) {
     const SE3& solved = problem.edges[e].T_ab;
     local.changed = local.changed || local.T_ab.R != solved.R || local.T_ab.t != solved.t;
     local.T_ab = solved;
-    local.measured = is_measured(problem.edges[e].column);
   }
   for (const ProblemBase& base : problem.bases)
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {

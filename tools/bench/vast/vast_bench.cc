@@ -77,6 +77,9 @@ void report_map(const VastVerdict& verdict, Report& report) {
   report.add("rides_closed", static_cast<double>(verdict.rides_closed), "of these, known to have carried the robot");
   report.add("carried_wrongly", static_cast<double>(verdict.carried_wrongly),
              "closures in force that tell of a ride where there was none");
+  report.add("step_error_p50_m", median(verdict.step_error_m), "of the robots' steps in the map, but for trains");
+  report.add("step_error_p99_m", p99(verdict.step_error_m), "");
+  report.add("step_error_max_m", greatest(verdict.step_error_m), "");
   report.add("odometry_error_p50_m", median(verdict.odometry_error_m), "at revisits, by the robot's odometry");
   report.add("map_error_p50_m", median(verdict.map_error_m), "at revisits, through the map");
   report.add("map_error_max_m", greatest(verdict.map_error_m), "");
@@ -118,8 +121,8 @@ Run declare_vast(CLI::App& app) {
   app.add_option("--seed", options->seed, "of the town and the drives")->capture_default_str();
   app.add_option("--picture", options->picture, "draw the map at the end: FILE.svg or FILE.png");
   app.add_option("--page", options->page, "write a page of results, FILE.html, with the picture if that is an SVG");
-  app.add_option("--closures", options->closures,
-                 "write a table of the closures in force with their errors at the end: FILE.tsv");
+  app.add_option("--edges", options->edges,
+                 "write a table of the edges and closures in force with their errors at the end: FILE.tsv");
   app.add_flag("--light", options->light, "keyframes of 44 tracks and 45 features instead of 120 and 300");
   app.footer(
       "Examples:\n"

@@ -72,12 +72,12 @@ class Ground {
 
 class TownJudge {
  public:
-  // The table of the closures is written to `closures` unless that is null.
-  TownJudge(const VastTown& town, const storage::Graph& graph, std::ostream* closures)
-      : town_(town), graph_(graph), closures_(closures) {
-    if (closures_)
-      *closures_ << "a\tb\tapart_m\terror_m\terror_rad\tsigma_m\tsigma_rad\tchi2\tinliers\tspread\tsupport\tbound\t"
-                    "carries\tcarried\n";
+  // The table of the edges and closures is written to `table` unless that is null.
+  TownJudge(const VastTown& town, const storage::Graph& graph, std::ostream* table)
+      : town_(town), graph_(graph), table_(table) {
+    if (table_)
+      *table_ << "kind\ta\tb\tapart_m\terror_m\terror_rad\tsigma_m\tsigma_rad\tchi2\tinliers\tspread\tsupport\tbound\t"
+                 "carries\tcarried\n";
     for (const storage::Session& session : graph.sessions()) {
       const std::uint32_t robot = town.robot_of(session.header.name);
       if (robot == town.robots()) throw std::runtime_error("a session is of no robot: " + session.header.name);
@@ -137,15 +137,18 @@ class TownJudge {
 
   void judge_edges(const storage::FrameHot& hot, VastVerdict& verdict) {
     for (const storage::Edge& edge : hot.edges) {
-      if (edge.kind != storage::EdgeKind::kLoop) {
-        if (!edge.carried_by.empty()) carried_.insert(edge.b);
-        continue;
-      }
       if (edge.state != storage::EdgeState::kAccepted) continue;
-      verdict.carried_wrongly += edge.carried.session != 0 && !rode(edge.carried);
       const SE3 T = truth(edge.a).inverse() * truth(edge.b);
       const SE3 error = T.inverse() * edge.T_ab;
-      if (closures_) tell(edge, T, error);
+      if (table_) tell(edge, T, error);
+      if (edge.kind != storage::EdgeKind::kLoop) {
+        if (!edge.carried_by.empty()) carried_.insert(edge.b);
+        const sim::CityDrive& drive = robot(edge.b).drive();
+        if (!drive.at(edge.a.index).running && !drive.at(edge.b.index).running)
+          verdict.step_error_m.push_back(error.t.norm());
+        continue;
+      }
+      verdict.carried_wrongly += edge.carried.session != 0 && !rode(edge.carried);
       if (!testing::is_wrong(error, edge.covariance)) {
         ++(testing::is_wrong(error) ? verdict.closures_vague : verdict.closures_right);
         continue;
@@ -160,12 +163,13 @@ class TownJudge {
 
   void tell(const storage::Edge& edge, const SE3& T, const SE3& error) {
     const Vector6 off = error.log();
-    *closures_ << edge.a.to_string() << '\t' << edge.b.to_string() << '\t' << T.t.norm() << '\t' << error.t.norm()
-               << '\t' << rotation_angle(error.R) << '\t' << std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace())
-               << '\t' << std::sqrt(edge.covariance.bottomRightCorner<3, 3>().trace()) << '\t'
-               << off.dot(edge.covariance.ldlt().solve(off)) << '\t' << edge.inliers << '\t' << edge.spread << '\t'
-               << edge.support << '\t' << edge.bound << '\t' << edge.carries << '\t' << (edge.carried.session != 0)
-               << '\n';
+    *table_ << (edge.kind == storage::EdgeKind::kLoop ? "closure" : "motion") << '\t' << edge.a.to_string() << '\t'
+            << edge.b.to_string() << '\t' << T.t.norm() << '\t' << error.t.norm() << '\t' << rotation_angle(error.R)
+            << '\t' << std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace()) << '\t'
+            << std::sqrt(edge.covariance.bottomRightCorner<3, 3>().trace()) << '\t'
+            << off.dot(edge.covariance.ldlt().solve(off)) << '\t' << edge.inliers << '\t' << edge.spread << '\t'
+            << edge.support << '\t' << edge.bound << '\t' << edge.carries << '\t' << (edge.carried.session != 0)
+            << '\n';
   }
 
   // Whether a train ran somewhere along the stretch.
@@ -238,7 +242,7 @@ class TownJudge {
 
   const VastTown& town_;
   const storage::Graph& graph_;
-  std::ostream* closures_;
+  std::ostream* table_;
   std::map<SessionNumber, std::unique_ptr<const sim::CityRobot>> robots_;
   std::set<FrameId> returned_, carried_;
 };
@@ -260,10 +264,10 @@ VastVerdict judge_town(const VastTown& town, const VastOptions& options) {
   const std::uint64_t epoch = engine->acquire().or_throw();
   const auto map =
       storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(options.memory_budget_mb << 20)).or_throw();
-  std::ofstream closures;
-  if (!options.closures.empty()) closures.open(options.closures);
-  TownJudge(town, *map->publish(), closures.is_open() ? &closures : nullptr).judge(verdict);
-  if (!options.closures.empty() && !closures.flush()) throw std::runtime_error("cannot write " + options.closures);
+  std::ofstream table;
+  if (!options.edges.empty()) table.open(options.edges);
+  TownJudge(town, *map->publish(), table.is_open() ? &table : nullptr).judge(verdict);
+  if (!options.edges.empty() && !table.flush()) throw std::runtime_error("cannot write " + options.edges);
   return verdict;
 }
 

@@ -26,6 +26,8 @@ struct VastVerdict {
   std::uint64_t carried_wrongly = 0;
   double metres = 0, street_metres = 0;
   std::uint64_t bytes_on_disk = 0;
+  // Of each step of the robots' motion, but for trains: how far the map has it off.
+  std::vector<double> step_error_m;
   // Between frames at revisits and the earlier frame there, metres: by the robot's odometry alone, where one robot saw
   // both, and through the map. Of a sample.
   std::vector<double> odometry_error_m, map_error_m;

@@ -18,10 +18,10 @@ struct VastOptions {
   bool light = false;  // keyframes of a fifth of the size
   std::size_t memory_budget_mb = 512;
   std::uint32_t kills = 10;
-  std::string folder;    // kept, and continued if it holds an unfinished run; empty: a temporary one
-  std::string picture;   // of the map
-  std::string page;      // HTML, with the picture in it
-  std::string closures;  // a table of the closures in force, TSV
+  std::string folder;   // kept, and continued if it holds an unfinished run; empty: a temporary one
+  std::string picture;  // of the map
+  std::string page;     // HTML, with the picture in it
+  std::string edges;    // a table of the edges and closures in force with their errors, TSV
 };
 
 // Draws descriptors with the vocabulary's statistics: three of four features of a stretch of street show a word of one
