@@ -188,6 +188,11 @@ std::optional<PlacedFrame> back_along_odometry(const storage::Graph& graph, Fram
   return walk.placed();
 }
 
+std::size_t points_of_centre(const MapPoints& map) {
+  return static_cast<std::size_t>(
+      std::ranges::find_if(map.points, [](const MapPoint& point) { return point.placed != 0; }) - map.points.begin());
+}
+
 MapPoints gather_points(const storage::Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out) {
   MapPoints map = place_frames(graph, centre, reach);

@@ -66,6 +66,9 @@ struct MapPoints {
   std::vector<std::shared_ptr<const storage::FrameCold>> held;  // owns the descriptors
 };
 
+// How many points are of the centre; they come first.
+std::size_t points_of_centre(const MapPoints& map);
+
 // Returns the points seen in the frames up to `reach` steps before and after the centre, for a stereo session. A point
 // is the estimate of the feature's landmark if that has its base near by, or else comes from the feature's disparity.
 // Points with a disparity of less than 2 sigmas are left out, since the error of their depth is not Gaussian; so are

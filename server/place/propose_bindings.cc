@@ -24,6 +24,7 @@ constexpr double kChi2With3At99 = 11.34;
 
 // A landmark from around the match, with all its views there.
 struct Target {
+  std::uint32_t point = 0;  // of the map, the first of its views
   std::vector<const Descriptor*> views;
   ExpectedPixel expected;
 };
@@ -105,13 +106,14 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
   const SE3 T_frame_match = T_match_frame.inverse();
 
   std::map<LandmarkId, std::optional<Target>> targets;
-  for (const MapPoint& point : map.points) {
+  for (std::uint32_t p = 0; p < map.points.size(); ++p) {
+    const MapPoint& point = map.points[p];
     if (!point.landmark.valid() || recent(point.landmark.base) || seen.landmarks.contains(point.landmark)) continue;
     const auto [entry, fresh] = targets.try_emplace(point.landmark);
     // Frames come nearest first, so the first view of a landmark predicts its position best.
     if (fresh)
       if (const auto expected = expect(point.point, point.covariance, query.camera, T_frame_match, covariance))
-        entry->second = Target{{}, *expected};
+        entry->second = Target{p, {}, *expected};
     if (entry->second) entry->second->views.push_back(point.descriptor);
   }
 
@@ -123,11 +125,9 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
 
   const Bindable bindable(query, free);
   std::vector<std::uint32_t> inside;
-  struct Best {
-    LandmarkId landmark;
-    std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
-  };
-  std::vector<Best> of_feature(query.features.size());
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<DescriptorMatch> of_feature;
+  for (std::uint32_t f = 0; f < query.features.size(); ++f) of_feature.push_back({f, kNone, kNone});
   for (const auto& [landmark, target] : targets) {
     if (!target) continue;
     std::size_t best = 0;
@@ -145,13 +145,14 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
       }
     }
     if (first > kMaxDescriptorDistance || first > kDescriptorRatio * kDescriptorRatio * second) continue;
-    if (first < of_feature[best].distance) of_feature[best] = {landmark, first};
+    if (first < of_feature[best].distance) of_feature[best] = {of_feature[best].feature, target->point, first};
   }
 
+  std::erase_if(of_feature, [](const DescriptorMatch& none) { return none.point == kNone; });
+  drop_outdone(query.features, map.points, points_of_centre(map), of_feature);
   std::vector<storage::ProposedBinding> bindings;
-  for (std::size_t f = 0; f < of_feature.size(); ++f)
-    if (of_feature[f].landmark.valid())
-      bindings.push_back(binding_to(of_feature[f].landmark, query.features[f], query.camera));
+  for (const auto& [f, p, d] : of_feature)
+    bindings.push_back(binding_to(map.points[p].landmark, query.features[f], query.camera));
   return bindings;
 }
 

@@ -186,8 +186,7 @@ std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoin
   }
   expected.radius = kNearSigmas * std::sqrt(max_variance);
   std::vector<DescriptorMatch> matches = match_points(query.features, map.points, &expected);
-  const auto of_centre = std::ranges::find_if(map.points, [](const MapPoint& point) { return point.placed != 0; });
-  drop_outdone(query.features, map.points, static_cast<std::size_t>(of_centre - map.points.begin()), matches);
+  drop_outdone(query.features, map.points, points_of_centre(map), matches);
   return matches;
 }
 

@@ -102,7 +102,7 @@ struct Edge {
   // Correlation of its xi (rows) with that of the odometry edge that ends in `a` (columns), in 127ths, stored by
   // columns (storage/graph/precision.h); zero where they are independent or the correlation is unknown.
   std::array<std::int8_t, 36> correlation_with_previous{};
-  SE3 prior_T_ab;  // last well-supported estimate (at first: the robot's own step)
+  SE3 prior_T_ab;  // what the robot itself, or the closure's verification, measured
   Matrix6 prior_covariance = Matrix6::Identity();
 
   float driven_s = 0;    // odometry edge: seconds driven since the frame before; loop edge: docs/method.md, 8
