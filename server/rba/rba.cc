@@ -28,7 +28,8 @@ constexpr double kFullRelativeDecrease = 1e-12;
 }  // namespace
 
 struct Relaxer::Impl {
-  Impl(storage::Map& edited, const RbaOptions& how) : map(edited), options(how), local(edited), region(local) {}
+  Impl(storage::Map& edited, const RbaOptions& how)
+      : map(edited), options(how), local(edited), region(local, how.own_step) {}
 
   // How far a relaxation goes.
   struct Extent {

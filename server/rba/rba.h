@@ -19,6 +19,9 @@ struct RbaOptions {
   std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
   int max_iterations = 6;        // of Levenberg-Marquardt, per solve
   double huber_px = 2.0;         // corner of Huber's loss in sigmas, which are pixels for a track at the lowest level
+  // What the robot's own step counts, by information, where observations measure the edge: the same tracks made both.
+  // 0: nothing, as in the paper.
+  double own_step = 1.0 / 9;
 };
 
 struct RbaSummary {

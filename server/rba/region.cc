@@ -15,8 +15,6 @@ const double kMinParallaxCosine = std::cos(std::numbers::pi / 180);  // one degr
 // Odometry steps to either side of an active frame within which frames may have landmarks on the other side of it: half
 // the spacing of loop edges.
 constexpr int kAround = 8;
-// What the robot's own step counts, by information, where observations measure the edge: the same tracks made both.
-constexpr double kOfMeasured = 1.0 / 9;
 
 // Cosine of the angle between the ray to the landmark in the base and the measured ray in the observing frame.
 double parallax_cosine(const ProblemLandmark& landmark, const ProblemObservation& observation,
@@ -288,11 +286,11 @@ void Region::choose_columns(Problem* problem) {
     if (edge.column < 0) continue;
     const storage::Edge& record = *local_.edges[edge_of_column_[edge.column]].record;
     const bool measured = !record.prior_active && is_measured(edge.column);
-    if (measured && record.kind != storage::EdgeKind::kOdometry) continue;
+    if (measured && (record.kind != storage::EdgeKind::kOdometry || own_step_ == 0)) continue;
     const Eigen::LLT<Matrix6> cholesky(record.prior_covariance);
     edge.prior_T_ab = record.prior_T_ab;
     edge.prior_information = cholesky.solve(Matrix6::Identity());
-    if (measured) edge.prior_information *= kOfMeasured;
+    if (measured) edge.prior_information *= own_step_;
     edge.prior_doubted = measured;
     edge.prior = cholesky.info() == Eigen::Success && edge.prior_information.allFinite();
   }

@@ -23,7 +23,8 @@ namespace relmap::rba {
 
 class Region {
  public:
-  explicit Region(LocalMap& local) : local_(local) {}
+  // `own_step`: see RbaOptions.
+  Region(LocalMap& local, double own_step) : local_(local), own_step_(own_step) {}
 
   // Whether fixed landmarks are held; they are by default. Call before the first activate().
   void hold_fixed(bool held) { hold_fixed_ = held; }
@@ -93,6 +94,7 @@ class Region {
                std::vector<std::int32_t>* items);
 
   LocalMap& local_;
+  const double own_step_;
   bool hold_fixed_ = true;
   std::vector<char> active_;  // by local frame
   std::vector<std::int32_t> active_frames_;

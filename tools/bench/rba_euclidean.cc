@@ -22,6 +22,13 @@ namespace {
 constexpr std::uint32_t kChain = 20;  // frames
 constexpr int kPrefixes = 12;         // of the drive, for the figure
 
+// The Euclidean solution knows nothing of the robots' own steps.
+rba::RbaOptions of_measurements_alone(std::uint32_t window) {
+  rba::RbaOptions rba = with_window(window);
+  rba.own_step = 0;
+  return rba;
+}
+
 // The transforms between frames i and i + kChain, for all i.
 using Chains = std::vector<SE3>;
 Chains chains(std::uint32_t frames, const std::function<SE3(std::uint32_t i, std::uint32_t j)>& T) {
@@ -56,7 +63,7 @@ struct ChainComparison {
   double adaptive_square = 0, full_error_square = 0;  // mean over seeds: against full; of full against truth
 
   void add(const sim::PointsWorldOptions& world, const EuclideanOptions& options, bool closures) {
-    testing::SimulatedDrive drive(world, with_window(options.window), {.proposed = closures});
+    testing::SimulatedDrive drive(world, of_measurements_alone(options.window), {.proposed = closures});
     drive.drive();
     const Chains adaptive_chains = chains_of_map(drive, drive.map());
     drive.relax_fully();
@@ -144,7 +151,7 @@ std::vector<Keyframe> track_recording(const std::string& folder) {
 
 void compare_on(const std::vector<Keyframe>& keyframes, const std::string& name, const EuclideanOptions& options,
                 Report& report) {
-  RecordedDrive drive(with_window(options.window));
+  RecordedDrive drive(of_measurements_alone(options.window));
   for (const Keyframe& keyframe : keyframes) drive.add(keyframe);
   const double huber = rba::RbaOptions().huber_px;
   EuclideanBa ceres(drive.map());
@@ -178,7 +185,7 @@ void run_euclidean(const EuclideanOptions& options, Report& report) {
     closed.add(world, options, true);
     if (seed > 1) continue;
     for (int k = 1; k <= kPrefixes; ++k) {
-      testing::SimulatedDrive drive(world, with_window(options.window));
+      testing::SimulatedDrive drive(world, of_measurements_alone(options.window));
       drive.drive(world.frames * static_cast<std::uint32_t>(k) / kPrefixes);
       frames.push_back(drive.driven());
       const double adaptive_rms = reprojection_rms(drive.map());

@@ -14,7 +14,7 @@ namespace relmap::bench {
 
 double reprojection_rms(storage::Map& map) {
   rba::LocalMap local(map);
-  rba::Region region(local);
+  rba::Region region(local, rba::RbaOptions().own_step);
   for (const storage::Session& session : map.sessions())
     for (std::uint64_t index = session.first; session.frames > 0 && index <= session.last; ++index) {
       const std::int32_t frame = local.frame({session.number, static_cast<std::uint32_t>(index)});
