@@ -61,7 +61,9 @@ TEST(LikeliestPoint, APoseFarFromAPlaceIsNotDrawnToItAndHasTheCovarianceItSays) 
     double nearer = 0;
     for (unsigned seed = 1; seed <= kStreets; ++seed) {
       const Street street(seed, back);
-      const auto motion = estimate_motion(street.all, kStereoCamera);
+      MotionOptions options;
+      options.correct_points = true;
+      const auto motion = estimate_motion(street.all, kStereoCamera, options);
       ASSERT_TRUE(motion.ok()) << motion.status().to_string();
       const SE3& T = motion->T_reference_camera;
       nearer += (street.T_place_camera.t - T.t).dot(street.T_place_camera.t.normalized()) / kStreets;

@@ -20,7 +20,7 @@ namespace {
 constexpr double kMinDepth = 1e-3;  // metres; nothing nearer can be seen
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
-constexpr int kMaxRounds = 4;       // of refinement
+constexpr int kCorrections = 3;     // of the points, and of the pose after each
 
 // The derivative is by the right perturbation of T_reference_camera; the covariance includes the point's own.
 using Residual = CorrespondenceResidual<6>;
@@ -282,30 +282,38 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   const auto min_inliers = std::max(kSample, static_cast<std::size_t>(std::max(0, options.min_inliers)));
   if (good.size() < min_inliers) return too_few(0, good.size());
 
-  Best best = search({good, camera, options}, options, guess);
+  const Problem problem(good, camera, options);
+  Best best = search(problem, options, guess);
+  auto inliers = problem.inliers(best.T);
 
-  // Uncertain points are where they most likely are if the pose is right. The inliers are counted once they no longer
-  // change: the first step of a refinement may lose some that the next ones find again.
-  std::vector<Correspondence> likeliest = good;
-  std::vector<std::uint32_t> uncertain;
-  for (std::uint32_t i = 0; i < good.size(); ++i)
-    if (!is_well_known(good[i])) uncertain.push_back(i);
-  const int min_rounds = uncertain.empty() ? 1 : 2;
-  const Problem problem(likeliest, camera, options);
-  std::vector<std::uint32_t> inliers;
+  // The inliers are counted once they no longer change: the first step of a refinement may lose some that the next ones
+  // find again.
   std::optional<Refined<PoseModel>> refined;
-  for (int round = 0;; ++round) {
-    const SE3 inverse = best.T.inverse();
-    for (const std::uint32_t i : uncertain) likeliest[i] = at_likeliest_point(good[i], camera, inverse);
-    auto again = problem.inliers(best.T);
-    const bool unchanged = round >= min_rounds && again == inliers;
-    inliers = std::move(again);
-    if (unchanged || round == kMaxRounds || inliers.size() < kSample) break;
+  for (int round = 0; round < 4 && inliers.size() >= kSample; ++round) {
     refined = refine_pose(problem, inliers, best.T, 10);
     if (!refined) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
     best.T = refined->state;
+    auto again = problem.inliers(best.T);
+    const bool unchanged = again == inliers;
+    inliers = std::move(again);
+    if (unchanged) break;
   }
   if (!refined || inliers.size() < min_inliers) return too_few(inliers.size(), good.size());
+
+  // Uncertain points are where they most likely are if the pose is right.
+  std::vector<Correspondence> likeliest = good;
+  const Problem corrected(likeliest, camera, options);
+  const bool uncertain =
+      options.correct_points && std::ranges::any_of(inliers, [&](std::uint32_t i) { return !is_well_known(good[i]); });
+  for (int round = 0; uncertain && round < kCorrections; ++round) {
+    const SE3 inverse = best.T.inverse();
+    for (const std::uint32_t i : inliers)
+      if (!is_well_known(good[i])) likeliest[i] = at_likeliest_point(good[i], camera, inverse);
+    const auto better = refine_pose(corrected, inliers, best.T, 10);
+    if (!better) break;
+    refined = better;
+    best.T = refined->state;
+  }
   if (options.limits && !options.limits->allow(best.T)) return too_few(0, good.size());
 
   Motion motion;
@@ -318,7 +326,7 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   int rows = 0;
   const SE3 inverse = best.T.inverse();
   for (const std::uint32_t i : inliers) {
-    const Residual r = problem.residual(inverse, likeliest[i], false);
+    const Residual r = corrected.residual(inverse, likeliest[i], false);
     squares += r.value.squaredNorm();
     rows += r.rows;
     motion.inliers.push_back(original[i]);

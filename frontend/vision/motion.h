@@ -48,6 +48,8 @@ struct MotionOptions {
   bool ordered = false;
   // Without limits, a vehicle that passes and fills the picture would be taken for a motion of the camera.
   std::optional<MotionLimits> limits;
+  // At the end, uncertain points are moved to where they most likely are by both views (likeliest_point.h).
+  bool correct_points = false;
 };
 
 struct Motion {

@@ -83,11 +83,7 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
     return match(features, points, same, [&](std::uint32_t, std::uint32_t f) {
       near.clear();
       const Vector2 seen(features[f].u, features[f].v);
-      grid.visit_near(seen, expected->radius, [&](std::uint32_t p) {
-        const Vector2 off = seen - expected->at[p];
-        if (expected->information.empty() || off.dot(expected->information[p] * off) < kNearSigmas * kNearSigmas)
-          near.push_back(p);
-      });
+      grid.visit_near(seen, expected->radius, [&](std::uint32_t p) { near.push_back(p); });
       std::sort(near.begin(), near.end());
       return std::span<const std::uint32_t>(near);
     });

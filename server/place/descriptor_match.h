@@ -22,19 +22,16 @@ struct DescriptorMatch {
 inline constexpr double kDescriptorRatio = 0.8;
 inline constexpr std::uint32_t kMaxDescriptorDistance = 270 * 270;  // squared; a descriptor's norm is 512
 
-// A feature that shows a point is at most this far from where an exact pose projects the exact point, as a share of the
+// A feature that shows a point is at most this far from where a good pose projects the point, as a share of the
 // picture's width.
 inline constexpr double kNearRadius = 0.02;
 
 // Where a model of the pictures, such as a pose, expects the points: a feature may be a point if it is less than
-// `radius` from there (pixels) and, if there are covariances (of pixels), within kNearSigmas of it.
+// `radius` from there (pixels).
 struct ExpectedPoints {
   std::vector<Vector2> at;  // by point
   double radius = 0;
-  std::vector<Eigen::Matrix2d> information =
-      {};  // by point, the inverse of its covariance; empty: the radius alone counts
 };
-inline constexpr double kNearSigmas = 3;
 
 // Returns mutual nearest neighbours that pass the ratio test, ascending by feature. `same(p, q)` says that points p and
 // q are one point of the world, so that they do not compete in the ratio test. If `expected` is null, every feature may

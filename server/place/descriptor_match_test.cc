@@ -68,19 +68,6 @@ TEST(DropOutdone, DropsWhatLooksMoreLikeAnotherPointUnlessThatIsTheSame) {
   EXPECT_EQ(matches.size(), 1u) << "one point of the world";
 }
 
-TEST(MatchPoints, AFeatureMayBeAPointOnlyWithinTheCovarianceOfItsPixel) {
-  Twins twins;
-  twins.feature.u = 100;
-  twins.feature.v = 50;
-  ExpectedPoints expected{{{120, 50}, {100, 70}}, 30};
-  EXPECT_TRUE(match_points({&twins.feature, 1}, twins.points, &expected).empty()) << "either";
-  const Eigen::Matrix2d wide = Eigen::Vector2d(10, 2).cwiseAbs2().cwiseInverse().asDiagonal();
-  expected.information = {wide, wide};
-  const auto matches = match_points({&twins.feature, 1}, twins.points, &expected);
-  ASSERT_EQ(matches.size(), 1u);
-  EXPECT_EQ(matches[0].point, 0u);
-}
-
 // As match_descriptors() says, from the distances of all pairs.
 std::vector<DescriptorMatch> by_all_pairs(std::span<const AppearanceFeature> features,
                                           std::span<const Descriptor* const> points,

@@ -170,21 +170,13 @@ std::vector<vision::Correspondence> correspond(const QueryPicture& query, const 
 // Matches each feature with points that the pose projects near it: in so small a part of the picture few features look
 // alike. How near depends on how well pose and point are known. If it did not, the points that are measured wrong in
 // the direction of a wrong pose would be matched and the others left out, and they would confirm it.
-std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query,
-                                        const Matrix6& covariance) {
+std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query) {
   const SE3 T_query_match = T_match_query.inverse();
-  const double floor = kNearRadius * query.camera.width / kNearSigmas;
-  double max_variance = floor * floor;
-  ExpectedPoints expected;
+  ExpectedPoints expected{{}, kNearRadius * query.camera.width};
   for (const MapPoint& point : map.points) {
-    const auto pixel = expect(point.point, point.covariance, query.camera, T_query_match, covariance);
-    expected.at.push_back(pixel ? pixel->pixel.head<2>() : Vector2(Vector2::Constant(kOutOfSight)));
-    Eigen::Matrix2d S = floor * floor * Eigen::Matrix2d::Identity();
-    if (pixel) S += pixel->covariance.topLeftCorner<2, 2>();
-    max_variance = std::max(max_variance, S.diagonal().maxCoeff());
-    expected.information.push_back(S.inverse());
+    const Vector3 p = T_query_match * point.point;
+    expected.at.push_back(p.z() > 0 ? query.camera.project(p).head<2>() : Vector2(Vector2::Constant(kOutOfSight)));
   }
-  expected.radius = kNearSigmas * std::sqrt(max_variance);
   std::vector<DescriptorMatch> matches = match_points(query.features, map.points, &expected);
   drop_outdone(query.features, map.points, points_of_centre(map), matches);
   return matches;
@@ -210,10 +202,11 @@ struct Fit {
 // Matches features again near where `T_match_query` predicts them. With the right pose that gains inliers; with a
 // chance pose it does not.
 Result<Fit> fit_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query,
-                     const Matrix6& covariance, vision::MotionOptions options) {
+                     vision::MotionOptions options) {
+  options.correct_points = true;
   options.enough = 1;  // a large share of inliers is no evidence here, since the pose selected the matches
   Fit found;
-  found.matches = match_near(query, map, T_match_query, covariance);
+  found.matches = match_near(query, map, T_match_query);
   found.matched = correspond(query, map, found.matches);
   auto motion = vision::estimate_motion(found.matched, query.camera, options, &T_match_query);
   if (!motion.ok()) return motion.status();
@@ -230,13 +223,14 @@ Result<Fit> fit(const QueryPicture& query, const MapPoints& map, std::vector<Des
   vision::MotionOptions options;
   options.seed = seed;
   options.max_trials = max_trials;
+  options.correct_points = true;
   options.min_inliers = query.camera.f > 0 ? kMinToGrow : kMinOfUnknownLens;
   auto pose = estimate_pose(correspondences, query.camera, options);
   if (!pose.ok()) return pose.status();
   Fit found{*std::move(pose), std::move(alike), correspondences, correspondences};
   if (query.camera.f == 0) return found;
   const std::size_t inliers = found.pose.motion.inliers.size();
-  if (auto again = fit_near(query, map, found.pose.motion.T_reference_camera, found.pose.motion.covariance, options);
+  if (auto again = fit_near(query, map, found.pose.motion.T_reference_camera, options);
       again.ok() && again->pose.motion.inliers.size() > inliers) {
     again->alike = std::move(found.alike);
     found = *std::move(again);
@@ -334,7 +328,7 @@ Result<StereoPlace> verify_in_main_frame(const storage::Graph& graph, const Quer
   options.seed = seed;
   options.max_trials = kQuickTrials;
   options.min_inliers = kMinInliers;  // that it is the place is known
-  auto again = fit_near(query, map, found.T_main_query, found.place.covariance, options);
+  auto again = fit_near(query, map, found.T_main_query, options);
   if (!again.ok()) return again.status();
   return judge(query, found.main_frame, map, *std::move(again));
 }
