@@ -67,10 +67,7 @@ TEST(Fleet, LosesNothingOverABadNetwork) {
     const BenchFigures bad = fleet(10, kRate * share);
     expect_all_there_once(bad);
     EXPECT_GT(bad["resent_share"], 0.03) << "the network was not bad";
-    // The first robots come round once all have sent some 330. On a busy machine they do not get so far in ten seconds.
-    if (bad["sent"] >= 400) {
-      EXPECT_GT(bad["closures"], 0) << "the map had nothing to do";
-    }
+    EXPECT_GT(bad["closures"], 0) << "the map had nothing to do";
     EXPECT_LE(bad["daemon_resident_mb"], bad["memory_budget_mb"]);
     const double again = published_figure("docs/figures.md", "share of bytes sent again \\| ([0-9.]+) %") / 100;
     // A machine that others use drops datagrams itself, which are sent again, too.

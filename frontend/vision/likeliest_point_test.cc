@@ -52,8 +52,8 @@ class Street {
   std::mt19937_64 random_;
 };
 
-// As if points were only where they were triangulated, these cameras come out 0.3 m and more too near to each other,
-// with a chi-square of 9 and more (median).
+// As if points were only where they were triangulated, these cameras come out 0.25 m and more too near to each other,
+// with a chi-square of 8 and more (median).
 TEST(LikeliestPoint, APoseFarFromAPlaceIsNotDrawnToItAndHasTheCovarianceItSays) {
   for (const double back : {0.5, 3.0, 8.0, 12.0}) {
     constexpr int kStreets = 120;
@@ -86,8 +86,7 @@ TEST(LikeliestPoint, IsBetweenWhereTheTwoViewsHaveIt) {
   const Correspondence moved = at_likeliest_point(c, kStereoCamera, T_camera_reference);
   EXPECT_GT(moved.point.z(), measured.z());
   EXPECT_LT(moved.point.z(), true_point.z());
-  // It is about along the ray; and the farther, the less is its depth
-  // known.
+  // It is about along the ray; and the farther, the less is its depth known.
   EXPECT_LT((kStereoCamera.project(moved.point) - kStereoCamera.project(measured)).head<2>().norm(), 1);
   EXPECT_GT(moved.point_covariance(2, 2), c.point_covariance(2, 2));
   // The difference from the projection tells the same, to first order, with the covariance of the new point.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -300,19 +301,20 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   }
   if (!refined || inliers.size() < min_inliers) return too_few(inliers.size(), good.size());
 
-  // Uncertain points are where they most likely are if the pose is right.
-  std::vector<Correspondence> likeliest = good;
-  const Problem corrected(likeliest, camera, options);
-  const bool uncertain =
-      options.correct_points && std::ranges::any_of(inliers, [&](std::uint32_t i) { return !is_well_known(good[i]); });
-  for (int round = 0; uncertain && round < kCorrections; ++round) {
-    const SE3 inverse = best.T.inverse();
-    for (const std::uint32_t i : inliers)
-      if (!is_well_known(good[i])) likeliest[i] = at_likeliest_point(good[i], camera, inverse);
-    const auto better = refine_pose(corrected, inliers, best.T, 10);
-    if (!better) break;
-    refined = better;
-    best.T = refined->state;
+  std::vector<std::uint32_t> uncertain;
+  if (options.correct_points)
+    std::ranges::copy_if(inliers, std::back_inserter(uncertain),
+                         [&](std::uint32_t i) { return !is_well_known(good[i]); });
+  if (!uncertain.empty()) {
+    const std::vector<Correspondence> measured = good;
+    for (int round = 0; round < kCorrections; ++round) {
+      const SE3 inverse = best.T.inverse();
+      for (const std::uint32_t i : uncertain) good[i] = at_likeliest_point(measured[i], camera, inverse);
+      const auto better = refine_pose(problem, inliers, best.T, 10);
+      if (!better) break;
+      refined = better;
+      best.T = refined->state;
+    }
   }
   if (options.limits && !options.limits->allow(best.T)) return too_few(0, good.size());
 
@@ -326,7 +328,7 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   int rows = 0;
   const SE3 inverse = best.T.inverse();
   for (const std::uint32_t i : inliers) {
-    const Residual r = corrected.residual(inverse, likeliest[i], false);
+    const Residual r = problem.residual(inverse, good[i], false);
     squares += r.value.squaredNorm();
     rows += r.rows;
     motion.inliers.push_back(original[i]);

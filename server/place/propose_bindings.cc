@@ -145,7 +145,9 @@ std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& gra
       }
     }
     if (first > kMaxDescriptorDistance || first > kDescriptorRatio * kDescriptorRatio * second) continue;
-    if (first < of_feature[best].distance) of_feature[best] = {of_feature[best].feature, target->point, first};
+    if (first >= of_feature[best].distance) continue;
+    of_feature[best].point = target->point;
+    of_feature[best].distance = first;
   }
 
   std::erase_if(of_feature, [](const DescriptorMatch& none) { return none.point == kNone; });

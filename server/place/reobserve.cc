@@ -199,8 +199,7 @@ std::vector<Aligned> agreeing(const std::vector<Aligned>& all, const StereoCamer
     correspondences.push_back({aligned.view->point,
                                {aligned.pixel.x(), aligned.pixel.y(), kNoRight},
                                kAgreementSigma * pixel_sigma(aligned.level),
-                               aligned.view->covariance,
-                               aligned.view->T_match_frame.t});
+                               aligned.view->covariance});
   vision::MotionOptions options;
   options.min_inliers = kMinAligned;
   const auto motion = vision::estimate_motion(correspondences, camera, options, &T_match_frame);

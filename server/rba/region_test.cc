@@ -127,7 +127,7 @@ TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {
   for (std::size_t e = 0; e < problem_.edges.size(); ++e) {
     const ProblemEdge& edge = problem_.edges[e];
     if (edge.column >= 0) {
-      EXPECT_TRUE(!edge.prior_doubted || uses[e] >= static_cast<std::int32_t>(storage::kMinSupport));
+      EXPECT_TRUE((edge.prior && !edge.prior_doubted) || uses[e] >= static_cast<std::int32_t>(storage::kMinSupport));
     }
   }
   EffectiveSupport support;

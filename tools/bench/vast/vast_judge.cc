@@ -143,9 +143,7 @@ class TownJudge {
       if (table_) tell(edge, T, error);
       if (edge.kind != storage::EdgeKind::kLoop) {
         if (!edge.carried_by.empty()) carried_.insert(edge.b);
-        const sim::CityDrive& drive = robot(edge.b).drive();
-        if (!drive.at(edge.a.index).running && !drive.at(edge.b.index).running)
-          verdict.step_error_m.push_back(error.t.norm());
+        if (!rode({edge.b.session, edge.a.index, edge.b.index})) verdict.step_error_m.push_back(error.t.norm());
         continue;
       }
       verdict.carried_wrongly += edge.carried.session != 0 && !rode(edge.carried);
