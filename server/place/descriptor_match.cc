@@ -124,7 +124,8 @@ void drop_outdone(std::span<const AppearanceFeature> features, std::span<const M
   std::erase_if(matches, [&](const DescriptorMatch& match) {
     const Descriptor& seen = features[match.feature].descriptor;
     return std::ranges::any_of(points.first(rivals), [&](const MapPoint& rival) {
-      return squared_distance(seen, *rival.descriptor) < match.distance && !one_point(rival, points[match.point]);
+      return squared_distance(seen, *rival.descriptor) < kDescriptorRatio * kDescriptorRatio * match.distance &&
+             !one_point(rival, points[match.point]);
     });
   });
 }

@@ -50,9 +50,11 @@ std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> fea
 // and landmark. Ascending by feature.
 std::vector<DescriptorMatch> nearest_of_all(std::vector<DescriptorMatch> matches, std::span<const MapPoint> points);
 
-// Drops the matches whose feature looks more like one of the first `rivals` points, unless that is the same point of
-// the world. Among points that are expected near a feature one is always the nearest, whether or not it is the right
-// one; among all points of a picture it is the right one as a rule, or none.
+// Drops the matches whose feature looks more like one of the first `rivals` points, by the ratio of the ratio test,
+// unless that is the same point of the world. Among points that are expected near a feature one is always the nearest,
+// whether or not it is the right one; among all points of a picture the right one, if it is there, is much nearer than
+// the others. One that is only just nearer says nothing: from another viewpoint the right point looks little more alike
+// than the best of hundreds.
 void drop_outdone(std::span<const AppearanceFeature> features, std::span<const MapPoint> points, std::size_t rivals,
                   std::vector<DescriptorMatch>& matches);
 

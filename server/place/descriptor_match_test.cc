@@ -52,7 +52,7 @@ TEST(MatchPoints, OnlyPointsThatAreExpectedNearCompete) {
   EXPECT_TRUE(match_points({&twins.feature, 1}, twins.points, &expected).empty());
 }
 
-TEST(DropOutdone, DropsWhatLooksMoreLikeAnotherPointUnlessThatIsTheSame) {
+TEST(DropOutdone, DropsWhatLooksFarMoreLikeAnotherPointUnlessThatIsTheSame) {
   Twins twins;  // two points that look like the feature
   std::vector<DescriptorMatch> matches{{0, 1, 100}};
   drop_outdone({&twins.feature, 1}, twins.points, 0, matches);
@@ -66,6 +66,17 @@ TEST(DropOutdone, DropsWhatLooksMoreLikeAnotherPointUnlessThatIsTheSame) {
   matches = {{0, 1, 100}};
   drop_outdone({&twins.feature, 1}, twins.points, 2, matches);
   EXPECT_EQ(matches.size(), 1u) << "one point of the world";
+}
+
+TEST(DropOutdone, TheOtherPointMustWinTheRatioTest) {
+  Twins twins;
+  twins.feature.descriptor[0] += 8;  // both points are at a squared distance of 64
+  std::vector<DescriptorMatch> matches{{0, 1, 100}};
+  drop_outdone({&twins.feature, 1}, twins.points, 1, matches);
+  EXPECT_EQ(matches.size(), 1u) << "0.8 times as far, which is not less";
+  matches = {{0, 1, 101}};
+  drop_outdone({&twins.feature, 1}, twins.points, 1, matches);
+  EXPECT_TRUE(matches.empty());
 }
 
 // As match_descriptors() says, from the distances of all pairs.
