@@ -24,7 +24,8 @@ constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memor
 
 }  // namespace
 
-LookupQueue::LookupQueue(std::shared_ptr<storage::Budget> budget) : budget_(std::move(budget)) {}
+LookupQueue::LookupQueue(std::shared_ptr<storage::Budget> budget, std::chrono::milliseconds max_lag)
+    : budget_(std::move(budget)), max_lag_(max_lag) {}
 LookupQueue::~LookupQueue() { stop(); }
 
 void LookupQueue::start(std::size_t threads, LookUp look_up, Journal journal, std::function<void()> on_change) {
@@ -125,7 +126,9 @@ double LookupQueue::lag_s() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - tickets_.begin()->second).count();
 }
 
-bool LookupQueue::is_full(std::size_t queued) const { return waiting() + queued >= kMaxWaiting; }
+bool LookupQueue::is_full(std::size_t queued) const {
+  return waiting() + queued >= kMaxWaiting || lag_s() > std::chrono::duration<double>(max_lag_).count();
+}
 
 std::vector<storage::FrameRange> LookupQueue::later_than(const Pushed& pushed) const {
   const MutexLock lock(mutex_);

@@ -24,9 +24,11 @@
 
 namespace relmap::map {
 
-// Frames that wait at once. While there are so many, robots wait, and send later, instead of learning later where they
-// are. At the 30 lookups a second of a single thread where every frame returns to a place, the last waits for 9 s.
+// While so many frames wait, or one has waited for so long, robots wait, and send later, instead of learning later
+// where they are. The number bounds the memory of what waits, the time how late a robot learns it where lookups are
+// slow: on a single thread, where every frame returns to a place, 256 took 9 s.
 inline constexpr std::size_t kMaxWaiting = 256;
+inline constexpr std::chrono::milliseconds kMaxLookupLag{4000};
 
 // Thread-safe.
 class LookupQueue {
@@ -42,7 +44,7 @@ class LookupQueue {
   using Durable = std::function<void(bool)>;
   using Journal = std::function<bool(const storage::JournalRecord&, Durable done)>;
 
-  explicit LookupQueue(std::shared_ptr<storage::Budget> budget);
+  explicit LookupQueue(std::shared_ptr<storage::Budget> budget, std::chrono::milliseconds max_lag = kMaxLookupLag);
   // Calls stop().
   ~LookupQueue();
   LookupQueue(const LookupQueue&) = delete;
@@ -74,8 +76,9 @@ class LookupQueue {
   bool is_waiting(SessionNumber session) const;
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
-  // Whether the frames that wait, and the `queued` records that may become such frames, are kMaxWaiting or more, so
-  // that no more keyframes should be taken in before some have been looked up.
+  // Whether the frames that wait, and the `queued` records that may become such frames, are kMaxWaiting or more, or a
+  // frame has waited for longer than `max_lag`, so that no more keyframes should be taken in before some have been
+  // looked up.
   bool is_full(std::size_t queued) const;
 
  private:
@@ -100,6 +103,7 @@ class LookupQueue {
   void close_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
 
   const std::shared_ptr<storage::Budget> budget_;
+  const std::chrono::milliseconds max_lag_;
   mutable Mutex mutex_;
   ConditionVariable changed_;
   std::deque<Pushed> queue_ RELMAP_GUARDED_BY(mutex_);  // for the threads

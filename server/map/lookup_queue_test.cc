@@ -187,6 +187,15 @@ TEST_F(LookupQueueTest, TheLagIsThatOfTheFrameThatWaitsLongest) {
   EXPECT_EQ(queue_.lag_s(), 0);
 }
 
+TEST_F(LookupQueueTest, IsFullOnceAFrameHasWaitedForLong) {
+  LookupQueue slow(budget_, std::chrono::milliseconds(20));
+  slow.push({1, 0});
+  while (slow.lag_s() <= 0.02) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_TRUE(slow.is_full(0));
+  queue_.push({1, 0});
+  EXPECT_FALSE(queue_.is_full(0)) << "it has only just come";
+}
+
 TEST_F(LookupQueueTest, LookupsGoOnWhileWhatTheOthersFoundIsWritten) {
   holds_back_ = true;
   for (std::uint32_t i = 0; i < 3; ++i) queue_.push({1, i});

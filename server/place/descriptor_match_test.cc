@@ -71,9 +71,9 @@ TEST(DropOutdone, DropsWhatLooksFarMoreLikeAnotherPointUnlessThatIsTheSame) {
 TEST(DropOutdone, TheOtherPointMustWinTheRatioTest) {
   Twins twins;
   twins.feature.descriptor[0] += 8;  // both points are at a squared distance of 64
-  std::vector<DescriptorMatch> matches{{0, 1, 100}};
+  std::vector<DescriptorMatch> matches{{0, 1, 99}};
   drop_outdone({&twins.feature, 1}, twins.points, 1, matches);
-  EXPECT_EQ(matches.size(), 1u) << "0.8 times as far, which is not less";
+  EXPECT_EQ(matches.size(), 1u) << "more than 0.8 times as far";
   matches = {{0, 1, 101}};
   drop_outdone({&twins.feature, 1}, twins.points, 1, matches);
   EXPECT_TRUE(matches.empty());
