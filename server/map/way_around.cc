@@ -21,6 +21,7 @@ namespace {
 // A search frame by frame ends there: it takes 200 ms of a lookup's thread, and in a town that was driven eight times
 // it comes 800 m far. With a quarter of this, rides by train are not noticed (docs/decisions/closures.md).
 constexpr std::size_t kMaxFrames = std::size_t{1} << 17;
+constexpr std::uint32_t kLateEvery = 16;
 
 bool is_closure_in_force(const storage::Edge& edge) {
   return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted;
@@ -41,20 +42,35 @@ bool is_joined_to_another(const storage::Graph& graph, FrameId frame, const stor
          });
 }
 
-// The last frame before `query` that is joined to another session, if a stop lies between the two.
+// Whether stops that lie further back than the last joined frame are looked for, too: at every kLateEvery-th frame, and
+// while ways around one were found a few frames ago, since one closure alone does not tell of a ride.
+bool looks_further_back(const storage::Graph& graph, FrameId query) {
+  if (query.index % kLateEvery == 0) return true;
+  for (std::uint32_t back = 1; back < kLateEvery && back <= query.index; ++back)
+    if (const auto hot = graph.hot({query.session, query.index - back}))
+      if (std::ranges::any_of(hot->edges, [](const storage::Edge& edge) { return edge.around != nullptr; }))
+        return true;
+  return false;
+}
+
+// The last frame that is joined to another session before the last stop of which nothing tells whether it was a ride.
 std::optional<FrameId> joined_before_stop(const storage::Graph& graph, FrameId query) {
-  bool stopped = false;
+  bool stopped = false, further_back = false;
   Standing standing;
-  std::uint32_t covered = query.index;  // back to here closures with its own past measure its motion
+  std::uint32_t covered = query.index;  // back to here closures measure its motion
   for (FrameId at = query; at == query || within_motion_reach(at, query);) {
     const auto hot = graph.hot(at);
     const storage::Edge* motion = hot ? storage::motion_to(*hot) : nullptr;
     if (!hot) return std::nullopt;
     if (at != query) {
-      if (is_joined_to_another(graph, at, *hot)) return stopped ? std::optional(at) : std::nullopt;
+      if ((stopped || !further_back) && is_joined_to_another(graph, at, *hot)) {
+        if (stopped) return at;
+        if (!looks_further_back(graph, query)) return std::nullopt;
+        further_back = true;
+      }
       for (const storage::Edge& edge : hot->edges)
-        if (is_closure_in_force(edge) && !is_bridge(edge) && within_motion_reach(edge.a, at))
-          covered = std::min(covered, edge.a.index);
+        if (is_closure_in_force(edge) && !is_bridge(edge))
+          if (const auto own = own_motion(edge)) covered = std::min(covered, own->from.index);
     }
     if (!motion || !motion->in_graph() || motion->source == MotionSource::kUnsensed) return std::nullopt;
     if (motion->carried_by.empty() && motion->a.index < covered)

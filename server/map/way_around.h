@@ -23,9 +23,12 @@ inline constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};
 
 // Finds the way for a proposal; null if
 //   - the proposal is with its session's own past, at most kMotionReach keyframes back, which tells the same;
-//   - between its query and the last frame before it that a closure in force joins to another session, the robot did
-//     not stand still for kMinRideSeconds, or that frame is more than kMotionReach keyframes back, or there is motion
-//     that nothing sensed, or a closure with the session's own past leads over the stop;
+//   - in the kMotionReach keyframes before its query the robot did not stand still for kMinRideSeconds, or only where
+//     closures in force tell its motion, or there is motion that nothing sensed, or no frame before that stop is joined
+//     to another session by a closure in force;
+//   - a frame between the stop and the query is joined to another session already, so that a way was sought before,
+//     and it is not the turn of this query: every 16th seeks again, since the map may have got a way in the meantime,
+//     and so do those that follow one that found a way;
 //   - the map has no way from that frame to the match, or both the shortest way and the one with the least standing
 //     lead through such a stop themselves, along a carried stretch, over motion that was not measured or through a
 //     deleted session, so that they tell nothing.

@@ -169,6 +169,35 @@ TEST(WayAround, AFalsePlaceBehindAStopIsRefusedByTheOdometry) {
   EXPECT_EQ(right.reason, Reason::CONSISTENT);
 }
 
+// When the rider comes back to what the guide saw, nothing measures the guide's way past the ride, so nothing tells
+// that the rider was carried. That comes later.
+TEST(WayAround, ARideIsNoticedOnceTheMapGetsAWayAroundIt) {
+  GuidedRide drive;
+  const auto is_known = [&] { return !storage::find_edge(drive.map(), RiddenDrive::ride())->carried_by.empty(); };
+  drive.map().edit_hot({kGuideSession, 45}).edges.front().carried_by = {{{kGuideSession, 46}, 1}};
+  std::uint32_t i = RiddenDrive::kAlights;
+  for (; RiddenDrive::frame(i).index < 64; ++i) {
+    const storage::ClosureProposalRecord proposal = drive.looked_up(i);
+    EXPECT_FALSE(proposal.around) << i;
+    drive.propose(proposal);
+  }
+  ASSERT_EQ(drive.closure_of(i - 1).state, storage::EdgeState::kAccepted);
+  drive.map().edit_hot({kGuideSession, 45}).edges.front().carried_by.clear();
+
+  const std::uint32_t sought = i;
+  for (; i < sought + 32 && !is_known(); ++i) {
+    const storage::ClosureProposalRecord proposal = drive.looked_up(i);
+    EXPECT_TRUE(proposal.around) << i << ": the 64th frame seeks, and those that follow";
+    drive.propose(proposal);
+  }
+  ASSERT_TRUE(is_known());
+  EXPECT_EQ(drive.closure_of(sought).reason, Reason::CARRIED);
+  EXPECT_EQ(drive.closure_of(60).state, storage::EdgeState::kAccepted) << "those behind the ride were right, too";
+  EXPECT_EQ(drive.closure_of(kJoined).state, storage::EdgeState::kAccepted) << "and those before it";
+  EXPECT_FALSE(drive.looked_up(i).around) << "it is known";
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
 // A robot of session 1 comes along a street, stops between its frames 3 and 4, and is recognised at frame 5 in the last
 // frame of session 2, which drives from 1:1 on. Edges are a metre long.
 class HandMadeWay : public ::testing::Test {
@@ -212,6 +241,32 @@ TEST_F(HandMadeWay, BeginsAtTheLastFrameThatIsJoinedBeforeTheStop) {
   EXPECT_EQ(found()->from, (FrameId{1, 3}));
   join({2, 3}, {1, 4}, {});
   EXPECT_FALSE(found()) << "it is joined behind the stop";
+}
+
+TEST_F(HandMadeWay, IsSoughtAgainAtEvery16thFrameWhileNothingTellsOfTheStop) {
+  for (std::uint32_t i = 6; i <= 18; ++i) {
+    graph_.add_frame({1, i});
+    graph_.add_edge({1, i - 1}, {1, i}, 0, kMetre);
+  }
+  join({2, 3}, {1, 4}, {});  // behind the stop
+  const auto found_at = [&](std::uint32_t index) {
+    storage::ClosureProposalRecord proposal;
+    proposal.query = {1, index};
+    proposal.match = {2, 5};
+    proposal.covariance = 1e-4 * Matrix6::Identity();
+    return way_around(graph_, proposal);
+  };
+  EXPECT_FALSE(found_at(15));
+  EXPECT_FALSE(found_at(17));
+  const auto around = found_at(16);
+  ASSERT_TRUE(around);
+  EXPECT_EQ(around->from, (FrameId{1, 1}));
+  join({3, 0}, {1, 16}, {});
+  graph_.edit_hot({1, 16}).edges.back().around = around;
+  graph_.edit_hot({1, 16}).edges.back().state = storage::EdgeState::kCandidate;
+  EXPECT_TRUE(found_at(17)) << "one closure alone does not tell of a ride";
+  graph_.edit_hot({1, 16}).edges.back().state = storage::EdgeState::kAccepted;
+  EXPECT_FALSE(found_at(17)) << "that it leads over the stop is told now";
 }
 
 TEST_F(HandMadeWay, TellsNothingIfSomebodyStoodOrWasCarriedOnIt) {
