@@ -21,6 +21,8 @@ namespace {
 // A search frame by frame ends there: it takes 200 ms of a lookup's thread, and in a town that was driven eight times
 // it comes 800 m far. With a quarter of this, rides by train are not noticed (docs/decisions/closures.md).
 constexpr std::size_t kMaxFrames = std::size_t{1} << 17;
+// A stop of which nothing tells is looked for at each of so many queries only, since that means going back through up
+// to kMotionReach frames and searching in vain as long as the map has no way.
 constexpr std::uint32_t kLateEvery = 16;
 
 bool is_closure_in_force(const storage::Edge& edge) {

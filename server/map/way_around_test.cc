@@ -218,9 +218,9 @@ class HandMadeWay : public ::testing::Test {
     const auto ordinal = static_cast<std::uint32_t>(graph_.edit_hot(b).edges.size());
     graph_.add_edge(a, b, ordinal, T_ab);
   }
-  std::shared_ptr<const storage::WayAround> found() const {
+  std::shared_ptr<const storage::WayAround> found(std::uint32_t query = 5) const {
     storage::ClosureProposalRecord proposal;
-    proposal.query = {1, 5};
+    proposal.query = {1, query};
     proposal.match = {2, 5};
     proposal.covariance = 1e-4 * Matrix6::Identity();
     return way_around(graph_, proposal);
@@ -249,24 +249,17 @@ TEST_F(HandMadeWay, IsSoughtAgainAtEvery16thFrameWhileNothingTellsOfTheStop) {
     graph_.add_edge({1, i - 1}, {1, i}, 0, kMetre);
   }
   join({2, 3}, {1, 4}, {});  // behind the stop
-  const auto found_at = [&](std::uint32_t index) {
-    storage::ClosureProposalRecord proposal;
-    proposal.query = {1, index};
-    proposal.match = {2, 5};
-    proposal.covariance = 1e-4 * Matrix6::Identity();
-    return way_around(graph_, proposal);
-  };
-  EXPECT_FALSE(found_at(15));
-  EXPECT_FALSE(found_at(17));
-  const auto around = found_at(16);
+  EXPECT_FALSE(found(15));
+  EXPECT_FALSE(found(17));
+  const auto around = found(16);
   ASSERT_TRUE(around);
   EXPECT_EQ(around->from, (FrameId{1, 1}));
   join({3, 0}, {1, 16}, {});
   graph_.edit_hot({1, 16}).edges.back().around = around;
   graph_.edit_hot({1, 16}).edges.back().state = storage::EdgeState::kCandidate;
-  EXPECT_TRUE(found_at(17)) << "one closure alone does not tell of a ride";
+  EXPECT_TRUE(found(17)) << "one closure alone does not tell of a ride";
   graph_.edit_hot({1, 16}).edges.back().state = storage::EdgeState::kAccepted;
-  EXPECT_FALSE(found_at(17)) << "that it leads over the stop is told now";
+  EXPECT_FALSE(found(17)) << "that it leads over the stop is told now";
 }
 
 TEST_F(HandMadeWay, TellsNothingIfSomebodyStoodOrWasCarriedOnIt) {
