@@ -18,7 +18,7 @@ namespace {
 constexpr Colour kGrid{233, 233, 228}, kBorder{214, 214, 208};
 constexpr double kNarrow = 420;             // points; narrower panels have smaller margins and letters
 constexpr std::size_t kNamedSessions = 12;  // if there are more, they are labelled with their numbers
-constexpr std::size_t kCrowd = 2000;        // closures; of more, the ends are not marked
+constexpr std::ptrdiff_t kCrowd = 2000;     // closures; of more, the ends are not marked
 
 double inset_of(double width) { return width < kNarrow ? 22 : 34; }
 
@@ -275,7 +275,9 @@ class MapPanel::Pen {
     Vector2 a, b;
     for (ClosureStyle style : closure_styles()) {
       // Hundreds of closures of full width would hide the route, and thousands all that was driven.
-      const bool crowded = contents_.count(style.kind) > kCrowd;
+      const bool crowded = std::ranges::count_if(picture_.edges, [&](const MapPicture::Edge& edge) {
+                             return edge.kind == style.kind && find(edge.a, a) && find(edge.b, b);
+                           }) > kCrowd;
       if (picture_.route || crowded) style.stroke.width *= 0.4;
       std::set<std::array<std::int64_t, 4>> drawn;  // the points of the page that closures of this style join already
       for (const MapPicture::Edge& edge : picture_.edges) {

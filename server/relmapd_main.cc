@@ -27,7 +27,7 @@ constexpr const char* kFooter = R"(examples:
   relmapd --data map --listen 0.0.0.0:50070 --insecure   # anyone who can reach the port may edit the map
 
 Some settings have no option and are set in the configuration file: ingest.* (which robots may send, and how much),
-rpc.*, routes.mixes, rba.*, disk_low_water_mb, commit_interval_ms. server/README.md describes them.
+rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms. server/README.md describes them.
 
 SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
 once, without loss: the next start applies the rest.

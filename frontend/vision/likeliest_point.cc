@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kNearest = 1e-3;     // metres; nothing nearer can be seen
 constexpr double kMinInverse = 0.05;  // of the measured inverse distance; less says nothing of the distance any more
-constexpr double kWellKnown = 0.02;   // of the distance, one sigma
+// Of the distance, one sigma: what the shape of the error then moves a point by is of second order, 0.0004 of it.
+constexpr double kWellKnown = 0.02;
 constexpr int kIterations = 4;
 
 // The point as a function of its error e in the reference frame, with mean zero and covariance c.point_covariance: what

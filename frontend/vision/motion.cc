@@ -309,9 +309,13 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
     const std::vector<Correspondence> measured = good;
     for (int round = 0; round < kCorrections; ++round) {
       const SE3 inverse = best.T.inverse();
+      const std::vector<Correspondence> before = good;
       for (const std::uint32_t i : uncertain) good[i] = at_likeliest_point(measured[i], camera, inverse);
       const auto better = refine_pose(problem, inliers, best.T, 10);
-      if (!better) break;
+      if (!better) {
+        std::ranges::copy(before, good.begin());
+        break;
+      }
       refined = better;
       best.T = refined->state;
     }

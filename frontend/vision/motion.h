@@ -48,7 +48,8 @@ struct MotionOptions {
   bool ordered = false;
   // Without limits, a vehicle that passes and fills the picture would be taken for a motion of the camera.
   std::optional<MotionLimits> limits;
-  // At the end, uncertain points are moved to where they most likely are by both views (likeliest_point.h).
+  // At the end, uncertain points are moved to where they most likely are by both views (likeliest_point.h), and the
+  // pose is refined with them. Which ones are inliers is not decided again. Only estimate_motion() does so.
   bool correct_points = false;
 };
 

@@ -22,6 +22,10 @@ constexpr std::size_t kBytesPushed = 32;         // of a frame in pushed_, which
 constexpr int kViews = 3;                        // attempts in a row, each on a new view
 constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memory, or for the disk
 
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
 }  // namespace
 
 LookupQueue::LookupQueue(std::shared_ptr<storage::Budget> budget, std::chrono::milliseconds max_lag)
@@ -122,12 +126,16 @@ bool LookupQueue::is_waiting(SessionNumber session) const {
 
 double LookupQueue::lag_s() const {
   const MutexLock lock(mutex_);
-  if (tickets_.empty()) return 0;
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - tickets_.begin()->second).count();
+  return tickets_.empty() ? 0 : seconds_since(tickets_.begin()->second);
 }
 
 bool LookupQueue::is_full(std::size_t queued) const {
-  return waiting() + queued >= kMaxWaiting || lag_s() > std::chrono::duration<double>(max_lag_).count();
+  return waiting() + queued >= kMaxWaiting || next_has_waited_s() > std::chrono::duration<double>(max_lag_).count();
+}
+
+double LookupQueue::next_has_waited_s() const {
+  const MutexLock lock(mutex_);
+  return queue_.empty() ? 0 : seconds_since(tickets_.at(queue_.front().ticket));
 }
 
 std::vector<storage::FrameRange> LookupQueue::later_than(const Pushed& pushed) const {

@@ -94,6 +94,7 @@ struct Mapper::Impl {
     changed.notify_all();
   }
   Status health() const;
+  Status keeps_up() const;
   Status storage_status() const {
     const MutexLock lock(mutex);
     return storage;
@@ -457,18 +458,27 @@ Status Mapper::Impl::health() const {
   return journal.ok() || failed ? storage : journal;
 }
 
+// BUDGET_EXCEEDED while keyframes come in faster than they are looked up and applied. If that is because the disk takes
+// nothing of what is found, the disk's reason.
+Status Mapper::Impl::keeps_up() const {
+  const char* behind = nullptr;
+  // Lookups share the queue's memory, and what they find must still fit in.
+  if (lookups.is_full(recognises_places() ? writer->waiting() + durable.size() : 0))
+    behind = "place recognition is too far behind";
+  else if (durable.lag_s() > static_cast<double>(kMaxWorkerLag.count()))
+    behind = "the worker is too far behind";
+  if (!behind) return {};
+  const Status disk = health();
+  return disk.ok() ? Status(Reason::BUDGET_EXCEEDED, behind) : disk;
+}
+
 Status Mapper::Impl::submit(storage::JournalRecord record, Done done) {
   if (failed) return health();
   // While commits fail, dirty parts cannot leave memory, so no more is taken in than fits.
   if (budget->used(storage::Share::kDirty) > budget->allowance(storage::Share::kDirty))
     if (Status status = health(); !status.ok()) return status;
-  // Lookups share the queue's memory, and what they find must still fit in.
-  if (std::holds_alternative<storage::KeyframeRecord>(record)) {
-    if (lookups.is_full(recognises_places() ? writer->waiting() + durable.size() : 0))
-      return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
-    if (durable.lag_s() > static_cast<double>(kMaxWorkerLag.count()))
-      return {Reason::BUDGET_EXCEEDED, "the worker is too far behind"};
-  }
+  if (std::holds_alternative<storage::KeyframeRecord>(record))
+    if (Status pace = keeps_up(); !pace.ok()) return pace;
   return writer->submit(std::move(record), std::move(done));
 }
 

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "server/map/derived.h"
+#include "server/map/lookup_queue.h"
 #include "server/map/testing/points_drive.h"
 #include "storage/testing/fault_engine.h"
 #include "storage/testing/faulty_files.h"
@@ -372,6 +373,44 @@ TEST(Mapper, AFailingJournalIsReportedAndRecoversByItself) {
   ASSERT_TRUE(mapper->wait_idle(soon()).ok());
   EXPECT_EQ(mapper->view()->sessions()[0].frames, 30u);
   EXPECT_THAT(derived_differences(*mapper->view()), testing::IsEmpty());
+}
+
+// While the disk takes nothing of what lookups find, these fall behind: that is not what is wrong.
+TEST(Mapper, WhileLookupsWaitForAFailingDiskTheReasonIsTheDisks) {
+  sim::PointsWorldOptions world_options = small_world(118);
+  world_options.births = 30;
+  world_options.appearance = 150;
+  const sim::PointsWorld world(world_options);
+  const FailingDisk disk;
+  MapperOptions options;
+  options.lookup_threads = 1;
+  const auto mapper =
+      Mapper::open(
+          disk.open(), std::make_shared<storage::Budget>(std::size_t{256} << 20),
+          place::Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw(),
+          options)
+          .or_throw();
+  std::uint32_t next = 60;  // a lap
+  ASSERT_TRUE(feed(*mapper, world, 0, next).ok());
+  // The disk may fail too late, when all lookups of these ten frames have ended.
+  const auto waits = [&] {
+    while (mapper->stats().lookup_lag > 1 && mapper->stats().lookup_lag_s < 1.5e-3 * kMaxLookupLag.count())
+      std::this_thread::sleep_for(5ms);
+    return mapper->stats().lookup_lag > 1;
+  };
+  do {
+    disk.journal->write = Reason::OK;
+    feed_patiently(*mapper, world, next, next + 10);
+    next += 10;
+    disk.journal->write = Reason::DISK_FULL;
+  } while (!waits() && next < 110);
+  ASSERT_LT(next, 110u);
+  storage::KeyframeRecord record = keyframe_record(world, next);
+  record.session = mapper->view()->sessions()[0].number;
+  EXPECT_EQ(mapper->submit(record, [](const auto&) {}).reason(), Reason::DISK_FULL);
+  disk.journal->write = Reason::OK;
+  EXPECT_TRUE(mapper->wait_idle(soon()).ok());
+  EXPECT_EQ(mapper->stats().lookup_lag, 0u);
 }
 
 // Records that queue behind a failing one fail with it, so that they do not overtake it.

@@ -117,6 +117,7 @@ class Unseen : public TwoLaps {
 };
 
 TEST_F(Unseen, ClosuresGoOutOfForceWhenMoreFramesSeeNothingThanClosuresAgree) {
+  // Next to each other, so that the three agree: with frames between them the robot's own steps speak against one.
   for (const std::uint32_t query : {62, 63, 64}) propose_wrongly(query);
   not_seen(70, 7, 64);
   for (const std::uint32_t query : {62, 63, 64}) EXPECT_EQ(state(query), storage::EdgeState::kAccepted) << query;

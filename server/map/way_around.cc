@@ -44,14 +44,20 @@ bool is_joined_to_another(const storage::Graph& graph, FrameId frame, const stor
          });
 }
 
-// Whether stops that lie further back than the last joined frame are looked for, too: at every kLateEvery-th frame, and
-// while ways around one were found a few frames ago, since one closure alone does not tell of a ride.
+// What was outvoted or taken out tells nothing.
+bool tells_of_a_way(const storage::Edge& edge) {
+  return edge.around != nullptr &&
+         (edge.state == storage::EdgeState::kCandidate || edge.state == storage::EdgeState::kAccepted);
+}
+
+// Whether stops that lie further back than the last joined frame are looked for, too: at frames whose index is a
+// multiple of kLateEvery, and while ways around one were found a few frames ago, since one closure alone does not tell
+// of a ride.
 bool looks_further_back(const storage::Graph& graph, FrameId query) {
   if (query.index % kLateEvery == 0) return true;
   for (std::uint32_t back = 1; back < kLateEvery && back <= query.index; ++back)
     if (const auto hot = graph.hot({query.session, query.index - back}))
-      if (std::ranges::any_of(hot->edges, [](const storage::Edge& edge) { return edge.around != nullptr; }))
-        return true;
+      if (std::ranges::any_of(hot->edges, tells_of_a_way)) return true;
   return false;
 }
 

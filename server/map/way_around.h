@@ -27,8 +27,8 @@ inline constexpr route::RouteWeights kWithoutStops{.standing_second = 1000};
 //     closures in force tell its motion, or there is motion that nothing sensed, or no frame before that stop is joined
 //     to another session by a closure in force;
 //   - a frame between the stop and the query is joined to another session already, so that a way was sought before,
-//     and it is not the turn of this query: every 16th seeks again, since the map may have got a way in the meantime,
-//     and so do those that follow one that found a way;
+//     and it is not the turn of this query: those whose index is a multiple of 16 seek again, since the map may have
+//     got a way in the meantime, and so do those that follow one that found a way;
 //   - the map has no way from that frame to the match, or both the shortest way and the one with the least standing
 //     lead through such a stop themselves, along a carried stretch, over motion that was not measured or through a
 //     deleted session, so that they tell nothing.

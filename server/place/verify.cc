@@ -168,8 +168,9 @@ std::vector<vision::Correspondence> correspond(const QueryPicture& query, const 
 }
 
 // Matches each feature with points that the pose projects near it: in so small a part of the picture few features look
-// alike. How near depends on how well pose and point are known. If it did not, the points that are measured wrong in
-// the direction of a wrong pose would be matched and the others left out, and they would confirm it.
+// alike. One of them is always the likest, so what is another point of the candidate's picture is dropped: it would
+// confirm the pose whether that is right or not. (A part that is as large as pose and point are uncertain was tried:
+// docs/decisions/localisation.md.)
 std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query) {
   const SE3 T_query_match = T_match_query.inverse();
   ExpectedPoints expected{{}, kNearRadius * query.camera.width};
