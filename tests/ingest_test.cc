@@ -16,7 +16,7 @@ TEST(Ingest, AnyNumberOfLookupThreadsAndOfRobotsFindTheSame) {
   const storage::TemporaryFolder folder;
   const std::string drive = folder / "drive", keyframes = folder / "drive.bin";
   for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
-           {built_program("relmap-sim"), "pictures", "--out", drive, "--pairs", "180", "--laps", "1.7", "--width",
+           {built_program("relmap-sim"), "pictures", "--out", drive, "--pairs", "120", "--laps", "1.7", "--width",
             "400"},
            {built_program("relmap-frontend"), "--source", "sim", drive, "--robot", "r", "--out", keyframes}}) {
     const Finished made = run_program(command, std::chrono::seconds(300));

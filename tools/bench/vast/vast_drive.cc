@@ -40,17 +40,24 @@ json to_json(const VastSample& sample) {
           {"closures", sample.closures}};
 }
 
+json to_json(const VastQuestion& question) { return {{"frames", question.frames}, {"ms", question.ms}}; }
+
+template <typename Item>
+json to_json(const std::vector<Item>& items) {
+  json all = json::array();
+  for (const Item& item : items) all.push_back(to_json(item));
+  return all;
+}
+
 json to_json(const VastProgress& progress) {
-  json samples = json::array();
-  for (const VastSample& sample : progress.samples) samples.push_back(to_json(sample));
   return {{"s", progress.s},
           {"cpu_s", progress.cpu_s},
           {"kills", progress.kills},
           {"starts_s", progress.starts_s},
           {"peak_resident_mb", progress.peak_resident_mb},
-          {"samples", samples},
+          {"samples", to_json(progress.samples)},
           {"route_ms", progress.route_ms},
-          {"place_ms", progress.place_ms},
+          {"places", to_json(progress.places)},
           {"routes_refused", progress.routes_refused},
           {"places_found", progress.places_found},
           {"places_wrong", progress.places_wrong}};
@@ -67,7 +74,7 @@ VastProgress progress_of(const json& saved) {
     progress.samples.push_back({s.at("s"), s.at("frames"), s.at("update_p99_us"), s.at("lookup_lag_s"),
                                 s.at("resident_mb"), s.at("closures")});
   saved.at("route_ms").get_to(progress.route_ms);
-  saved.at("place_ms").get_to(progress.place_ms);
+  for (const json& q : saved.at("places")) progress.places.push_back({q.at("frames"), q.at("ms")});
   saved.at("routes_refused").get_to(progress.routes_refused);
   saved.at("places_found").get_to(progress.places_found);
   saved.at("places_wrong").get_to(progress.places_wrong);
@@ -266,7 +273,8 @@ class VastRun {
         ++progress_.places_found;
         progress_.places_wrong += is_wrong_place(sessions, *view.frame, *place);
       }
-      if (place.reason() != Reason::UNREACHABLE) progress_.place_ms.push_back(place_ms);
+      if (place.reason() != Reason::UNREACHABLE && !progress_.samples.empty())
+        progress_.places.push_back({progress_.samples.back().frames, place_ms});
       if (route.reason() == Reason::UNREACHABLE || place.reason() == Reason::UNREACHABLE) asked.reset();
     }
   }

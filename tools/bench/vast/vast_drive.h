@@ -19,6 +19,12 @@ struct VastSample {
   std::uint64_t closures = 0;
 };
 
+// A question "where is this frame?", over RPC.
+struct VastQuestion {
+  std::uint64_t frames = 0;  // in the map
+  double ms = 0;
+};
+
 // A run, as far as it has come. Kept in the folder, so that an interrupted run goes on.
 struct VastProgress {
   double s = 0, cpu_s = 0;
@@ -26,7 +32,8 @@ struct VastProgress {
   std::vector<double> starts_s;  // of the daemon after each kill, until it served
   double peak_resident_mb = 0;
   std::vector<VastSample> samples;
-  std::vector<double> route_ms, place_ms;
+  std::vector<double> route_ms;
+  std::vector<VastQuestion> places;
   std::uint64_t routes_refused = 0, places_found = 0, places_wrong = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 
 #include "server/route/transform.h"
 #include "storage/graph/binding.h"
+#include "storage/maintenance/verify.h"
 #include "storage/map/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "tests/support/drive_evaluation.h"
@@ -143,7 +145,10 @@ class TownJudge {
       if (table_) tell(edge, T, error);
       if (edge.kind != storage::EdgeKind::kLoop) {
         if (!edge.carried_by.empty()) carried_.insert(edge.b);
-        if (!rode({edge.b.session, edge.a.index, edge.b.index})) verdict.step_error_m.push_back(error.t.norm());
+        if (!rode({edge.b.session, edge.a.index, edge.b.index})) {
+          verdict.step_error_m.push_back(error.t.norm());
+          verdict.own_step_error_m.push_back((T.inverse() * odometry(edge.a).inverse() * odometry(edge.b)).t.norm());
+        }
         continue;
       }
       verdict.carried_wrongly += edge.carried.session != 0 && !rode(edge.carried);
@@ -245,6 +250,18 @@ class TownJudge {
   std::set<FrameId> returned_, carried_;
 };
 
+// What is unsound in the map and its journal; the first findings are told.
+std::uint64_t verify(const storage::Engine& engine) {
+  std::size_t told = 0;
+  const auto tell = [&](const storage::Finding& finding) {
+    if (++told <= kMaxTold)
+      std::cerr << "verify: " << reason_name(finding.reason) << ' ' << finding.frame.to_string() << ' ' << finding.what
+                << '\n';
+  };
+  return storage::verify(*engine.snapshot(), {}, tell, {}).or_throw().findings +
+         storage::verify_journal(engine, tell, {}).or_throw().findings;
+}
+
 std::uint64_t bytes_in(const std::string& folder) {
   std::uint64_t bytes = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
@@ -259,6 +276,7 @@ VastVerdict judge_town(const VastTown& town, const VastOptions& options) {
   VastVerdict verdict;
   verdict.bytes_on_disk = bytes_in(folder);
   const auto engine = storage::open_rocksdb(folder, {}).or_throw();
+  verdict.findings = verify(*engine);
   const std::uint64_t epoch = engine->acquire().or_throw();
   const auto map =
       storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(options.memory_budget_mb << 20)).or_throw();

@@ -26,8 +26,10 @@ struct VastVerdict {
   std::uint64_t carried_wrongly = 0;
   double metres = 0, street_metres = 0;
   std::uint64_t bytes_on_disk = 0;
+  std::uint64_t findings = 0;  // of `relmap-admin verify`
   // Of each step of the robots' motion, but for trains: how far the map has it off.
   std::vector<double> step_error_m;
+  std::vector<double> own_step_error_m;  // and the robot's own odometry
   // Between frames at revisits and the earlier frame there, metres: by the robot's odometry alone, where one robot saw
   // both, and through the map. Of a sample.
   std::vector<double> odometry_error_m, map_error_m;

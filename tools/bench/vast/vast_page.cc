@@ -1,9 +1,11 @@
 #include "tools/bench/vast/vast_page.h"
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 #include <utility>
 
+#include "proto/base/quantile.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
 #include "tools/bench/plot.h"
@@ -48,7 +50,7 @@ std::string text_of(double value, int digits) {
   return out.str();
 }
 
-// Sibley, Mei, Reid and Newman, IJRR 2010: tables 1 and 2, figures 17 and 18.
+// Sibley, Mei, Reid and Newman, IJRR 2010: tables 1 and 2.
 std::vector<Row> beside_the_paper(const VastProgress& progress, const VastVerdict& verdict) {
   const auto keyframes = static_cast<double>(verdict.keyframes);
   return {
@@ -73,6 +75,19 @@ Curve over_frames(const VastProgress& progress, std::string name, double VastSam
   for (const VastSample& sample : progress.samples) {
     curve.x.push_back(static_cast<double>(sample.frames));
     curve.y.push_back(sample.*value);
+  }
+  return curve;
+}
+
+Curve places_over_frames(const VastProgress& progress) {
+  Curve curve{"answers", {}, {}};
+  const std::size_t share = progress.places.size() / 50 + 1;
+  for (std::size_t from = 0; from < progress.places.size(); from += share) {
+    const std::size_t to = std::min(from + share, progress.places.size());
+    std::vector<double> ms;
+    for (std::size_t i = from; i < to; ++i) ms.push_back(progress.places[i].ms);
+    curve.x.push_back(static_cast<double>(progress.places[(from + to) / 2].frames));
+    curve.y.push_back(quantile(ms, 0.5));
   }
   return curve;
 }
@@ -106,6 +121,10 @@ void write_page(const VastOptions& options, const VastProgress& progress, const 
                        false,
                        {over_frames(progress, "relaxation", &VastSample::update_p99_us)}}),
                 "Relative bundle adjustment after a keyframe, of the last updates at each second.");
+  out << figure(
+      drawn({"Where is this frame?", "keyframes in the map", "ms", false, false, {places_over_frames(progress)}}),
+      "Until the daemon has answered over RPC, while keyframes streamed in: the median of each fiftieth of the "
+      "questions. The paper's Figure 17 has the time of a query of FAB-MAP.");
   out << figure(drawn({"How far lookups are behind",
                        "keyframes in the map",
                        "s",
