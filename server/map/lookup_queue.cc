@@ -21,6 +21,9 @@ constexpr std::size_t kBytesPerFrame = 256;      // of an open frame, here and i
 constexpr std::size_t kBytesPushed = 32;         // of a frame in pushed_, which may be closed already
 constexpr int kViews = 3;                        // attempts in a row, each on a new view
 constexpr std::chrono::milliseconds kRetry{20};  // then waits so long for memory, or for the disk
+// The weight of the latest lookup in the mean: some twenty count. A robot that comes to where it was is looked up
+// several times as long, and that must show before a hundred frames have come.
+constexpr double kOfTheLatest = 0.05;
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -38,6 +41,8 @@ void LookupQueue::start(std::size_t threads, LookUp look_up, Journal journal, st
   on_change_ = std::move(on_change);
   for (std::size_t i = 0; i < threads; ++i) try {
       threads_.emplace_back([this] { run(); });
+      const MutexLock lock(mutex_);
+      ++running_;
     } catch (const std::system_error& error) {
       if (threads_.empty()) throw;
       spdlog::warn("{} of {} threads recognise places: {}", i, threads, error.what());
@@ -130,12 +135,14 @@ double LookupQueue::lag_s() const {
 }
 
 bool LookupQueue::is_full(std::size_t queued) const {
-  return waiting() + queued >= kMaxWaiting || next_has_waited_s() > std::chrono::duration<double>(max_lag_).count();
+  return waiting() + queued >= kMaxWaiting || expected_lag_s(queued) > std::chrono::duration<double>(max_lag_).count();
 }
 
-double LookupQueue::next_has_waited_s() const {
+double LookupQueue::expected_lag_s(std::size_t queued) const {
   const MutexLock lock(mutex_);
-  return queue_.empty() ? 0 : seconds_since(tickets_.at(queue_.front().ticket));
+  const double next_has_waited = queue_.empty() ? 0 : seconds_since(tickets_.at(queue_.front().ticket));
+  const double all_take = static_cast<double>(queue_.size() + queued) * lookup_s_;
+  return std::max(next_has_waited, all_take / static_cast<double>(std::max<std::size_t>(1, running_)));
 }
 
 std::vector<storage::FrameRange> LookupQueue::later_than(const Pushed& pushed) const {
@@ -200,7 +207,13 @@ LookupQueue::End LookupQueue::look_up_and_journal(const Pushed& pushed) {
   const LaterFrames later = [&] { return later_than(pushed); };
   for (int attempt = 0; attempt < kViews; ++attempt) {
     try {
-      return journal(pushed, look_up_(pushed.frame, later));
+      const auto begin = std::chrono::steady_clock::now();
+      const std::vector<storage::JournalRecord> found = look_up_(pushed.frame, later);
+      {
+        const MutexLock lock(mutex_);
+        lookup_s_ += kOfTheLatest * (seconds_since(begin) - lookup_s_);
+      }
+      return journal(pushed, found);
     } catch (const std::exception& error) {
       const auto* status = dynamic_cast<const StatusError*>(&error);
       if (status && status->status().reason() == Reason::VIEW_EXPIRED) continue;

@@ -24,9 +24,9 @@
 
 namespace relmap::map {
 
-// While so many frames wait, or the next one has waited for so long, robots wait, and send later, instead of learning
-// later where they are. The number bounds the memory of what waits, the time how late a robot learns it where lookups
-// are slow: on a single thread, where every frame returns to a place, 256 took 9 s.
+// While so many frames wait, or so much time passes before they are looked up, robots wait, and send later, instead of
+// learning later where they are. The number bounds the memory of what waits, the time how late a robot learns it where
+// lookups are slow: where every frame returns to a place, 256 took 9 to 14 s.
 inline constexpr std::size_t kMaxWaiting = 256;
 inline constexpr std::chrono::milliseconds kMaxLookupLag{4000};
 
@@ -76,9 +76,10 @@ class LookupQueue {
   bool is_waiting(SessionNumber session) const;
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
-  // Whether the frames that wait, and the `queued` records that may become such frames, are kMaxWaiting or more, or the
-  // next to be looked up has waited for longer than `max_lag`, so that no more keyframes should be taken in before some
-  // have been looked up. A single lookup that takes long, or has to be made again, keeps nobody waiting.
+  // Whether no more keyframes should be taken in before some have been looked up: the frames that wait, and the
+  // `queued` records that may become such frames, are kMaxWaiting or more, or would take longer than `max_lag`, as
+  // lookups have taken recently, or the next of them has waited for longer. A single lookup that takes long, or has to
+  // be made again, keeps nobody waiting.
   bool is_full(std::size_t queued) const;
 
  private:
@@ -97,7 +98,8 @@ class LookupQueue {
   End journal(const Pushed& pushed, const std::vector<storage::JournalRecord>& found);
   // Ends a lookup, or puts the frame in the queue again.
   void end(const Pushed& pushed, End how);
-  double next_has_waited_s() const;  // the frame whose lookup begins next; 0 if there is none
+  // For how long a frame would wait that came after the `queued` records.
+  double expected_lag_s(std::size_t queued) const;
   std::vector<storage::FrameRange> later_than(const Pushed& pushed) const;
   void forget_pushed(std::uint64_t ticket) RELMAP_REQUIRES(mutex_);
   void open_locked(FrameId frame) RELMAP_REQUIRES(mutex_);
@@ -111,6 +113,8 @@ class LookupQueue {
   std::uint64_t last_ticket_ RELMAP_GUARDED_BY(mutex_) = 0;
   // When frames that are in the queue or being looked up were pushed, by ticket.
   std::map<std::uint64_t, std::chrono::steady_clock::time_point> tickets_ RELMAP_GUARDED_BY(mutex_);
+  std::size_t running_ RELMAP_GUARDED_BY(mutex_) = 0;  // threads
+  double lookup_s_ RELMAP_GUARDED_BY(mutex_) = 0;      // that a lookup has taken recently, on the average
   // By session, the frames pushed since the oldest of these.
   std::map<SessionNumber, std::deque<Pushed>> pushed_ RELMAP_GUARDED_BY(mutex_);
   std::set<FrameId> open_ RELMAP_GUARDED_BY(mutex_);  // those queued, those being looked up, and those that failed

@@ -195,6 +195,31 @@ TEST_F(LookupQueueTest, IsFullOnceTheNextFrameHasWaitedForLong) {
   EXPECT_FALSE(patient.is_full(0));
 }
 
+TEST_F(LookupQueueTest, IsFullOnceWhatWaitsTakesTooLong) {
+  LookupQueue queue(budget_, std::chrono::milliseconds(500));
+  std::atomic<std::uint32_t> done = 0;
+  std::atomic<bool> goes_on = true;
+  queue.start(
+      1,
+      [&](FrameId frame, const LaterFrames&) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        while (frame.index >= 100 && !goes_on) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        ++done;
+        return std::vector<storage::JournalRecord>{};
+      },
+      [](const storage::JournalRecord&, const LookupQueue::Durable&) { return true; }, [] {});
+  EXPECT_FALSE(queue.is_full(200)) << "nobody knows yet what a lookup takes";
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    queue.push({1, i});
+    while (done <= i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(queue.is_full(200)) << "200 take two seconds";
+  goes_on = false;
+  for (std::uint32_t i = 100; i < 201; ++i) queue.push({1, i});
+  EXPECT_TRUE(queue.is_full(0)) << "of the frames that wait it is the same";
+  goes_on = true;
+}
+
 TEST_F(LookupQueueTest, ALookupThatTakesLongKeepsNobodyWaiting) {
   LookupQueue queue(budget_, std::chrono::milliseconds(20));
   std::atomic<bool> begun = false, ends = false;
