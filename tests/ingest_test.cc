@@ -16,7 +16,7 @@ TEST(Ingest, AnyNumberOfLookupThreadsAndOfRobotsFindTheSame) {
   const storage::TemporaryFolder folder;
   const std::string drive = folder / "drive", keyframes = folder / "drive.bin";
   for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
-           {built_program("relmap-sim"), "pictures", "--out", drive, "--pairs", "120", "--laps", "1.7", "--width",
+           {built_program("relmap-sim"), "pictures", "--out", drive, "--pairs", "150", "--laps", "1.5", "--width",
             "400"},
            {built_program("relmap-frontend"), "--source", "sim", drive, "--robot", "r", "--out", keyframes}}) {
     const Finished made = run_program(command, std::chrono::seconds(300));
@@ -29,7 +29,7 @@ TEST(Ingest, AnyNumberOfLookupThreadsAndOfRobotsFindTheSame) {
   };
   const BenchFigures one = ingest("1", "1"), many = ingest("1", "3"), robots = ingest("4", "2");
   EXPECT_GT(one["keyframes"], 50);
-  EXPECT_GT(one["closures"], 0.3 * one["keyframes"]);
+  EXPECT_GT(one["closures"], 0.2 * one["keyframes"]) << "of a third that return";
   EXPECT_EQ(one["wrong"], 0);
   // What a lookup sees in force depends on when it is made, and so does a closure in a hundred.
   EXPECT_NEAR(many["closures"], one["closures"], 1);
