@@ -143,7 +143,8 @@ class Tour : public ::testing::Test {
 
 TEST_F(Tour, EveryCommandWorksAsPrinted) { expect_all_work(); }
 
-TEST_F(Tour, EveryCommandWorksWhereTheMapHasAnotherRecording) {
+using LongTour = Tour;
+TEST_F(LongTour, EveryCommandWorksWhereTheMapHasAnotherRecording) {
   const std::string other = record_simulation(home_ / "other", {"--seed", "2", "--pairs", "130", "--laps", "1.2"});
   fs::create_directories(home_ / "tour");
   RunningDaemon daemon({.data = home_ / "tour/map", .lcm = "", .more = {}});
@@ -351,7 +352,7 @@ class DocumentedCommands : public ::testing::Test {
     return {};
   }
 
-  std::map<std::vector<std::string>, std::string> help_;
+  static inline std::map<std::vector<std::string>, std::string> help_;  // of all tests
 };
 
 TEST_F(DocumentedCommands, AreKnownToThePrograms) {

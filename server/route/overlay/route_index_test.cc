@@ -106,7 +106,7 @@ TEST(RouteIndex, IsRightWhileTheMapChanges) {
   for (int asker = 0; asker < 2; ++asker)
     askers.emplace_back([&, asker] {
       std::mt19937 random(static_cast<std::uint32_t>(asker));
-      for (; asked < 300; ++asked) {
+      for (; asked < 150; ++asked) {
         const auto map = index->snapshot();
         const auto frame = [&] {
           const SessionNumber robot = 1 + static_cast<SessionNumber>(random() % 4);
@@ -116,7 +116,7 @@ TEST(RouteIndex, IsRightWhileTheMapChanges) {
       }
     });
   std::mt19937 random(9);
-  while (asked < 300) {
+  while (asked < 150) {
     town.change(random);
     town.drive(random() % 4 == 0 ? 1 : 0);
     std::this_thread::sleep_for(2ms);
@@ -154,7 +154,7 @@ TEST(RouteIndex, ManySearchesShareLittleMemory) {
   for (unsigned seed = 1; seed <= 3; ++seed)
     askers.emplace_back([&, seed] {
       std::mt19937 random(seed);
-      for (int i = 0; i < 40; ++i) {
+      for (int i = 0; i < 20; ++i) {
         const RouteIndex::Snapshot map = index->snapshot();
         if (!map.overlay) continue;
         OverlayQuery query;
@@ -183,7 +183,7 @@ TEST(RouteIndex, ManySearchesShareLittleMemory) {
     std::this_thread::sleep_for(5ms);
   }
   for (std::thread& asker : askers) asker.join();
-  EXPECT_GT(found, 30);
+  EXPECT_GT(found, 15);
   EXPECT_LE(town.budget().used(storage::Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
 }
 
