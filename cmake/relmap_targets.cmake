@@ -99,7 +99,7 @@ function(relmap_test name)
     set(arg_ALONE OFF)
   endif()
   if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 900)
+    set(arg_TIMEOUT 1800)  # PublishedFigures takes 430 s on two slow cores
   endif()
   if(NOT arg_FULL_TIMEOUT)
     set(arg_FULL_TIMEOUT 600)
