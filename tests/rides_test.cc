@@ -64,6 +64,7 @@ TEST(Rides, LoopBehindTwoLiftsIsClosedInTheDaemonsMap) {
 }
 
 TEST(Rides, LoopBehindATrainIsClosed) { expect_closed("train", 1); }
+TEST(Rides, LoopBehindAnEscalatorIsClosed) { expect_closed("escalator", 1); }
 TEST(Rides, WithoutARideNothingWrongIsClosed) { expect_nothing_wrong("train", 1, true); }
 TEST(Rides, StandingAmongLookAlikesClosesNothingWrong) { expect_nothing_wrong("alike", 1, false); }
 
