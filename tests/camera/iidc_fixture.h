@@ -73,6 +73,9 @@ struct Watched {
   std::map<Reason, std::uint64_t> gaps;
   std::vector<std::int64_t> times_us;
   std::vector<std::uint32_t> cycles;  // the camera's own stamps; 0 if it has none
+  // Frames before the first of a stream that the driver cannot know of: those that the bus lost between others that
+  // were not taken in time. Zero, unless some were not.
+  std::uint64_t unknown = 0;
 
   std::uint64_t frames() const { return numbers.size(); }
 };
@@ -87,10 +90,12 @@ inline void watch(iidc::LiveCamera& live, Watched& seen, const std::function<boo
       continue;
     }
     if (!frame->has_value()) return;
-    if (const auto number = default_frame_number((*frame)->raw.bytes()))
+    if (const auto number = default_frame_number((*frame)->raw.bytes())) {
+      if (seen.numbers.empty() && seen.torn == 0 && (*frame)->index > 0) seen.unknown = *number - (*frame)->index;
       seen.numbers.push_back(*number);
-    else
+    } else {
       ++seen.torn;
+    }
     seen.times_us.push_back((*frame)->time_us);
     seen.cycles.push_back((*frame)->cycle.value_or(0));
   }

@@ -44,7 +44,9 @@ struct LiveFrame {
 
 struct LiveCounts {
   std::uint64_t frames = 0;
-  std::uint64_t lost = 0;  // frames that the camera took and that did not arrive, or arrived damaged
+  // Frames that the camera took and that did not arrive, arrived damaged, or were not taken in time. Those that did not
+  // arrive before the first that did are not known.
+  std::uint64_t lost = 0;
   std::map<Reason, std::uint64_t> faults;
   std::uint64_t reopened = 0;       // times that the camera was opened again after it had gone
   std::uint64_t begun_anew = 0;     // times that the stream was restarted while the camera was there
