@@ -1,5 +1,6 @@
 #include "client/relmap_client.h"
 
+#include "client/channel.h"
 #include "client/client_impl.h"
 #include "client/replies.h"
 #include "client/server_address.h"
@@ -14,13 +15,13 @@ using MapStub = v1::Map::Stub;
 
 constexpr int kMaxReplyBytes = 16 << 20;
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReplyBytes);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // Reconnects soon after a daemon was restarted.
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  return arguments;
 }
 
 Status read_route_part(const v1::FindRouteReply& reply, Route& route) {
@@ -43,10 +44,16 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   const auto where = resolve_server(server);
   if (!where.ok()) return where.status();
   const Impl::Clock::time_point until = Impl::Clock::now() + options.connect_timeout;
-  auto impl = std::make_unique<Impl>(server, make_channel(where->address), std::move(options));
+  auto channel = open_channel(*where, options.credentials, channel_arguments());
+  if (!channel.ok()) return channel.status();
+  auto impl = std::make_unique<Impl>(server, std::move(*channel), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";
   if (!impl->channel->WaitForConnected(until))
-    return {Reason::UNREACHABLE, "nothing answers at " + where->address + named};
+    return {Reason::UNREACHABLE, "nothing answers at " + where->address + named +
+                                     (where->is_socket() ? ""
+                                      : impl->options.credentials.empty()
+                                          ? ", or it serves TLS, and needs --credentials"
+                                          : ", or it and " + impl->options.credentials + " do not trust each other")};
   if (where->boot_id.empty()) return std::unique_ptr<Client>(new Client(std::move(impl)));
 
   // After a crash the file `endpoint` remains, and another daemon may use its port by now.

@@ -22,14 +22,18 @@ namespace relmap::client {
 struct ClientOptions {
   std::chrono::milliseconds connect_timeout{5000};
   std::chrono::milliseconds deadline{60000};  // of each call; a whole stream or list is one call
+  // File that proves who the caller is (proto/access/credentials.h), for daemons that serve TLS at HOST:PORT. Empty:
+  // none, and no TLS. A daemon of this machine, named by its data folder, needs none.
+  std::string credentials;
   // Called with the canonical proto3 JSON of each message received, in order, by the calling thread.
   std::function<void(const std::string& json)> on_reply;
 };
 
 class Client {
  public:
-  // `server`: the data folder of a daemon on this machine (DIR/endpoint has its address), or HOST:PORT.
-  // INVALID_ARGUMENT: it is neither. UNREACHABLE: no daemon answers; the message says why.
+  // `server`: the data folder of a daemon on this machine (DIR/endpoint says where it answers), or HOST:PORT.
+  // INVALID_ARGUMENT: it is neither. UNREACHABLE: no daemon answers; the message says why. NO_SUCH_FILE, BAD_CONFIG:
+  // the credentials cannot be used.
   static Result<std::unique_ptr<Client>> connect(const std::string& server, ClientOptions options = {});
   ~Client();
   // Connects to the same server with the same options again, since a restarted daemon may use another port. Fails as

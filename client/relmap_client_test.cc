@@ -177,6 +177,25 @@ TEST_F(ClientTest, ReachesADaemonThatListensEverywhereOverLoopback) {
   EXPECT_EQ(resolve_server(folder_.string())->address, "localhost:5");
 }
 
+TEST_F(ClientTest, PrefersTheSocketOfADataFolder) {
+  std::ofstream(folder_ / "endpoint") << "socket /a folder/socket\naddress 0.0.0.0:5\npid 7\nboot b\n";
+  const auto where = resolve_server(folder_.string());
+  ASSERT_TRUE(where.ok()) << where.status().to_string();
+  EXPECT_EQ(where->address, "unix:/a folder/socket");
+  EXPECT_TRUE(where->is_socket());
+  EXPECT_EQ(where->pid, 7);
+  EXPECT_TRUE(resolve_server("unix:/a/socket")->is_socket());
+}
+
+TEST_F(ClientTest, CredentialsThatCannotBeUsedAreRefusedByName) {
+  ClientOptions options;
+  options.credentials = folder_ / "nowhere.pem";
+  EXPECT_EQ(Client::connect(address(), options).status().reason(), Reason::NO_SUCH_FILE);
+  std::ofstream(folder_ / "empty.pem") << "";
+  options.credentials = folder_ / "empty.pem";
+  EXPECT_EQ(Client::connect(address(), options).status().reason(), Reason::BAD_CONFIG);
+}
+
 TEST_F(ClientTest, ReadsMatchesAndTheReasonsOfOthers) {
   View view;
   view.frame = FrameId{3, 17};

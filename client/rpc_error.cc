@@ -19,6 +19,10 @@ Reason nearest(grpc::StatusCode code) {
       return Reason::UNIMPLEMENTED;
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
       return Reason::BUDGET_EXCEEDED;
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return Reason::UNAUTHENTICATED;
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return Reason::NOT_ALLOWED;
     case grpc::StatusCode::INVALID_ARGUMENT:
       return Reason::INVALID_ARGUMENT;
     default:

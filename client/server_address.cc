@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "proto/base/hex.h"
+
 namespace relmap::client {
 
 namespace {
@@ -15,6 +17,19 @@ bool is_host_port(const std::string& text) {
   const char *begin = text.data() + colon + 1, *end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(begin, end, port);
   return error == std::errc{} && stop == end && port > 0 && port < 65536;
+}
+
+// gRPC reads the address as a URI (RFC 3986).
+std::string uri_of_socket(const std::string& path) {
+  std::string uri = "unix:";
+  for (const char c : path) {
+    const auto byte = static_cast<std::uint8_t>(c);
+    if (c == '%' || c == '?' || c == '#')
+      uri += "%" + hex(ByteSpan(&byte, 1));
+    else
+      uri += c;
+  }
+  return uri;
 }
 
 // Replaces the address of a daemon that listens on all interfaces by loopback.
@@ -29,15 +44,18 @@ std::string reachable(const std::string& address) {
 Result<ServerAddress> resolve_server(const std::string& server) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(server, ignored)) {
-    if (is_host_port(server)) return ServerAddress{server, 0, ""};
+    if (is_host_port(server) || server.starts_with("unix:/")) return ServerAddress{server, 0, ""};
     return {Reason::INVALID_ARGUMENT, "'" + server + "' is neither a data folder nor HOST:PORT"};
   }
   const std::string path = server + "/endpoint";
   std::ifstream file(path);
   if (!file) return {Reason::UNREACHABLE, "no daemon serves " + server + " (there is no " + path + ")"};
   ServerAddress address;
+  std::string socket;
   for (std::string key; file >> key;) {
-    if (key == "address")
+    if (key == "socket")
+      std::getline(file >> std::ws, socket);
+    else if (key == "address")
       file >> address.address;
     else if (key == "pid")
       file >> address.pid;
@@ -46,9 +64,9 @@ Result<ServerAddress> resolve_server(const std::string& server) {
     else
       std::getline(file, key);  // ignores the lines of later versions
   }
-  if (!is_host_port(address.address) || address.boot_id.empty())
+  if ((socket.empty() && !is_host_port(address.address)) || address.boot_id.empty())
     return {Reason::CORRUPT, path + " does not say where the daemon answers"};
-  address.address = reachable(address.address);
+  address.address = socket.empty() ? reachable(address.address) : uri_of_socket(socket);
   return address;
 }
 

@@ -35,7 +35,7 @@ constexpr const char* kFooter =
     "  relmap-frontend drive/ --robot sim --out k.bin --report pairs.tsv --show tracks.mp4\n"
     "  relmap-frontend --source images --mono photos/ --robot phone --session tower\n"
     "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --out k.bin\n"
-    "  relmap-frontend --source iidc --robot cart --server map.lab:50070\n"
+    "  relmap-frontend --source iidc --robot cart --server map.lab:50070 --credentials cart.pem\n"
     "  relmap-frontend --source iidc 7140058 --rate 15 --robot cart --session morning\n"
     "  relmap-frontend --source raw drive.raw --robot cart --server /srv/map\n"
     "\n"
@@ -110,6 +110,10 @@ int main_function(int argc, char** argv) {
   auto* const server =
       app.add_option("--server", a.server, "where relmapd answers over gRPC: its data folder, or HOST:PORT")
           ->excludes(lcm);
+  app.add_option("--credentials", a.credentials,
+                 "file that proves which robot this is, for a relmapd that serves TLS (relmap-admin credentials\n"
+                 "makes it); $RELMAP_CREDENTIALS")
+      ->envname("RELMAP_CREDENTIALS");
   auto* const spool = app.add_option("--spool", a.publisher.spool,
                                      "folder that keeps keyframes until they are settled (default:\n"
                                      "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it); none "

@@ -11,6 +11,7 @@
 
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
+#include "server/ops/process.h"
 #include "server/ops/signals.h"
 #include "tools/terminal/command_line.h"
 
@@ -24,10 +25,16 @@ constexpr const char* kFooter = R"(examples:
   relmapd --data /srv/map
   relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0'
   relmapd --config /etc/relmapd.yaml --check-config
-  relmapd --data map --listen 0.0.0.0:50070 --insecure   # anyone who can reach the port may edit the map
+  relmap-admin credentials ca /etc/relmap/credentials --host map.lab
+  relmapd --data /srv/map --listen 0.0.0.0:50070 --credentials /etc/relmap/credentials
+  relmapd --data map --listen 127.0.0.1:50070 --insecure   # anyone who can reach the port may edit the map
+
+gRPC is served at the Unix socket DIR/socket, which only the user that runs the daemon can open: relmap --server DIR
+uses it. --listen serves over TCP, too, and docs/security.md tells who may do what there.
 
 Some settings have no option and are set in the configuration file: ingest.* (which robots may send, and how much),
-rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms. server/README.md describes them.
+tls.*, access, socket_group, rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms.
+server/README.md describes them.
 
 SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
 once, without loss: the next start applies the rest.
@@ -71,7 +78,7 @@ int exit_code(Reason reason) {
 // The options of the command line. What they leave out keeps the value of the configuration file, or the default.
 struct CommandLine {
   std::string config_file;
-  std::optional<std::string> data, listen, lcm, vocabulary, log_level;
+  std::optional<std::string> data, listen, credentials, lcm, vocabulary, log_level;
   std::optional<std::uint64_t> memory_budget_mb;
   bool deterministic = false, insecure = false, no_closures = false, check_config = false;
 
@@ -80,11 +87,13 @@ struct CommandLine {
         ->type_name("DIR");
     app.add_option("--config", config_file, "YAML file of settings; options of the command line override it")
         ->type_name("FILE");
-    app.add_option(
-           "--listen", listen,
-           "Address that gRPC listens at (default 127.0.0.1:50070); port 0 takes any free port, which is written to "
-           "DIR/endpoint")
+    app.add_option("--listen", listen,
+                   "Address at which gRPC is served over TCP, too; port 0 takes any free port, which is written to "
+                   "DIR/endpoint; none: only at DIR/socket (default)")
         ->type_name("HOST:PORT");
+    app.add_option("--credentials", credentials,
+                   "Folder made by relmap-admin credentials: the certificate to serve TLS with, and who may call")
+        ->type_name("FOLDER");
     app.add_option("--lcm", lcm,
                    "Takes keyframes over LCM: from a multicast group (udpm://GROUP:PORT?ttl=N) or from a log "
                    "(file://PATH); none "
@@ -100,7 +109,7 @@ struct CommandLine {
     app.add_flag("--no-closures", no_closures,
                  "Do not recognise places, so that no loop is closed (to measure what closures improve)");
     app.add_flag("--insecure", insecure,
-                 "Allow --listen beyond loopback; there is no TLS, so everyone who reaches the port may edit the map");
+                 "Serve --listen without TLS: everyone who can reach the port may edit the map");
     app.add_flag("--check-config", check_config,
                  "Check whether the daemon could start with these settings, write nothing, and exit");
     relmap::terminal::add_version(app);
@@ -111,7 +120,8 @@ struct CommandLine {
       if (Status status = relmap::ops::read_config(config_file, config); !status.ok())
         return {Reason::BAD_CONFIG, status.message()};
     if (data) config.data = *data;
-    if (listen) config.listen = *listen;
+    if (listen) config.listen = relmap::ops::listen_of(*listen);
+    if (credentials) config.credentials = *credentials;
     if (lcm) config.lcm = relmap::ops::lcm_url_of(*lcm);
     if (vocabulary) config.vocabulary = *vocabulary;
     if (log_level) config.log_level = *log_level;
@@ -122,9 +132,12 @@ struct CommandLine {
     config.map.deterministic |= deterministic;
     config.insecure |= insecure;
     if (no_closures) config.map.closures = false;
+    relmap::ops::complete_config(config);
     return relmap::ops::check_config(config);
   }
 };
+
+constexpr std::size_t kOwnFiles = 1024;  // the map's, the journal's and others that are not connections
 
 int fail(const Status& status) {
   spdlog::error("{}", status.to_string());
@@ -133,6 +146,10 @@ int fail(const Status& status) {
 
 int run(const Config& config) {
   relmap::ops::block_stop_signals();
+  const std::size_t files = relmap::ops::raise_file_limit();
+  if (files < 2 * config.connections.total + kOwnFiles)
+    spdlog::warn("{} files may be open, too few for {} connections: raise the hard limit (LimitNOFILE=)", files,
+                 2 * config.connections.total);
   auto daemon = relmap::ops::Daemon::start(config);
   if (!daemon.ok()) return fail(daemon.status());
   std::optional<int> signal;

@@ -109,7 +109,7 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
 
     const Finished backed_up = admin({"--json", "backup", options_.data, copy});
     ASSERT_EQ(backed_up.exit_code, kFine) << said(backed_up);
-    EXPECT_THAT(backed_up.standard_error, HasSubstr(daemon.address()));
+    EXPECT_THAT(backed_up.standard_error, HasSubstr("unix:" + options_.data + "/socket"));
     const auto document = last_document(backed_up.standard_output);
     EXPECT_EQ(text(document, "reason"), "OK");
     EXPECT_GE(number(document, "durable_sequence"), static_cast<double>(before.durable_sequence));
@@ -153,12 +153,12 @@ TEST_F(Admin, RepairAndRestoreNeedTheDaemonStopped) {
   const Finished repair = admin({"--json", "repair", options_.data});
   EXPECT_EQ(repair.exit_code, kOwned) << said(repair);
   EXPECT_EQ(text(last_document(repair.standard_output), "reason"), "FOLDER_LOCKED");
-  EXPECT_THAT(repair.standard_error, HasSubstr(daemon.address()));
+  EXPECT_THAT(repair.standard_error, HasSubstr("unix:" + options_.data + "/socket"));
   ASSERT_EQ(admin({"backup", options_.data, folder_ / "copy"}).exit_code, kFine);
   const Finished restore = admin({"--json", "restore", folder_ / "copy", options_.data});
   EXPECT_EQ(restore.exit_code, kOwned) << said(restore);
   EXPECT_EQ(text(last_document(restore.standard_output), "reason"), "FOLDER_LOCKED");
-  EXPECT_THAT(restore.standard_error, HasSubstr(daemon.address()));
+  EXPECT_THAT(restore.standard_error, HasSubstr("unix:" + options_.data + "/socket"));
   EXPECT_EQ(admin({"restore", options_.data, folder_ / "elsewhere"}).exit_code, kOwned);
   EXPECT_EQ(admin({"--server", daemon.address(), "repair"}).exit_code, kOwned);
   EXPECT_EQ(admin({"--server", daemon.address(), "stats"}).exit_code, kFine);
@@ -308,7 +308,7 @@ TEST_F(Admin, BackupRestoreAndCompactKeepKeysOfALaterVersion) {
   RunningDaemon daemon(options_);
   const Finished beside = admin({"compact", options_.data});
   ASSERT_EQ(beside.exit_code, kFine) << said(beside);
-  EXPECT_THAT(beside.standard_error, HasSubstr(daemon.address()));
+  EXPECT_THAT(beside.standard_error, HasSubstr("unix:" + options_.data + "/socket"));
   ASSERT_EQ(admin({"backup", options_.data, again}).exit_code, kFine);
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
   expect_kept(options_.data);
@@ -428,7 +428,7 @@ TEST_F(Admin, ReindexCompletesAfterAKillHalfWay) {
   const Finished owned = admin({"--json", "reindex", options_.data});
   EXPECT_EQ(owned.exit_code, kOwned) << said(owned);
   EXPECT_EQ(text(last_document(owned.standard_output), "reason"), "FOLDER_LOCKED");
-  EXPECT_THAT(owned.standard_error, HasSubstr(daemon.address()));
+  EXPECT_THAT(owned.standard_error, HasSubstr("unix:" + options_.data + "/socket"));
   EXPECT_EQ(admin({"--server", daemon.address(), "reindex"}).exit_code, kOwned);
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
 }

@@ -158,7 +158,7 @@ class World {
       const Message message = std::move(under_way_.begin()->second);
       under_way_.erase(under_way_.begin());
       if (const auto* part = std::get_if<KeyframePart>(&message)) intake_->take_part(*part, now_);
-      if (const auto* gap = std::get_if<Gap>(&message)) intake_->take_gap(*gap, now_);
+      if (const auto* gap = std::get_if<Gap>(&message)) (void)intake_->take_gap(*gap, now_);
       if (const auto* ack = std::get_if<Acknowledgement>(&message)) core_.acknowledge(*ack, now_);
     }
   }

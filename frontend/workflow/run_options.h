@@ -25,6 +25,7 @@ struct RunOptions {
   std::string imu = "auto";     // a recording for read_imu(); auto: that of the data set, if it has one; or none
   std::string to = "lcm";       // lcm, grpc or file
   std::string server;           // for grpc: the daemon's data folder or HOST:PORT
+  std::string credentials;      // for grpc over TLS: the file that proves who sends; empty: none
   std::string out;              // for file: its path
   std::string report;           // TSV file (report_file.h); empty: none
   std::string show;             // folder or .mp4 (track_show.h); empty: none

@@ -32,7 +32,7 @@ namespace relmap {
   X(CAPTURE_FAILED, 19)   /* a gap: the robot's source failed */                                                      \
   X(BAD_MOTION, 20)       /* an odometry pose no robot could have (> 1e7 m) */                                        \
   X(TIME_AHEAD, 21)       /* a time stamp more than a minute after the one before it, and alone with it */            \
-  X(NOT_ALLOWED, 22)      /* the robot is not on the daemon's list */                                                 \
+  X(NOT_ALLOWED, 22)      /* the robot is not on the daemon's list, or the caller's role does not allow it */         \
   X(RATE_LIMITED, 23)     /* more than the daemon takes from one robot; kept by the robot and sent again */           \
   X(SESSION_FROZEN, 24)   /* an operator froze the session: it accepts no more keyframes */                           \
   X(SESSION_DELETED, 25)  /* the session is being deleted, or has been */                                             \
@@ -97,9 +97,10 @@ namespace relmap {
   X(UNSUPPORTED, 117) /* understood, but not something this build or source can do */                                 \
   X(NUMERICAL, 118)   /* a solve that met a singular system or NaN; the map is as it was */                           \
   X(INTERNAL, 119)                                                                                                    \
-  X(DISK_FULL, 120) /* the disk of the data folder is full, or below its low-water mark */                            \
-  X(NOT_A_MAP, 121) /* the folder is neither empty nor the data folder of a map */                                    \
-  X(WRONG_MAP, 122) /* the daemon serves another map than the one that was begun in */                                \
+  X(DISK_FULL, 120)       /* the disk of the data folder is full, or below its low-water mark */                      \
+  X(NOT_A_MAP, 121)       /* the folder is neither empty nor the data folder of a map */                              \
+  X(WRONG_MAP, 122)       /* the daemon serves another map than the one that was begun in */                          \
+  X(UNAUTHENTICATED, 123) /* no credentials, or they are unknown, expired or revoked */                               \
   /* A camera. */                                                                                                     \
   X(NO_CAMERA, 140)        /* none at all, or none of that serial number */                                           \
   X(CAMERA_GONE, 141)      /* unplugged, or the process that serves its bus has ended */                              \

@@ -16,7 +16,7 @@ class Ingest {
     after();
   }
   void take(const relmap::Gap& gap) {
-    intake_.take_gap(gap, now());
+    (void)intake_.take_gap(gap, now());
     after();
   }
 

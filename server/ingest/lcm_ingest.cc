@@ -19,13 +19,12 @@ namespace {
 constexpr std::chrono::seconds kStatusInterval{1};
 constexpr std::chrono::milliseconds kMapInterval{100};  // while acknowledgements are sent
 
-template <typename Message>
-LcmLink::Handler handler(intake::IngestServer& server, Result<Message> (*decode)(ByteSpan),
-                         void (intake::IngestServer::*take)(Message)) {
+template <typename Message, typename Take>
+LcmLink::Handler handler(intake::IngestServer& server, Result<Message> (*decode)(ByteSpan), Take take) {
   return [&server, decode, take](ByteSpan bytes) {
     Result<Message> message = decode(bytes);
     if (message.ok())
-      (server.*take)(std::move(*message));
+      take(std::move(*message));
     else
       server.count_foreign(message.reason());
   };
@@ -85,12 +84,13 @@ LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, intake::IngestServer& server,
                                                     StatusSource status, std::size_t queue_bytes) {
-  Result<std::unique_ptr<LcmLink>> link =
-      LcmLink::open(url,
-                    {{kKeyframeChannel, handler(server, decode_lcm_part, &intake::IngestServer::take_part)},
-                     {kGapChannel, handler(server, decode_lcm_gap, &intake::IngestServer::take_gap)},
-                     {kEndChannel, handler(server, decode_lcm_end, &intake::IngestServer::take_end)}},
-                    queue_bytes);
+  Result<std::unique_ptr<LcmLink>> link = LcmLink::open(
+      url,
+      {{kKeyframeChannel,
+        handler(server, decode_lcm_part, [&](KeyframePart part) { server.take_part(std::move(part)); })},
+       {kGapChannel, handler(server, decode_lcm_gap, [&](const Gap& gap) { (void)server.take_gap(gap); })},
+       {kEndChannel, handler(server, decode_lcm_end, [&](const SessionEnd& end) { (void)server.take_end(end); })}},
+      queue_bytes);
   if (!link.ok()) return link.status();
   auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
   LcmLink* const out = impl->link.get();

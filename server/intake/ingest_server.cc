@@ -90,18 +90,21 @@ struct IngestServer::Impl {
     }
   }
 
+  // `action` returns what the sender is to know.
   template <typename Take>
-  void take(Take&& action) {
+  Status take(Take&& action) {
     bool sooner = false;
+    Status status;
     {
       const MutexLock lock(mutex);
-      if (stopped) return;
-      action(intake);
+      if (stopped) return {};
+      status = action(intake);
       const SteadyTime next = intake.next_due(now());
       sooner = next < planned;
       planned = std::min(planned, next);
     }
     if (sooner) wake();
+    return status;
   }
 
   void enqueue(KeyframePart part) {
@@ -132,9 +135,10 @@ struct IngestServer::Impl {
       }
       if (parts.empty()) return;
       std::optional<std::set<SessionUuid>> changed;
-      take([&](Intake& i) RELMAP_REQUIRES(mutex) {
+      (void)take([&](Intake& i) RELMAP_REQUIRES(mutex) {
         for (const KeyframePart& part : parts) i.take_part(part, now());
         if (std::exchange(begun_version, i.begun_version()) != i.begun_version()) changed = i.begun();
+        return Status();
       });
       if (!changed) continue;
       const MutexLock lock(queue_mutex);
@@ -198,16 +202,18 @@ IngestServer::~IngestServer() { stop(); }
 
 void IngestServer::take_part(KeyframePart part) { impl_->enqueue(std::move(part)); }
 
-void IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload) {
-  impl_->take([&](Intake& intake) { intake.take_payload(session, sequence, crc, std::move(payload), now()); });
+Status IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
+                                  const std::string& robot) {
+  return impl_->take(
+      [&](Intake& intake) { return intake.take_payload(session, sequence, crc, std::move(payload), now(), robot); });
 }
 
-void IngestServer::take_gap(Gap gap) {
-  impl_->take([&](Intake& intake) { intake.take_gap(gap, now()); });
+Status IngestServer::take_gap(const Gap& gap, const std::string& robot) {
+  return impl_->take([&](Intake& intake) { return intake.take_gap(gap, now(), robot); });
 }
 
-void IngestServer::take_end(SessionEnd end) {
-  impl_->take([&](Intake& intake) { intake.take_end(end, now()); });
+Status IngestServer::take_end(const SessionEnd& end, const std::string& robot) {
+  return impl_->take([&](Intake& intake) { return intake.take_end(end, now(), robot); });
 }
 
 void IngestServer::count_foreign(Reason reason) {

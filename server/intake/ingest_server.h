@@ -28,9 +28,10 @@ class IngestServer {
   // For transports without flow control: checks the part, queues it for its sender (part_queue.h) and returns at once.
   void take_part(KeyframePart part);
   // As Intake's. They may block while a session begins.
-  void take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload);
-  void take_gap(Gap gap);
-  void take_end(SessionEnd end);
+  Status take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
+                      const std::string& robot = {});
+  Status take_gap(const Gap& gap, const std::string& robot = {});
+  Status take_end(const SessionEnd& end, const std::string& robot = {});
   void count_foreign(Reason reason);
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;

@@ -25,6 +25,13 @@ constexpr std::chrono::seconds kLive{5};             // a robot heard within thi
 constexpr std::chrono::minutes kLately{1};           // stats() counts the sessions that were heard within this time
 constexpr std::chrono::seconds kLookForNames{1};     // interval of looking for robots of the same name
 constexpr std::int64_t kNoLag = 86'400'000'000;      // us: so old a time stamp is a recording's and tells no lag
+
+// Counts why a message was not taken. Only NOT_ALLOWED is its sender's to know; the others pass.
+Status count_not_opened(ReasonCounts& counts, const Status& why) {
+  ++counts[index_of(why.reason())];
+  return why.reason() == Reason::NOT_ALLOWED ? why : Status();
+}
+
 }  // namespace
 
 Intake::Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IntakeOptions options,
@@ -43,10 +50,13 @@ Intake::~Intake() {
   outcomes_->wake = nullptr;
 }
 
-Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
+// The session's entry, which is made if it is not there. BUDGET_EXCEEDED: there are too many. NOT_ALLOWED.
+Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, const std::string& robot) {
   auto it = sessions_.find(session);
-  if (it == sessions_.end()) {
-    if (sessions_.size() >= options_.max_sessions && !make_room(now)) return nullptr;
+  const bool fresh = it == sessions_.end();
+  if (fresh) {
+    if (sessions_.size() >= options_.max_sessions && !make_room(now))
+      return Status(Reason::BUDGET_EXCEEDED, "as many sessions as can be are being taken in");
     auto submit = [this, session, outcomes = outcomes_](storage::JournalRecord record, std::uint64_t ticket) {
       return sink_.submit(std::move(record), [outcomes, session, ticket](const Result<std::uint64_t>& result) {
         const MutexLock lock(outcomes->mutex);
@@ -61,11 +71,21 @@ Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
     it->second.schedule.news();  // tells the robot what the daemon has
     it->second.begun = it->second.intake.begun();
     it->second.heard_first = now;
+  }
+  Entry& entry = it->second;
+  const std::string owner = entry.begun ? entry.intake.header().robot : entry.sender.value_or(robot);
+  if (!robot.empty() && robot != owner) {
+    if (fresh) sessions_.erase(it);
+    return Status(Reason::NOT_ALLOWED,
+                  robot + " may not send to session " + session.to_string() + ", which is another robot's");
+  }
+  if (fresh) {
     silent_.erase(session);
     ++begun_version_;
   }
-  it->second.schedule.heard(now);
-  return &it->second;
+  if (!entry.sender) entry.sender = robot;
+  entry.schedule.heard(now);
+  return &entry;
 }
 
 bool Intake::make_room(SteadyTime now) {
@@ -198,73 +218,94 @@ bool Intake::wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc) {
 void Intake::take_part(const KeyframePart& part, SteadyTime now) try {
   ++stats_.parts;
   if (const Status s = check_part(part); !s.ok()) return count_part(s.reason());
-  Entry* entry = open(part.session, now);
-  if (!entry) return count_part(Reason::BUDGET_EXCEEDED);
+  const auto opened = open(part.session, now, {});
+  if (!opened.ok()) return count_part(opened.reason());
+  Entry* const entry = *opened;
   entry->by_parts = true;
   entry->bytes.add(now, static_cast<double>(part.data.size()));
   if (!wanted(*entry, part.sequence, part.payload_crc) || !paced(*entry, part.sequence, now)) return;
   entry->intake.seen(part.sequence);
   auto whole = reassembly_.add(part, entry->begun ? part.session : SessionUuid{});
   if (!whole.ok()) return count_part(*entry, whole.reason());
-  if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now);
+  if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now, {});
 } catch (const StatusError& error) {
   count_part(error.status().reason());
 }
 
-void Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                          SteadyTime now) try {
+Status Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
+                            SteadyTime now, const std::string& robot) try {
   ++stats_.parts;
-  if (payload.empty() || payload.size() > kMaxKeyframeBytes) return count_part(Reason::BAD_SIZE);
-  if (crc32c(payload) != crc) return count_part(Reason::CORRUPT);
-  Entry* entry = open(session, now);
-  if (!entry) return count_part(Reason::BUDGET_EXCEEDED);
-  entry->by_parts = false;
-  entry->bytes.add(now, static_cast<double>(payload.size()));
-  if (!wanted(*entry, sequence, crc)) return;
-  auto charge = reassembly_.take_room(payload.size());
-  if (!charge) return count_part(*entry, Reason::BUDGET_EXCEEDED);
-  take_whole(*entry, session, sequence, {crc, std::move(payload), std::move(charge)}, now);
+  const auto refuse = [this](Reason reason) {
+    count_part(reason);
+    return Status();
+  };
+  if (payload.empty() || payload.size() > kMaxKeyframeBytes) return refuse(Reason::BAD_SIZE);
+  if (crc32c(payload) != crc) return refuse(Reason::CORRUPT);
+  const auto opened = open(session, now, robot);
+  if (!opened.ok()) return count_not_opened(stats_.parts_refused, opened.status());
+  Entry& entry = **opened;
+  entry.by_parts = false;
+  entry.bytes.add(now, static_cast<double>(payload.size()));
+  if (!wanted(entry, sequence, crc)) return {};
+  if (auto charge = reassembly_.take_room(payload.size()))
+    take_whole(entry, session, sequence, {crc, std::move(payload), std::move(charge)}, now, robot);
+  else
+    count_part(entry, Reason::BUDGET_EXCEEDED);
+  return {};
 } catch (const StatusError& error) {
   count_part(error.status().reason());
+  return {};
 }
 
 void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
-                        SteadyTime now) {
+                        SteadyTime now, const std::string& robot) {
   ++stats_.keyframes_received;
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
-  const bool sound = entry.intake.take(sequence, std::move(payload)).ok();
+  const bool sound = entry.intake.take(sequence, std::move(payload), robot).ok();
   if (!sound) entry.schedule.news();
   advance(session, entry, now);
   if (sound && entry.begun && !std::exchange(entry.announced, true))
     note(RobotEvent::Kind::kHeard, session, entry, now);
 }
 
-void Intake::take_gap(const Gap& gap, SteadyTime now) try {
-  const auto refuse = [this](Reason reason) { ++stats_.messages_refused[index_of(reason)]; };
+Status Intake::take_gap(const Gap& gap, SteadyTime now, const std::string& robot) try {
+  const auto refuse = [this](Reason reason) {
+    count_foreign(reason);
+    return Status();
+  };
   if (gap.from > gap.to || gap.session.is_nil() ||
       (gap.reason != Reason::DROPPED_BY_ROBOT && gap.reason != Reason::CAPTURE_FAILED &&
        gap.reason != Reason::MAP_RESTORED))
     return refuse(Reason::INVALID_ARGUMENT);
   if (gap.to - gap.from >= kMaxGapSequences) return refuse(Reason::BAD_SIZE);
   if (gap.to > kMaxSequence) return refuse(Reason::INVALID_ARGUMENT);
-  Entry* entry = open(gap.session, now);
-  if (!entry) return refuse(Reason::BUDGET_EXCEEDED);
-  entry->schedule.news();
-  entry->intake.give_up(gap.from, gap.to, gap.reason);
-  advance(gap.session, *entry, now);
-} catch (const StatusError& error) {
-  ++stats_.messages_refused[index_of(error.status().reason())];
-}
-
-void Intake::take_end(const SessionEnd& end, SteadyTime now) try {
-  if (end.session.is_nil()) return count_foreign(Reason::INVALID_ARGUMENT);
-  Entry* entry = open(end.session, now);
-  if (!entry) return count_foreign(Reason::BUDGET_EXCEEDED);
-  entry->schedule.news();
-  entry->intake.end(end.next_sequence);
-  if (entry->intake.ended()) tell(end.session, PoseNews::Kind::kEnded);
+  const auto opened = open(gap.session, now, robot);
+  if (!opened.ok()) return count_not_opened(stats_.messages_refused, opened.status());
+  Entry& entry = **opened;
+  entry.schedule.news();
+  entry.intake.give_up(gap.from, gap.to, gap.reason);
+  advance(gap.session, entry, now);
+  return {};
 } catch (const StatusError& error) {
   count_foreign(error.status().reason());
+  return {};
+}
+
+Status Intake::take_end(const SessionEnd& end, SteadyTime now, const std::string& robot) try {
+  if (end.session.is_nil()) {
+    count_foreign(Reason::INVALID_ARGUMENT);
+    return {};
+  }
+  const auto opened = open(end.session, now, robot);
+  if (!opened.ok()) return count_not_opened(stats_.messages_refused, opened.status());
+  Entry& entry = **opened;
+  entry.schedule.news();
+  entry.intake.end(end.next_sequence);
+  if (entry.intake.ended()) tell(end.session, PoseNews::Kind::kEnded);
+  return {};
+} catch (const StatusError& error) {
+  count_foreign(error.status().reason());
+  return {};
 }
 
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
@@ -447,9 +488,8 @@ Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try 
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
   for (const storage::Session& known : sink_.view()->sessions()) {
     if (known.header.uuid != session) continue;
-    const Entry* const entry = open(session, SteadyTime{});
-    if (!entry) return {Reason::BUDGET_EXCEEDED, "too many sessions are being taken in"};
-    return make_acknowledgement(session, *entry);
+    const auto entry = open(session, SteadyTime{}, {});
+    return entry.ok() ? make_acknowledgement(session, **entry) : Result<Acknowledgement>(entry.status());
   }
   return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
 } catch (const StatusError& error) {

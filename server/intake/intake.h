@@ -39,12 +39,13 @@ class Intake {
          std::function<void()> wake);
   ~Intake();
 
-  // None of these fails. Errors are counted by reason, and the next acknowledgement tells the robot what to do.
+  // Errors are counted by reason, and the next acknowledgement tells the robot what to do. `robot` is the robot that
+  // has proved to be the sender; empty: it may be any. NOT_ALLOWED, and nothing is done, if the session is another's.
   void take_part(const KeyframePart& part, SteadyTime now);
-  void take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                    SteadyTime now);
-  void take_gap(const Gap& gap, SteadyTime now);
-  void take_end(const SessionEnd& end, SteadyTime now);
+  Status take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
+                      SteadyTime now, const std::string& robot = {});
+  Status take_gap(const Gap& gap, SteadyTime now, const std::string& robot = {});
+  Status take_end(const SessionEnd& end, SteadyTime now, const std::string& robot = {});
   // Counts bytes that are no message (CORRUPT) or a message of another protocol (UNKNOWN_PROTOCOL_VERSION).
   void count_foreign(Reason reason);
 
@@ -71,7 +72,8 @@ class Intake {
   struct Entry {
     SessionIntake intake;
     AcknowledgementSchedule schedule;
-    double payload_bytes = 64 * 1024;  // running mean of keyframe sizes
+    std::optional<std::string> sender{};  // of the first message, while it has not begun; empty: it may be any
+    double payload_bytes = 64 * 1024;     // running mean of keyframe sizes
     RateMeter keyframes{}, bytes{};
     std::int64_t lag_us = -1;
     std::map<Reason, std::uint64_t> not_taken{};
@@ -105,7 +107,7 @@ class Intake {
     std::function<void()> wake RELMAP_GUARDED_BY(mutex);
   };
 
-  Entry* open(const SessionUuid& session, SteadyTime now);
+  Result<Entry*> open(const SessionUuid& session, SteadyTime now, const std::string& robot);
   bool make_room(SteadyTime now);
   bool drop_waiting(std::size_t more_than);
   void forget_silent(SteadyTime now);
@@ -121,7 +123,7 @@ class Intake {
   void tell_pace(const SessionUuid& session, Entry& entry, SteadyTime now);
   void tell(const SessionUuid& session, PoseNews::Kind kind, double rate_hz = 0);
   void take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
-                  SteadyTime now);
+                  SteadyTime now, const std::string& robot);
   void take_outcomes(SteadyTime now);
   void advance(const SessionUuid& session, Entry& entry, SteadyTime now);
   void join_line(const SessionUuid& session, Entry& entry);

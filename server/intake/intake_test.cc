@@ -256,7 +256,7 @@ TEST_F(IntakeTest, ConflictsAreRefusedAndSettleNothing) {
 TEST_F(IntakeTest, GapsAreJournalledExceptForSequencesThatCame) {
   send(0);
   send(4);
-  intake_->take_gap({uuid_, 1, 6, Reason::MAP_RESTORED}, now_);
+  EXPECT_TRUE(intake_->take_gap({uuid_, 1, 6, Reason::MAP_RESTORED}, now_).ok());
   send(7);
   EXPECT_EQ(acknowledge().next_sequence, 0u);
   EXPECT_EQ(settle().next_sequence, 8u);
@@ -272,9 +272,9 @@ TEST_F(IntakeTest, GapsAreJournalledExceptForSequencesThatCame) {
 }
 
 TEST_F(IntakeTest, InvalidGapsAreRefused) {
-  intake_->take_gap({uuid_, 3, 1, Reason::DROPPED_BY_ROBOT}, now_);
-  intake_->take_gap({uuid_, 0, 1, Reason::NOT_FINITE}, now_);
-  intake_->take_gap({uuid_, 0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
+  EXPECT_TRUE(intake_->take_gap({uuid_, 3, 1, Reason::DROPPED_BY_ROBOT}, now_).ok());
+  EXPECT_TRUE(intake_->take_gap({uuid_, 0, 1, Reason::NOT_FINITE}, now_).ok());
+  EXPECT_TRUE(intake_->take_gap({uuid_, 0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_).ok());
   const IngestStats stats = intake_->stats(now_);
   EXPECT_EQ(stats.messages_refused[index_of(Reason::INVALID_ARGUMENT)], 2u);
   EXPECT_EQ(stats.messages_refused[index_of(Reason::BAD_SIZE)], 1u);
@@ -310,7 +310,7 @@ TEST_F(IntakeTest, SessionThatBeginsWithRefusalsKeepsThemInTheJournal) {
   Keyframe bad = keyframe(0);
   bad.session.camera.f = 0.01;
   send(bad);
-  intake_->take_gap({uuid_, 1, 2, Reason::CAPTURE_FAILED}, now_);
+  EXPECT_TRUE(intake_->take_gap({uuid_, 1, 2, Reason::CAPTURE_FAILED}, now_).ok());
   Acknowledgement ack = settle();
   EXPECT_EQ(ack.next_sequence, 3u);
   EXPECT_EQ(ack.refused.size(), 1u);
@@ -328,7 +328,7 @@ TEST_F(IntakeTest, ARestartContinuesFromWhatTheMapKnows) {
   Keyframe bad = keyframe(1);
   bad.driven_us = -1;
   send(bad);
-  intake_->take_gap({uuid_, 2, 3, Reason::CAPTURE_FAILED}, now_);
+  EXPECT_TRUE(intake_->take_gap({uuid_, 2, 3, Reason::CAPTURE_FAILED}, now_).ok());
   settle();
   restart();
   EXPECT_EQ(intake_->acknowledgement(uuid_)->next_sequence, 4u);
@@ -470,9 +470,9 @@ TEST_F(IntakeTest, SilentSessionsMakeRoomForOthers) {
 
 TEST_F(IntakeTest, WholePayloadsAreCheckedAndAcknowledgedLikePartsOfThem) {
   const Bytes payload = encode_keyframe(keyframe(0));
-  intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_);
-  intake_->take_payload(uuid_, 1, crc32c(payload) ^ 1, payload, now_);
-  intake_->take_payload(uuid_, 1, 0, Bytes(kMaxKeyframeBytes + 1), now_);
+  EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_).ok());
+  EXPECT_TRUE(intake_->take_payload(uuid_, 1, crc32c(payload) ^ 1, payload, now_).ok());
+  EXPECT_TRUE(intake_->take_payload(uuid_, 1, 0, Bytes(kMaxKeyframeBytes + 1), now_).ok());
   EXPECT_EQ(settle().next_sequence, 1u);
   EXPECT_EQ(part_refused(Reason::CORRUPT), 1u);
   EXPECT_EQ(part_refused(Reason::BAD_SIZE), 1u);
@@ -505,7 +505,7 @@ TEST_F(IntakeTest, SessionsThatNeverBeginLockNobodyOut) {
     SessionUuid stranger;
     std::memcpy(stranger.bytes.data(), &i, sizeof i);
     stranger.bytes[15] = 1;
-    intake_->take_gap({stranger, 0, 5, Reason::DROPPED_BY_ROBOT}, now_);
+    EXPECT_TRUE(intake_->take_gap({stranger, 0, 5, Reason::DROPPED_BY_ROBOT}, now_).ok());
     now_ += milliseconds(1);
   }
   EXPECT_LE(intake_->stats(now_).sessions, 1024u);
@@ -514,7 +514,7 @@ TEST_F(IntakeTest, SessionsThatNeverBeginLockNobodyOut) {
 }
 
 TEST_F(IntakeTest, TheLastPossibleSequenceHasASuccessor) {
-  intake_->take_gap({uuid_, 0xfffffff0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
+  EXPECT_TRUE(intake_->take_gap({uuid_, 0xfffffff0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_).ok());
   EXPECT_EQ(intake_->stats(now_).messages_refused[index_of(Reason::INVALID_ARGUMENT)], 1u);
 }
 
@@ -594,26 +594,26 @@ TEST_F(IntakeTest, ASessionEndsWhenAllOfItIsSettledAndAKeyframeOpensItAgain) {
     return count;
   };
   for (std::uint32_t s = 0; s < 3; ++s) send(s);
-  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 3}, now_).ok());
   settle();
   EXPECT_EQ(ended(), 0u) << "not all was settled when it was said";
-  intake_->take_end({uuid_, 2}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 2}, now_).ok());
   settle();
   EXPECT_EQ(ended(), 0u) << "there is more than it knows";
-  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 3}, now_).ok());
   EXPECT_EQ(ended(), 0u) << "not durable";
   settle();
   EXPECT_EQ(ended(), 1u);
-  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 3}, now_).ok());
   EXPECT_EQ(ended(), 1u) << "the robot may not have heard";
   restart();
-  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 3}, now_).ok());
   EXPECT_EQ(ended(), 1u);
   EXPECT_EQ(journalled<storage::SetSessionStateRecord>().size(), 1u);
   send(3);
   EXPECT_EQ(settle().next_sequence, 4u);
   EXPECT_EQ(sink_.view()->session(1)->state, storage::SessionState::kOpen);
-  intake_->take_end({uuid_, 4}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 4}, now_).ok());
   settle();
   EXPECT_EQ(ended(), 1u);
   EXPECT_EQ(journalled<storage::SetSessionStateRecord>().size(), 2u);
@@ -815,7 +815,7 @@ TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
   uuid_.bytes[0] ^= 1;
   send(0);
   settle();
-  intake_->take_end({uuid_, 1}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 1}, now_).ok());
   settle();
   uuid_.bytes[0] ^= 2;
   Keyframe bad = keyframe(0);
@@ -940,7 +940,7 @@ TEST_F(IntakeTest, TwoRobotsOfOneNameDifferFromOneThatWasRestarted) {
   hear(second, 2);
   EXPECT_FALSE(namesakes(second).empty());
   uuid_ = first;
-  intake_->take_end({first, 3}, now_);
+  EXPECT_TRUE(intake_->take_end({first, 3}, now_).ok());
   settle();
   EXPECT_TRUE(namesakes(second).empty());
 }
@@ -966,7 +966,7 @@ TEST_F(IntakeTest, ReportsToTheLogWhoIsHeardAndWhoFellSilent) {
   send(3);
   settle();
   EXPECT_EQ(kinds(), Kinds{RobotEvent::Kind::kHeard}) << "it is back";
-  intake_->take_end({uuid_, 4}, now_);
+  EXPECT_TRUE(intake_->take_end({uuid_, 4}, now_).ok());
   settle();
   now_ += std::chrono::seconds(70);
   (void)intake_->poll(now_);

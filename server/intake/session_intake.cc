@@ -81,7 +81,7 @@ SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint
   return Verdict::kTake;
 }
 
-Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) {
+Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload, const std::string& robot) {
   seen(sequence);
   const Result<Keyframe> keyframe = decode_keyframe(payload.bytes);
   Held held;
@@ -89,6 +89,8 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
   held.verdict = check_payload(uuid_, sequence, keyframe);
   if (held.verdict.ok() && !robots_.empty() && !robots_.contains(keyframe->session.robot))
     held.verdict = {Reason::NOT_ALLOWED, "robot " + keyframe->session.robot + " is not on the list"};
+  if (held.verdict.ok() && !robot.empty() && keyframe->session.robot != robot)
+    held.verdict = {Reason::NOT_ALLOWED, robot + " sent a keyframe of robot " + keyframe->session.robot};
   const Status verdict = held.verdict;
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;

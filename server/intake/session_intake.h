@@ -37,8 +37,8 @@ class SessionIntake {
   Verdict classify(std::uint32_t sequence, std::uint32_t crc);
 
   // Takes a complete payload for which classify() returned kTake. Not OK: the reason for which the sequence will be
-  // refused when its turn comes.
-  Status take(std::uint32_t sequence, Reassembly::Payload payload);
+  // refused when its turn comes, NOT_ALLOWED if the keyframe is not of `robot` (empty: it may be of any).
+  Status take(std::uint32_t sequence, Reassembly::Payload payload, const std::string& robot = {});
   // Takes a gap. Requires from <= to.
   void give_up(std::uint32_t from, std::uint32_t to, Reason reason);
   // Notes that something came of a sequence, so that lower ones of which nothing came are missing.

@@ -29,8 +29,9 @@ std::string convert(const YAML::Node& node, T& value, const char* kind) {
   return {};
 }
 
-Setter text(std::string Config::*member) {
-  return [member](const YAML::Node& node, Config& config) { return convert(node, config.*member, "text"); };
+template <typename Get>
+Setter text(Get get) {
+  return [get](const YAML::Node& node, Config& config) { return convert(node, std::invoke(get, config), "text"); };
 }
 
 template <typename Get>
@@ -95,7 +96,22 @@ std::string read_robots(const YAML::Node& node, Config& config) {
 const std::map<std::string, Setter>& settings() {
   static const std::map<std::string, Setter> table{
       {"data", text(&Config::data)},
-      {"listen", text(&Config::listen)},
+      {"listen",
+       [](const YAML::Node& node, Config& config) -> std::string {
+         std::string said;
+         if (auto wrong = convert(node, said, "text"); !wrong.empty()) return wrong;
+         config.listen = listen_of(said);
+         return {};
+       }},
+      {"socket_group", text(&Config::socket_group)},
+      {"credentials", text(&Config::credentials)},
+      {"access", text(&Config::access)},
+      {"tls.certificate", text([](Config& c) -> std::string& { return c.tls.certificate; })},
+      {"tls.key", text([](Config& c) -> std::string& { return c.tls.key; })},
+      {"tls.client_authority", text([](Config& c) -> std::string& { return c.tls.client_authority; })},
+      {"rpc.max_connections", number([](Config& c) -> std::size_t& { return c.connections.total; }, 1, 100000)},
+      {"rpc.max_connections_per_peer",
+       number([](Config& c) -> std::size_t& { return c.connections.per_peer; }, 1, 100000)},
       {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},
       {"lcm",
        [](const YAML::Node& node, Config& config) -> std::string {
@@ -158,8 +174,6 @@ Status apply(const YAML::Node& map, const std::string& prefix, const std::string
   return {};
 }
 
-bool is_loopback(const std::string& host) { return host == "localhost" || host == "::1" || host.starts_with("127."); }
-
 }  // namespace
 
 Status parse_config(std::string_view text, const std::string& name, Config& config) {
@@ -203,14 +217,32 @@ Status check_lcm(const std::string& url) {
 }  // namespace
 
 std::string lcm_url_of(const std::string& said) { return said == "none" ? std::string() : said; }
+std::string listen_of(const std::string& said) { return said == "none" ? std::string() : said; }
+
+void complete_config(Config& config) {
+  if (config.credentials.empty()) return;
+  const auto complete = [&](std::string& file, const char* name) {
+    if (file.empty()) file = config.credentials + "/" + name;
+  };
+  complete(config.tls.certificate, "server.pem");
+  complete(config.tls.key, "server.pem");
+  complete(config.tls.client_authority, "ca.crt");
+  complete(config.access, "access");
+}
 
 Status check_config(const Config& config) {
   if (config.data.empty()) return {Reason::BAD_CONFIG, "no data folder: give --data DIR"};
-  const auto listen = parse_host_port(config.listen);
-  if (!listen.ok()) return listen.status();
-  if (!listen->loopback && !config.insecure)
-    return {Reason::BAD_CONFIG, "listening on " + config.listen +
-                                    " would let anyone who can reach it edit the map; say --insecure to allow that"};
+  if (!config.listen.empty())
+    if (const auto listen = parse_host_port(config.listen); !listen.ok()) return listen.status();
+  const bool tls = !config.tls.certificate.empty();
+  if (tls == config.tls.key.empty())
+    return {Reason::BAD_CONFIG, "tls.certificate and tls.key belong together: one of them is missing"};
+  if (!config.listen.empty() && tls == config.insecure)
+    return {Reason::BAD_CONFIG,
+            tls ? "TLS and --insecure contradict each other"
+                : "listening on " + config.listen +
+                      " would let anyone who can reach it edit the map; give --credentials FOLDER (relmap-admin "
+                      "credentials makes it), or allow that with --insecure"};
   if (Status lcm = check_lcm(config.lcm); !lcm.ok()) return lcm;
   static const std::set<std::string> levels{"trace", "debug", "info", "warning", "error"};
   if (!levels.contains(config.log_level))
@@ -238,7 +270,6 @@ Result<HostPort> parse_host_port(std::string_view text) {
   const std::string_view digits = text.substr(colon + 1);
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), result.port);
   if (error != std::errc{} || end != digits.data() + digits.size()) return bad();
-  result.loopback = is_loopback(result.host);
   return result;
 }
 

@@ -11,16 +11,23 @@
 #include "server/map/way_around.h"
 #include "server/route/weight.h"
 #include "server/rpc/limits.h"
+#include "server/rpc/listener.h"
+#include "server/rpc/server.h"
 
 namespace relmap::ops {
 
 struct Config {
-  std::string data;                        // folder of the map
-  std::string listen = "127.0.0.1:50070";  // HOST:PORT of gRPC; port 0: any free port
-  bool insecure = false;                   // allows listening beyond loopback, where everyone is an operator
-  std::string lcm;                         // LCM URL; empty: off
-  double max_keyframes_per_s = 100;        // mean that one robot may send over LCM; 0: no limit
-  std::vector<std::string> robots;         // names of the robots whose keyframes are taken; empty: all
+  std::string data;          // folder of the map
+  std::string socket_group;  // whose members may use DIR/socket, besides the user that runs the daemon; empty: nobody
+  std::string listen;        // HOST:PORT of gRPC over TCP; port 0: any free port; empty: only the socket
+  bool insecure = false;     // no TLS: everyone who can reach `listen` is an operator
+  std::string credentials;   // folder of `relmap-admin credentials`, whose files the next two take if they name none
+  rpc::TlsFiles tls;
+  std::string access;  // file of tokens and revocations (proto/access/access_list.h)
+  rpc::ConnectionLimits connections;
+  std::string lcm;                   // LCM URL; empty: off
+  double max_keyframes_per_s = 100;  // mean that one robot may send over LCM; 0: no limit
+  std::vector<std::string> robots;   // names of the robots whose keyframes are taken; empty: all
   std::uint64_t memory_budget_mb = 1024;
   std::uint64_t disk_low_water_mb = 256;  // with less free disk space nothing is taken in
   std::string vocabulary;                 // file; empty: the shipped one
@@ -48,13 +55,18 @@ Status parse_config(std::string_view text, const std::string& name, Config& conf
 // Config::lcm for a setting as given: "none" means off, so that the command line can override a URL in the file.
 std::string lcm_url_of(const std::string& said);
 
+// Config::listen for a setting as given, in the same way.
+std::string listen_of(const std::string& said);
+
+// Names the files in Config::credentials where the configuration names none.
+void complete_config(Config& config);
+
 // BAD_CONFIG if settings contradict each other or a necessary one is missing.
 Status check_config(const Config& config);
 
 struct HostPort {
   std::string host;
   std::uint16_t port = 0;
-  bool loopback = false;  // 127.0.0.0/8, ::1 or localhost
   std::string to_string() const;
 };
 // Parses HOST:PORT, as in "127.0.0.1:50070", "[::1]:0" or "localhost:50070". BAD_CONFIG if it is none.

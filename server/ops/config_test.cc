@@ -102,20 +102,44 @@ TEST(Config, AMissingFileIsReported) {
   EXPECT_NE(status.message().find("/nowhere/relmapd.yaml"), std::string::npos);
 }
 
-TEST(Config, ListeningBeyondLoopbackNeedsInsecure) {
+TEST(Config, ListeningOverTcpNeedsTlsOrInsecure) {
   Config config;
   config.data = "map";
-  for (const char* address : {"127.0.0.1:0", "127.8.0.1:1", "[::1]:50070", "localhost:50070"}) {
+  EXPECT_TRUE(check_config(config).ok()) << "only the socket";
+  for (const char* address : {"127.0.0.1:0", "localhost:50070", "0.0.0.0:50070", "[::]:50070", "robot.local:50070"}) {
     config.listen = address;
-    EXPECT_TRUE(check_config(config).ok()) << address;
-  }
-  for (const char* address : {"0.0.0.0:50070", "[::]:50070", "192.168.0.7:50070", "robot.local:50070"}) {
-    config.listen = address;
+    config.tls = {};
     config.insecure = false;
     EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG) << address;
     config.insecure = true;
     EXPECT_TRUE(check_config(config).ok()) << address;
+    config.tls = {"server.crt", "server.key", ""};
+    EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG) << "a contradiction";
+    config.insecure = false;
+    EXPECT_TRUE(check_config(config).ok()) << address;
+    config.tls.key.clear();
+    EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG) << "half of a pair";
   }
+  config.listen = listen_of("none");
+  EXPECT_EQ(config.listen, "");
+}
+
+TEST(Config, AFolderOfCredentialsNamesWhatNothingElseNames) {
+  Config config;
+  ASSERT_TRUE(parse_config("credentials: /etc/relmap/credentials\ntls: { key: /elsewhere/key.pem }\n"
+                           "rpc: { max_connections: 20, max_connections_per_peer: 10 }\n",
+                           "relmapd.yaml", config)
+                  .ok());
+  complete_config(config);
+  EXPECT_EQ(config.tls.certificate, "/etc/relmap/credentials/server.pem");
+  EXPECT_EQ(config.tls.key, "/elsewhere/key.pem");
+  EXPECT_EQ(config.tls.client_authority, "/etc/relmap/credentials/ca.crt");
+  EXPECT_EQ(config.access, "/etc/relmap/credentials/access");
+  EXPECT_EQ(config.connections.total, 20u);
+  EXPECT_EQ(config.connections.per_peer, 10u);
+  Config plain;
+  complete_config(plain);
+  EXPECT_EQ(plain.access + plain.tls.certificate, "");
 }
 
 TEST(Config, RefusesLcmUrlsThatCannotDeliverKeyframes) {

@@ -15,6 +15,7 @@
 #include "server/ingest/mapper_sink.h"
 #include "server/ops/endpoint.h"
 #include "server/ops/process.h"
+#include "server/ops/socket_path.h"
 #include "server/route/overlay/route_index.h"
 #include "server/rpc/server.h"
 #include "storage/io/file.h"
@@ -86,6 +87,7 @@ struct Daemon::Impl {
   void start_lcm();
   DaemonStatus lcm_status() const;
   void report() const;
+  void reload_access();
   Status stop();
 
   const Config config;
@@ -102,8 +104,10 @@ struct Daemon::Impl {
   mutable Mutex lcm_mutex;
   Status lcm_refusal RELMAP_GUARDED_BY(lcm_mutex);  // why LCM ingest does not run
   std::unique_ptr<rpc::Core> core;
+  std::unique_ptr<rpc::Gatekeeper> gatekeeper;
   std::unique_ptr<rpc::RpcServer> server;
-  std::string address;
+  std::string socket, address;
+  std::string access_problem;  // with the access list, which is logged once
 
   std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
   bool stopped = false;
@@ -173,17 +177,29 @@ Status Daemon::Impl::serve() {
   core->routes.index->start();
   mapper->use_route_map([this] { return core->routes.index->snapshot(); });
 
-  auto where = parse_host_port(config.listen);
-  if (!where.ok()) return where.status();
-  auto started = rpc::RpcServer::start(*core, {where->host, where->port});
+  auto path = socket_path(config.data);
+  if (!path.ok()) return path.status();
+  socket = std::move(*path);
+  rpc::ServerOptions options{socket, config.socket_group, {}, 0, config.tls, config.connections};
+  if (!config.listen.empty()) {
+    const auto where = parse_host_port(config.listen);
+    if (!where.ok()) return where.status();
+    options.host = where->host;
+    options.port = where->port;
+  }
+  gatekeeper = std::make_unique<rpc::Gatekeeper>(config.access, config.insecure);
+  if (Status known = gatekeeper->reload(); !known.ok()) return {Reason::BAD_CONFIG, known.message()};
+  if (config.insecure && !config.listen.empty())
+    spdlog::warn("--insecure: everyone who can reach {} may edit the map", config.listen);
+  auto started = rpc::RpcServer::start(*core, *gatekeeper, options);
   if (!started.ok()) return started.status();
   server = std::move(started).value();
-  where->port = server->port();
-  address = where->to_string();
+  if (!options.host.empty()) address = HostPort{options.host, server->port()}.to_string();
   start_lcm();
-  const Status written = write_endpoint(config.data, {address, getpid(), hex(boot)});
+  const Status written = write_endpoint(config.data, {socket, address, getpid(), hex(boot)});
   if (written.ok() || mapper->stats().storage.reason() != Reason::READ_ONLY) return written;
-  spdlog::warn("clients find the daemon by its address only: {}", written.to_string());
+  spdlog::warn("clients find the daemon only by --server unix:{}{}: {}", socket,
+               address.empty() ? std::string() : " or " + address, written.to_string());
   return {};
 }
 
@@ -227,6 +243,13 @@ void Daemon::Impl::report() const {
                budget->used() >> 20, budget->limit() >> 20, resident_bytes() >> 20);
 }
 
+void Daemon::Impl::reload_access() {
+  const Status read = gatekeeper->reload_if_changed();
+  if (!read.ok() && read.message() != access_problem)
+    spdlog::error("the access list stays as it was: {}", read.to_string());
+  access_problem = read.message();
+}
+
 Status Daemon::Impl::stop() {
   if (stopped) return {};
   stopped = true;
@@ -258,6 +281,8 @@ Daemon::~Daemon() {
 Status Daemon::check(const Config& config) {
   if (Status sound = check_config(config); !sound.ok()) return sound;
   if (const auto vocabulary = load_vocabulary(config); !vocabulary.ok()) return vocabulary.status();
+  if (Status sound = rpc::check_files(config.tls); !sound.ok()) return sound;
+  if (Status known = rpc::Gatekeeper(config.access).reload(); !known.ok()) return {Reason::BAD_CONFIG, known.message()};
   return storage::check_data_folder(config.data);
 }
 
@@ -266,17 +291,20 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
   std::unique_ptr<Daemon> daemon(new Daemon(std::make_unique<Impl>(config)));
   if (Status status = daemon->impl_->open_map(); !status.ok()) return with_advice(status, config);
   if (Status status = daemon->impl_->serve(); !status.ok()) return status;
-  spdlog::info("relmapd {} serves {} on {}{}", RELMAP_VERSION, config.data, daemon->address(),
+  spdlog::info("relmapd {} serves {} at {}{}{}", RELMAP_VERSION, config.data, daemon->socket(),
+               daemon->address().empty() ? std::string() : ", gRPC on " + daemon->address(),
                daemon->impl_->lcm ? ", LCM on " + config.lcm : std::string());
   return daemon;
 }
 
+const std::string& Daemon::socket() const { return impl_->socket; }
 const std::string& Daemon::address() const { return impl_->address; }
 
 void Daemon::tick() {
   const auto now = std::chrono::steady_clock::now();
   impl_->core->views.expire();
   impl_->core->routes.found.expire();
+  impl_->reload_access();
   give_back_free_memory();
   storage::Budget& budget = impl_->mapper->budget();
   budget.set(storage::Share::kAllocator,

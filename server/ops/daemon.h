@@ -22,10 +22,11 @@ class Daemon {
   // Calls stop().
   ~Daemon();
 
-  // HOST:PORT at which gRPC is served.
+  // Where gRPC is served: the path of the Unix socket, and HOST:PORT, which is empty without TCP.
+  const std::string& socket() const;
   const std::string& address() const;
 
-  // Periodic work. Call about once a second.
+  // Periodic work. Call about once a second. Reads the access list again if it has changed.
   void tick();
 
   // Takes nothing more in, ends running calls, applies what is durable, and commits. Not OK if the last commit failed;

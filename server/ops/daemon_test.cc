@@ -18,6 +18,7 @@ class DaemonTest : public testing::Test {
     std::filesystem::remove_all(folder_);
     config_.data = folder_ + "/map";
     config_.listen = "127.0.0.1:0";
+    config_.insecure = true;
     config_.memory_budget_mb = 64;
   }
   ~DaemonTest() override { std::filesystem::remove_all(folder_); }
@@ -36,9 +37,21 @@ TEST_F(DaemonTest, WritesTheEndpointFileAndRemovesItWhenItStops) {
   auto daemon = Daemon::start(config_);
   ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
   EXPECT_THAT(endpoint(), testing::HasSubstr("address " + (*daemon)->address() + "\npid " + std::to_string(getpid())));
+  EXPECT_THAT(endpoint(), testing::StartsWith("socket " + config_.data + "/socket\n"));
+  EXPECT_TRUE(std::filesystem::is_socket(config_.data + "/socket"));
   (*daemon)->tick();
   EXPECT_TRUE((*daemon)->stop().ok());
   EXPECT_FALSE(std::filesystem::exists(config_.data + "/endpoint"));
+  EXPECT_FALSE(std::filesystem::exists(config_.data + "/socket"));
+}
+
+TEST_F(DaemonTest, ServesOnlyAtItsSocketUnlessToldOtherwise) {
+  config_.listen = Config().listen;
+  config_.insecure = false;
+  auto daemon = Daemon::start(config_);
+  ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
+  EXPECT_EQ((*daemon)->address(), "");
+  EXPECT_THAT(endpoint(), testing::Not(testing::HasSubstr("address")));
 }
 
 TEST_F(DaemonTest, ReleasesTheFolderWhenItStops) {
@@ -70,8 +83,12 @@ TEST_F(DaemonTest, ASecondDaemonOnThePortFails) {
 
 TEST_F(DaemonTest, RefusesUnusableConfigurations) {
   Config config = config_;
-  config.listen = "0.0.0.0:0";
+  config.insecure = false;
+  EXPECT_EQ(Daemon::start(config).reason(), Reason::BAD_CONFIG) << "TCP needs TLS, also within this machine";
+  config.credentials = folder_ + "/nowhere";
+  complete_config(config);
   EXPECT_EQ(Daemon::start(config).reason(), Reason::BAD_CONFIG);
+  EXPECT_EQ(Daemon::check(config).reason(), Reason::BAD_CONFIG);
   config = config_;
   config.vocabulary = folder_ + "/nowhere.vocab";
   EXPECT_EQ(Daemon::start(config).reason(), Reason::NO_SUCH_FILE);

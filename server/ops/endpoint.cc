@@ -11,7 +11,9 @@ Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint) 
   const std::string path = data_folder + "/endpoint", temporary = path + ".new";
   {
     std::ofstream file(temporary, std::ios::trunc);
-    file << "address " << endpoint.address << "\npid " << endpoint.pid << "\nboot " << endpoint.boot_id << "\n";
+    file << "socket " << endpoint.socket << "\n";
+    if (!endpoint.address.empty()) file << "address " << endpoint.address << "\n";
+    file << "pid " << endpoint.pid << "\nboot " << endpoint.boot_id << "\n";
     file.close();
     if (!file) return {Reason::IO_ERROR, "cannot write " + temporary + ": " + std::strerror(errno)};
   }

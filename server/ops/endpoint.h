@@ -1,7 +1,8 @@
-// The file DIR/endpoint tells at which address the daemon that owns the data folder DIR serves. It exists while the
-// daemon serves. After a crash it stays behind, which can be told by its pid and boot id.
+// The file DIR/endpoint tells where the daemon that owns the data folder DIR serves. It exists while the daemon serves.
+// After a crash it stays behind, which can be told by its pid and boot id.
 //
-//   address 127.0.0.1:50070
+//   socket /srv/map/socket
+//   address 0.0.0.0:50070     (if it serves over TCP, too)
 //   pid 4711
 //   boot 3f0c...
 #pragma once
@@ -14,7 +15,8 @@
 namespace relmap::ops {
 
 struct Endpoint {
-  std::string address;  // host:port
+  std::string socket;   // absolute path
+  std::string address;  // host:port; empty: only the socket
   std::int64_t pid = 0;
   std::string boot_id;
 };

@@ -1,5 +1,7 @@
 #include "server/ops/process.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <fstream>
@@ -26,6 +28,14 @@ std::size_t status_field(const char* field) {
 }
 
 }  // namespace
+
+std::size_t raise_file_limit() {
+  rlimit files{};
+  if (getrlimit(RLIMIT_NOFILE, &files) != 0) return 0;
+  files.rlim_cur = files.rlim_max;
+  if (setrlimit(RLIMIT_NOFILE, &files) != 0) getrlimit(RLIMIT_NOFILE, &files);
+  return files.rlim_cur;
+}
 
 std::size_t resident_bytes() { return status_field("VmRSS:"); }
 std::size_t peak_resident_bytes() { return status_field("VmHWM:"); }

@@ -5,6 +5,9 @@
 
 namespace relmap::ops {
 
+// Raises the number of files that may be open to what the system allows this process, and returns it.
+std::size_t raise_file_limit();
+
 std::size_t resident_bytes();
 std::size_t peak_resident_bytes();
 

@@ -90,6 +90,8 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::NOT_ALLOWED:
     case Reason::CAMERA_FORBIDDEN:
       return grpc::StatusCode::PERMISSION_DENIED;
+    case Reason::UNAUTHENTICATED:
+      return grpc::StatusCode::UNAUTHENTICATED;
     case Reason::BUDGET_EXCEEDED:
     case Reason::RATE_LIMITED:
     case Reason::DISK_FULL:

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "proto/base/hex.h"
+#include "server/rpc/caller.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/roles.h"
 
@@ -32,10 +33,6 @@ std::string choose_request_id(const grpc::CallbackServerContext& context) {
   return hex(std::uint64_t{random()});
 }
 
-// Without TLS callers cannot be told apart: everybody who reaches the port, which is loopback unless --insecure is
-// given, is an operator.
-Identity identify(const grpc::CallbackServerContext&) { return {"anonymous", Role::kOperator}; }
-
 std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerContext& context, double default_s) {
   const auto now = std::chrono::steady_clock::now();
   const auto left = context.deadline() - std::chrono::system_clock::now();
@@ -48,10 +45,11 @@ std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerCont
 
 }  // namespace
 
-Gateway::Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics)
+Gateway::Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics, const Gatekeeper& gatekeeper)
     : limits_(limits),
       budget_(budget),
       metrics_(metrics),
+      gatekeeper_(gatekeeper),
       general_(limits.threads),
       picture_thread_(1),
       maintenance_thread_(1) {}
@@ -65,7 +63,7 @@ Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* m
       deadline_{deadline_of(*context, gateway.limits_.default_deadline_s), [this]() -> Status {
                   if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
                   if (cancelled_) return {Reason::DEADLINE, "the caller has gone"};
-                  return {};
+                  return check_caller();
                 }} {
   context_->AddInitialMetadata("x-request-id", request_id_);
 }
@@ -87,10 +85,9 @@ void Call::leave() {
 }
 
 Status Call::admit(std::size_t more) {
-  const Identity caller = identify(*context_);
-  const auto required = required_role(method_);
-  if (!required || caller.role < *required)
-    return {Reason::UNSUPPORTED, std::string(caller.name) + " may not call " + method_};
+  auto caller = identify();
+  if (!caller.ok()) return caller.status();
+  caller_ = std::move(*caller);
   counted_ = running_ = true;
   ++gateway_.calls_;
   if (lane_ == Lane::kIngest) {
@@ -124,6 +121,27 @@ Status Call::admit(std::size_t more) {
     return {Reason::BUDGET_EXCEEDED, "waiting pictures use half of the " + std::to_string(share) +
                                          " bytes that the memory budget leaves for replies"};
   return charge_->grow_to(kBytesPerCall + more);
+}
+
+Result<Identity> Call::identify() const {
+  auto caller = gateway_.gatekeeper_.identify(evidence_of(*context_, *context_->auth_context()));
+  if (!caller.ok()) return caller;
+  const auto required = required_role(method_);
+  if (!required || caller->role < *required)
+    return Status(Reason::NOT_ALLOWED, std::string(method_) + " is for the role " +
+                                           std::string(access::role_name(required.value_or(Role::kOperator))) +
+                                           ", and " + caller->name + " has the role " +
+                                           std::string(access::role_name(caller->role)));
+  return caller;
+}
+
+Status Call::check_caller() const {
+  if (gateway_.gatekeeper_.is_current(caller_)) return {};
+  const auto now = identify();
+  if (!now.ok()) return now.status();
+  return now->name == caller_.name && now->role == caller_.role
+             ? Status()
+             : Status(Reason::UNAUTHENTICATED, "the credentials of " + caller_.name + " have changed");
 }
 
 void Call::post(std::function<void()> task) {

@@ -13,6 +13,7 @@
 
 #include "server/rpc/charge.h"
 #include "server/rpc/deadline.h"
+#include "server/rpc/gatekeeper.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/metrics.h"
 #include "server/rpc/producer.h"
@@ -29,8 +30,8 @@ enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest };
 
 class Gateway {
  public:
-  // `budget` and `metrics` must outlive it.
-  Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics);
+  // `budget`, `metrics` and `gatekeeper` must outlive it.
+  Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics, const Gatekeeper& gatekeeper);
 
   // From now on refuses new calls with SHUTTING_DOWN and interrupts running ones (Deadline::check()).
   void drain() { draining_ = true; }
@@ -53,6 +54,7 @@ class Gateway {
   const RpcLimits limits_;
   storage::Budget& budget_;
   Metrics& metrics_;
+  const Gatekeeper& gatekeeper_;
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
   // Calls that are not answered yet; gRPC may hold a call a little longer.
@@ -66,8 +68,14 @@ class Call {
   Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane);
   ~Call();
 
-  // Checks role, admission and budget, and charges a call of usual size plus `more` bytes. Must be called first, once.
+  // Checks identity, role, admission and budget, and charges a call of usual size plus `more` bytes. Must be called
+  // first, once.
   Status admit(std::size_t more);
+  // Who calls, once admitted.
+  const Identity& caller() const { return caller_; }
+  // Not OK once the caller's credentials have expired or were revoked during the call: UNAUTHENTICATED, NOT_ALLOWED.
+  // deadline().check() includes it. Thread-safe.
+  Status check_caller() const;
   const Deadline& deadline() const { return deadline_; }
   std::string peer() const { return context_->peer(); }
   void cancel() { cancelled_ = true; }
@@ -81,6 +89,7 @@ class Call {
 
  private:
   static Status from_current_exception();
+  Result<Identity> identify() const;
   void leave();
 
   Gateway& gateway_;
@@ -89,6 +98,7 @@ class Call {
   const Lane lane_;
   const std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   std::string request_id_;
+  Identity caller_;
   std::atomic<bool> cancelled_{false};
   Deadline deadline_;
   bool counted_ = false, running_ = false;

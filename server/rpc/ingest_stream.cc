@@ -40,8 +40,10 @@ void IngestStream::OnReadDone(bool ok) {
 }
 
 Status IngestStream::take(v1::IngestRequest& request) {
+  if (Status known = call_.check_caller(); !known.ok()) return known;
   if (!subscription_) return begin(request);
   intake::IngestServer& intake = *intake_;
+  const std::string robot = call_.caller().robot();
   switch (request.content_case()) {
     case v1::IngestRequest::kKeyframe: {
       const v1::KeyframePayload& keyframe = request.keyframe();
@@ -51,23 +53,21 @@ Status IngestStream::take(v1::IngestRequest& request) {
       if (keyframe.payload().size() > kMaxKeyframeBytes)
         return {Reason::BAD_SIZE, "a keyframe of " + std::to_string(keyframe.payload().size()) + " bytes; at most " +
                                       std::to_string(kMaxKeyframeBytes)};
-      intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
-                          Bytes(keyframe.payload().begin(), keyframe.payload().end()));
-      return {};
+      return leave_unless(intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
+                                              Bytes(keyframe.payload().begin(), keyframe.payload().end()), robot),
+                          *uuid);
     }
     case v1::IngestRequest::kGap: {
       const auto gap = read_gap(request.gap());
       if (!gap.ok()) break;
       if (Status joined = join(gap->session); !joined.ok()) return joined;
-      intake.take_gap(*gap);
-      return {};
+      return leave_unless(intake.take_gap(*gap, robot), gap->session);
     }
     case v1::IngestRequest::kEnd: {
       const auto ended = read_end(request.end());
       if (!ended.ok()) break;
       if (Status joined = join(ended->session); !joined.ok()) return joined;
-      intake.take_end(*ended);
-      return {};
+      return leave_unless(intake.take_end(*ended, robot), ended->session);
     }
     case v1::IngestRequest::kHello:
     case v1::IngestRequest::CONTENT_NOT_SET:
@@ -84,6 +84,8 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
             "protocol " + std::to_string(major) + "; known: " + std::to_string(kProtocolMajor)};
   if (Status storage = mapper_.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
   const std::string& robot = request.hello().robot();  // for the log only; keyframes name their robot themselves
+  if (const std::string own = call_.caller().robot(); !own.empty() && robot != own)
+    return {Reason::NOT_ALLOWED, own + " may not send keyframes as " + robot};
   who_ = (check_name("robot", robot).ok() ? "robot " + robot : "a robot without a name") + " (" + call_.peer() + ")";
   spdlog::info("{} has connected", who_);
   v1::IngestReply welcome;
@@ -101,6 +103,15 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
   return {};
 }
 
+// Ends the stream of a robot that sends to another's session, of which it must hear nothing either.
+Status IngestStream::leave_unless(const Status& taken, const SessionUuid& session) {
+  if (taken.ok()) return {};
+  const MutexLock lock(mutex_);
+  sessions_.erase(session);
+  acknowledgements_.erase(session);
+  return taken;
+}
+
 Status IngestStream::join(const SessionUuid& session) {
   const MutexLock lock(mutex_);
   if (sessions_.size() >= kMaxStreamSessions && !sessions_.contains(session))
@@ -112,13 +123,18 @@ Status IngestStream::join(const SessionUuid& session) {
 void IngestStream::hear(const Acknowledgement& ack) {
   const MutexLock lock(mutex_);
   if (ending_ || !sessions_.contains(ack.session)) return;
-  acknowledgements_.insert_or_assign(ack.session, ack);
+  if (const Status known = call_.check_caller(); !known.ok()) ending_ = known;
+  if (!ending_) acknowledgements_.insert_or_assign(ack.session, ack);
   go_on();
 }
 
 void IngestStream::hear(const PoseNews& news) {
   const MutexLock lock(mutex_);
   if (ending_ || !sessions_.contains(news.session) || replies_.size() >= kMaxReplies) return;
+  if (const Status known = call_.check_caller(); !known.ok()) {
+    ending_ = known;
+    return go_on();
+  }
   replies_.push_back(news_message(news));
   go_on();
 }

@@ -34,6 +34,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   Status take(v1::IngestRequest& request);
   Status begin(const v1::IngestRequest& request);
   Status join(const SessionUuid& session);
+  Status leave_unless(const Status& taken, const SessionUuid& session);
   void hear(const Acknowledgement& ack);
   void hear(const PoseNews& news);
   void end(const Status& status);

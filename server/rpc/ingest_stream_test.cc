@@ -43,7 +43,7 @@ class IngestStreamTest : public testing::Test {
     options.map = map_.mapper->identity();
     intake_ = std::make_unique<intake::IngestServer>(*sink_, map_.mapper->budget(), BootId{4, 2}, std::move(options));
     core_->intake.server = intake_.get();
-    server_ = RpcServer::start(*core_, {}).or_throw();
+    server_ = RpcServer::start(*core_, everyone_, {.host = "127.0.0.1"}).or_throw();
     stub_ = v1::Ingest::NewStub(
         grpc::CreateChannel("127.0.0.1:" + std::to_string(server_->port()), grpc::InsecureChannelCredentials()));
   }
@@ -91,6 +91,7 @@ class IngestStreamTest : public testing::Test {
   std::unique_ptr<Core> core_;
   std::unique_ptr<ingest::MapperSink> sink_;
   std::unique_ptr<intake::IngestServer> intake_;
+  const Gatekeeper everyone_{"", true};
   std::unique_ptr<RpcServer> server_;
   std::unique_ptr<v1::Ingest::Stub> stub_;
 };

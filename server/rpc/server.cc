@@ -4,12 +4,18 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
+#include <grpcpp/security/tls_certificate_provider.h>
+#include <grpcpp/security/tls_credentials_options.h>
 
+#include <fstream>
 #include <mutex>
+#include <sstream>
 #include <thread>
 #include <vector>
 
 #include "frontend/vision/picture.h"
+#include "proto/access/certificate.h"
+#include "server/rpc/caller.h"
 #include "server/rpc/gateway.h"
 #include "server/rpc/services.h"
 #include "server/rpc/unreadable_request.h"
@@ -36,64 +42,139 @@ void enable_plugins() {
   });
 }
 
-std::string address_of(const ServerOptions& options) {
-  const bool v6 = options.host.find(':') != std::string::npos;
-  return (v6 ? "[" + options.host + "]" : options.host) + ":" + std::to_string(options.port);
+constexpr unsigned kTlsRefresh_s = 10;           // between looks at the files of TLS
+constexpr int kHandshake_ms = 10'000;            // that a caller may take for the handshakes of TLS and HTTP/2
+constexpr int kMaxIdle_ms = 600'000;             // without a call; then the connection is closed
+constexpr int kMaxStreamsOfAConnection = 1'000;  // calls at once
+
+Result<std::string> read_pem(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) return Status(Reason::BAD_CONFIG, "cannot read " + path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+// TLS 1.2 or later. A caller may show a certificate; one that cannot be verified ends the handshake.
+std::shared_ptr<grpc::ServerCredentials> tls_credentials(const TlsFiles& files) {
+  grpc::experimental::TlsServerCredentialsOptions options(
+      std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(files.key, files.certificate,
+                                                                           files.client_authority, kTlsRefresh_s));
+  options.watch_identity_key_cert_pairs();
+  options.set_cert_request_type(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);
+  if (!files.client_authority.empty()) {
+    options.watch_root_certs();
+    options.set_cert_request_type(GRPC_SSL_REQUEST_CLIENT_CERTIFICATE_AND_VERIFY);
+  }
+  return grpc::experimental::TlsServerCredentials(options);
+}
+
+using Acceptor = std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>;
+
+Listener::Take hand_over_to(Acceptor acceptor) {
+  return [acceptor = std::shared_ptr<grpc::experimental::ExternalConnectionAcceptor>(std::move(acceptor))](
+             int listening, int connection) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+    parameters.listener_fd = listening;
+    parameters.fd = connection;
+    acceptor->HandleNewConnection(&parameters);
+  };
 }
 
 }  // namespace
 
+Status check_files(const TlsFiles& files) {
+  if (files.certificate.empty()) return {};
+  const auto certificate = read_pem(files.certificate), key = read_pem(files.key);
+  for (const auto* text : {&certificate, &key})
+    if (!text->ok()) return text->status();
+  if (const Status fits = access::check_key_pair({*certificate, *key}); !fits.ok())
+    return {Reason::BAD_CONFIG, files.certificate + " with " + files.key + ": " + fits.message()};
+  if (files.client_authority.empty()) return {};
+  const auto authority = read_pem(files.client_authority);
+  if (!authority.ok()) return authority.status();
+  if (const auto facts = access::read_certificate(*authority); !facts.ok())
+    return {Reason::BAD_CONFIG, files.client_authority + ": " + facts.status().message()};
+  return {};
+}
+
 struct RpcServer::Impl {
   // The mapper's budget outlives the server: the core holds both.
-  Impl(Core& core, const RpcLimits& limits) : gateway(limits, core.mapper.budget(), core.metrics) {}
+  Impl(Core& core, const Gatekeeper& gatekeeper)
+      : gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper) {}
 
   Gateway gateway;
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;  // destroyed before the services
-  int port = 0;
-  bool stopped = false;
+  std::unique_ptr<Listener> listener;    // destroyed before the server
+  std::uint16_t port = 0;
+  bool stopped = true;
 };
 
 RpcServer::RpcServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 RpcServer::~RpcServer() { stop(std::chrono::milliseconds(0)); }
 
-Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOptions& options) {
+Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper& gatekeeper,
+                                                    const ServerOptions& options) {
   enable_plugins();
-  auto impl = std::make_unique<Impl>(core, core.limits);
+  auto impl = std::make_unique<Impl>(core, gatekeeper);
   impl->services.push_back(make_map_service(core, impl->gateway));
   impl->services.push_back(make_ingest_service(core, impl->gateway));
   impl->services.push_back(make_admin_service(core, impl->gateway));
 
   grpc::ServerBuilder builder;
-  // Otherwise two daemons would silently share the port.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshake_ms);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsOfAConnection);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kMaxIdle_ms);
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
   // The stream of a robot that drives out of radio range is closed after half a minute.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // any number
   builder.SetResourceQuota(grpc::ResourceQuota("relmapd").Resize(kTransportBytes));
-  const std::string address = address_of(options);
-  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &impl->port);
+  std::vector<Listener::Source> sources;
+  const auto listen_at = [&](std::vector<ListeningSocket> sockets, std::shared_ptr<grpc::ServerCredentials> by) {
+    const Listener::Take take = hand_over_to(builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, std::move(by)));
+    for (ListeningSocket& socket : sockets) sources.push_back({std::move(socket), take});
+  };
+  if (!options.socket.empty()) {
+    auto socket = ListeningSocket::at_path(options.socket, options.socket_group);
+    if (!socket.ok()) return socket.status();
+    std::vector<ListeningSocket> one;
+    one.push_back(std::move(*socket));
+    listen_at(std::move(one), grpc::experimental::LocalServerCredentials(UDS));
+  }
+  if (!options.host.empty()) {
+    auto sockets = ListeningSocket::at_host(options.host, options.port);
+    if (!sockets.ok()) return sockets.status();
+    impl->port = sockets->front().port();
+    std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();
+    if (!options.tls.certificate.empty()) {
+      if (Status sound = check_files(options.tls); !sound.ok()) return sound;
+      credentials = tls_credentials(options.tls);
+      credentials->SetAuthMetadataProcessor(turn_strangers_away(gatekeeper));
+    }
+    listen_at(std::move(*sockets), std::move(credentials));
+  }
   for (const auto& service : impl->services) builder.RegisterService(service.get());
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
   interceptors.push_back(name_unreadable_requests());
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   impl->server = builder.BuildAndStart();
-  if (!impl->server || impl->port == 0) {
-    impl->stopped = true;
-    return {Reason::PORT_IN_USE,
-            "cannot listen on " + address + ": another process uses it, or it is not an address of this machine"};
-  }
+  if (!impl->server) return Status(Reason::INTERNAL, "gRPC cannot start a server");
+  impl->stopped = false;
+  impl->listener = std::make_unique<Listener>(std::move(sources), options.connections);
   return std::unique_ptr<RpcServer>(new RpcServer(std::move(impl)));
 }
 
-std::uint16_t RpcServer::port() const { return static_cast<std::uint16_t>(impl_->port); }
+std::uint16_t RpcServer::port() const { return impl_->port; }
 
 void RpcServer::stop(std::chrono::milliseconds patience) {
   if (impl_->stopped) return;
   impl_->stopped = true;
+  impl_->listener->stop();
   if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
   impl_->gateway.drain();
   // Waits for calls only: Shutdown() would also wait for idle connections, whose clients may take seconds to notice.

@@ -1,4 +1,4 @@
-// The gRPC server: services, health and reflection on one port.
+// The gRPC server: services, health and reflection, at a Unix socket and at a TCP address.
 #pragma once
 
 #include <chrono>
@@ -7,22 +7,39 @@
 #include <string>
 
 #include "server/rpc/core.h"
+#include "server/rpc/gatekeeper.h"
+#include "server/rpc/listener.h"
 
 namespace relmap::rpc {
 
-struct ServerOptions {
-  std::string host = "127.0.0.1";
-  std::uint16_t port = 0;  // 0 means any free port
+// Files in PEM, which are read again within ten seconds after they change.
+struct TlsFiles {
+  std::string certificate, key;  // may be one file, so that both change at a time; empty: no TLS
+  std::string client_authority;  // by whom callers' certificates must be signed; empty: none is asked for
 };
+
+struct ServerOptions {
+  std::string socket = {};        // path; empty: no socket
+  std::string socket_group = {};  // whose members may use the socket, besides its owner; empty: none
+  std::string host = {};          // empty: no TCP
+  std::uint16_t port = 0;         // 0 means any free port
+  TlsFiles tls = {};
+  ConnectionLimits connections = {};
+};
+
+// BAD_CONFIG unless the files can be read and belong together; nothing is checked without TLS.
+Status check_files(const TlsFiles& files);
 
 class RpcServer {
  public:
-  // Starts a server, which serves when this returns. `core` must outlive it. PORT_IN_USE.
-  static Result<std::unique_ptr<RpcServer>> start(Core& core, const ServerOptions& options);
+  // Starts a server, which serves when this returns. `core` and `gatekeeper` must outlive it. PORT_IN_USE, IO_ERROR
+  // (the socket), BAD_CONFIG (its group, or the files of TLS).
+  static Result<std::unique_ptr<RpcServer>> start(Core& core, const Gatekeeper& gatekeeper,
+                                                  const ServerOptions& options);
   // Stops without patience.
   ~RpcServer();
 
-  std::uint16_t port() const;
+  std::uint16_t port() const;  // of TCP; 0 without it
 
   // Stops the server: health reports NOT_SERVING, new calls are refused, and running ones are interrupted. Calls that
   // have not ended after `patience` are cut off.

@@ -31,7 +31,7 @@ constexpr std::chrono::hours kStopPatience{24 * 365};
 class Server : public testing::Test {
  protected:
   Server() {
-    server_ = RpcServer::start(*map_.core, {}).or_throw();
+    server_ = RpcServer::start(*map_.core, everyone_, {.host = "127.0.0.1"}).or_throw();
     address_ = "127.0.0.1:" + std::to_string(server_->port());
     channel_ = grpc::CreateChannel(address_, grpc::InsecureChannelCredentials());
     map_stub_ = v1::Map::NewStub(channel_);
@@ -71,6 +71,7 @@ class Server : public testing::Test {
   }
 
   ServedMap map_;
+  const Gatekeeper everyone_{"", true};
   std::unique_ptr<RpcServer> server_;
   std::string address_;
   std::shared_ptr<grpc::Channel> channel_;
@@ -236,7 +237,7 @@ TEST_F(Server, AnswersHealthAndReflection) {
 
 TEST_F(Server, CallsBeyondTheLimitsAreRefusedAtOnce) {
   Core crowded(*map_.mapper, map_.core->facts, {.max_pictures = 0});
-  const auto server = RpcServer::start(crowded, {}).or_throw();
+  const auto server = RpcServer::start(crowded, everyone_, {.host = "127.0.0.1"}).or_throw();
   const auto stub = v1::Map::NewStub(
       grpc::CreateChannel("127.0.0.1:" + std::to_string(server->port()), grpc::InsecureChannelCredentials()));
   v1::LocaliseReply reply;
@@ -253,7 +254,7 @@ TEST_F(Server, CallsBeyondTheLimitsAreRefusedAtOnce) {
 }
 
 TEST_F(Server, ASecondServerOnThePortIsRefusedByName) {
-  const auto second = RpcServer::start(*map_.core, {.host = "127.0.0.1", .port = server_->port()});
+  const auto second = RpcServer::start(*map_.core, everyone_, {.host = "127.0.0.1", .port = server_->port()});
   EXPECT_EQ(second.reason(), Reason::PORT_IN_USE);
   EXPECT_THAT(second.status().message(), testing::HasSubstr(address_));
 }

@@ -239,7 +239,8 @@ class Run {
         resend = steady_clock::now() + milliseconds(100);
       }
       for (; sent < std::min<std::uint64_t>(from + 8, kFrames); ++sent)
-        life.ingest().take_payload(uuid_, static_cast<std::uint32_t>(sent), crc32c(payloads_[sent]), payloads_[sent]);
+        (void)life.ingest().take_payload(uuid_, static_cast<std::uint32_t>(sent), crc32c(payloads_[sent]),
+                                         payloads_[sent]);
       if (steady_clock::now() > deadline) return wrong("keyframes are not acknowledged any more");
       std::this_thread::sleep_for(milliseconds(1));
     }

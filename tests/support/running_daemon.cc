@@ -31,6 +31,10 @@ std::vector<std::string> daemon_arguments(const DaemonOptions& options) {
                                      "127.0.0.1:0",
                                      "--memory-budget-mb",
                                      std::to_string(options.memory_budget_mb)};
+  if (options.credentials.empty())
+    arguments.emplace_back("--insecure");
+  else
+    arguments.insert(arguments.end(), {"--credentials", options.credentials});
   if (!options.lcm.empty()) arguments.insert(arguments.end(), {"--lcm", options.lcm});
   arguments.insert(arguments.end(), options.more.begin(), options.more.end());
   return arguments;

@@ -22,6 +22,7 @@ struct DaemonOptions {
   std::vector<std::string> more;              // arguments
   std::string program = {};                   // relmapd of another build; empty: of this one
   std::optional<Multicast> own_network = {};  // see ProcessOptions
+  std::string credentials = {};               // folder, to serve TLS with; empty: no TLS
 };
 
 // Throws with the daemon's log if it does not serve within `patience`; 0: does not wait.
@@ -32,7 +33,7 @@ class RunningDaemon {
   Process& process() { return *process_; }
   // Whether DIR/endpoint names this process.
   bool serving() const;
-  std::string address() const;
+  std::string address() const;  // over TCP
   std::unique_ptr<client::Client> client() const;
   std::string log() const;
 

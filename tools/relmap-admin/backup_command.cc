@@ -59,7 +59,7 @@ gets its name only when it is complete. On the file system of the map it shares 
 sector damages both: put it on another disk, or copy it there.
 
   relmap-admin backup /var/lib/relmap /backup/map-monday
-  relmap-admin --server map.example:50070 backup /backup/map-monday)");
+  relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday)");
   command->callback([&action, asked] { action = [asked](Context& context) { return back_up_map(*asked, context); }; });
 }
 

@@ -23,10 +23,12 @@ Examples:
   relmap-admin stats /var/lib/relmap
   relmap-admin verify /var/lib/relmap
   relmap-admin backup /var/lib/relmap /backup/map-monday
-  relmap-admin --server map.example:50070 backup /backup/map-monday
+  relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday
   relmap-admin restore /backup/map-monday /var/lib/relmap
   relmap-admin repair /var/lib/relmap
   relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab
+  relmap-admin credentials ca /etc/relmap/credentials --host map.example
+  relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot --out cart-1.pem
   relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')";
 
 void declare(CLI::App& app, Context& context, Action& action) {
@@ -35,14 +37,17 @@ void declare(CLI::App& app, Context& context, Action& action) {
   app.fallthrough();
   app.add_option("--server", context.server, "address of a running daemon, instead of a folder")
       ->type_name("HOST:PORT");
+  app.add_option("--credentials", context.credentials, "file that proves who asks, for a daemon that serves TLS")
+      ->envname("RELMAP_CREDENTIALS")
+      ->type_name("FILE");
   app.add_flag("--json", context.console.json, "print answers as JSON, one document a line");
   app.add_flag("-q,--quiet", context.quiet, "show no progress");
   app.add_option("--deadline", context.deadline_s, "time limit of work that a daemon does, in seconds")
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
   terminal::add_version(app);
-  for (const auto add :
-       {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex, add_stats})
+  for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
+                         add_stats, add_credentials})
     add(app, action);
 }
 
@@ -73,11 +78,13 @@ ExitCode exit_code(const Answer& answer) {
 }
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal) {
-  CLI::App app("Looks after relmap data folders: verify, repair, back up, restore, compact, migrate, reindex.",
-               "relmap-admin");
+  CLI::App app(
+      "Looks after relmap data folders (verify, repair, back up, restore, compact, migrate, reindex), and makes "
+      "the credentials of a fleet.",
+      "relmap-admin");
   terminal::Console console(out, err);
   terminal::ProgressBar bar(err, terminal);
-  Context context{console, bar, "", 43200, false};
+  Context context{console, bar, "", "", 43200, false};
   Action action;
   declare(app, context, action);
   try {

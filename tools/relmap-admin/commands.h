@@ -17,8 +17,9 @@ namespace relmap::admin {
 struct Context {
   terminal::Console& console;
   terminal::ProgressBar& bar;
-  std::string server;     // --server; empty if it is not given
-  double deadline_s = 0;  // time limit of work that a daemon does
+  std::string server;       // --server; empty if it is not given
+  std::string credentials;  // --credentials; empty if it is not given
+  double deadline_s = 0;    // time limit of work that a daemon does
   bool quiet = false;
 
   // Shows progress on the bar, unless --quiet is given.
@@ -42,5 +43,6 @@ void add_compact(CLI::App& app, Action& action);
 void add_migrate(CLI::App& app, Action& action);
 void add_reindex(CLI::App& app, Action& action);
 void add_stats(CLI::App& app, Action& action);
+void add_credentials(CLI::App& app, Action& action);
 
 }  // namespace relmap::admin

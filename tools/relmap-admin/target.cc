@@ -28,6 +28,7 @@ Status check_map(const std::string& directory) {
 Result<std::unique_ptr<client::Client>> connect(const Context& context, const std::string& server) {
   client::ClientOptions options;
   options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(context.deadline_s * 1e3));
+  options.credentials = context.credentials;
   return client::Client::connect(server, options);
 }
 

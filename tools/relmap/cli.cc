@@ -13,6 +13,7 @@ namespace {
 
 constexpr char kFooter[] = R"(
 --server names the daemon: the data folder of a relmapd on this machine, or HOST:PORT. Its default is $RELMAP_SERVER.
+--credentials names the file that proves who asks; its default is $RELMAP_CREDENTIALS, and a folder needs none.
 A frame is written session:index, as 3:120; an edge session:index/ordinal, as 3:120/1.
 Data goes to stdout, everything else to stderr.
 Exit codes: 0 done; 1 refused or failed (the first word on stderr is the reason); 2 wrong usage; 3 no daemon answers,
@@ -20,7 +21,7 @@ or ingest: keyframes were refused; 5 ingest: everything is in the map, but some 
 
 Examples:
   relmap --server /var/lib/relmap status
-  relmap --server map.example:50070 sessions
+  relmap --server map.example:50070 --credentials anna.pem sessions
   relmap top                             # robots, sessions, worker, memory, once a second
   relmap session freeze survey-2026      # takes no more keyframes, and is not adjusted any more
   relmap session delete test-drive       # takes its frames out of the map, for good
@@ -41,7 +42,7 @@ Examples:
   relmap map --out map.png --from 1:0 --to kitchen)";
 
 struct GlobalOptions {
-  std::string server;
+  std::string server, credentials;
   double deadline_s = 60;
   bool json = false;
 };
@@ -54,6 +55,10 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.add_option("--server", options.server, "the daemon: its data folder, or HOST:PORT")
       ->envname("RELMAP_SERVER")
       ->required();
+  app.add_option("--credentials", options.credentials,
+                 "file that proves who asks, for a daemon that serves TLS (relmap-admin credentials makes it)")
+      ->envname("RELMAP_CREDENTIALS")
+      ->type_name("FILE");
   app.add_flag("--json", options.json, "print each reply as canonical proto3 JSON, one document a line");
   app.add_option("--deadline", options.deadline_s, "time limit of each request, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
@@ -87,6 +92,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   console.json = options.json;
   client::ClientOptions client_options;
   client_options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(options.deadline_s * 1e3));
+  client_options.credentials = options.credentials;
   if (options.json) client_options.on_reply = [&](const std::string& document) { console.reply(document); };
   const auto client = client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "client/channel.h"
 #include "client/rpc_error.h"
 #include "client/server_address.h"
 #include "frontend/publishing/grpc/stream_messages.h"
@@ -25,12 +26,12 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kFirstPause{100}, kMaxPause{2000};
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // A new channel must not inherit the back-off of an old one to the same address; the pauses are made here.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  return arguments;
 }
 
 bool same(const v1::IngestRequest& a, const v1::IngestRequest& b) {
@@ -55,8 +56,8 @@ struct GrpcTransport::Impl {
 
   // One call. The members below `transport` are guarded by the transport's mutex.
   struct Stream final : grpc::ClientBidiReactor<v1::IngestRequest, v1::IngestReply> {
-    Stream(Impl& owner, const client::ServerAddress& address)
-        : where(address), stub(v1::Ingest::NewStub(make_channel(address.address))), transport(owner) {}
+    Stream(Impl& owner, const client::ServerAddress& address, const std::shared_ptr<grpc::Channel>& channel)
+        : where(address), stub(v1::Ingest::NewStub(channel)), transport(owner) {}
 
     void start() {
       stub->async()->Stream(&context, this);
@@ -126,7 +127,13 @@ struct GrpcTransport::Impl {
       return where.status();
     }
 
-    Stream stream(*this, *where);
+    const auto channel = client::open_channel(*where, options.credentials, channel_arguments());
+    if (!channel.ok()) {
+      mutex.lock();
+      return channel.status();
+    }
+
+    Stream stream(*this, *where, *channel);
     stream.unanswered_since = Clock::now();
     stream.start();
     stream.write(hello_request(robot));
@@ -256,7 +263,9 @@ Result<std::unique_ptr<GrpcTransport>> GrpcTransport::open(const std::string& se
                                                            GrpcTransportOptions options) {
   const auto where = client::resolve_server(server);
   if (where.reason() == Reason::INVALID_ARGUMENT) return where.status();
-  auto impl = std::make_unique<Impl>(server, robot, options);
+  if (where.ok())
+    if (const auto usable = client::open_channel(*where, options.credentials, {}); !usable.ok()) return usable.status();
+  auto impl = std::make_unique<Impl>(server, robot, std::move(options));
   impl->thread = std::thread([running = impl.get()] { running->run(); });
   return std::unique_ptr<GrpcTransport>(new GrpcTransport(std::move(impl)));
 }

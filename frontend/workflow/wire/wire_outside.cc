@@ -20,7 +20,7 @@ Result<std::unique_ptr<frontend::KeyframeSink>> open_daemon_sink(const RunOption
                                                                  const publishing::PublisherOptions& publisher,
                                                                  const SessionHeader& session) {
   if (options.to != "grpc") return frontend::sink_of(publishing::Publisher::start(publisher, session));
-  auto transport = publishing::GrpcTransport::open(options.server, session.robot);
+  auto transport = publishing::GrpcTransport::open(options.server, session.robot, {.credentials = options.credentials});
   if (!transport.ok()) return transport.status();
   return frontend::sink_of(publishing::Publisher::start(publisher, session, std::move(*transport)));
 }

@@ -1,0 +1,21 @@
+// Opens gRPC channels to a daemon.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/server_address.h"
+
+namespace grpc {
+class Channel;
+class ChannelArguments;
+}  // namespace grpc
+
+namespace relmap::client {
+
+// Over TCP with TLS if `credentials` names a file (proto/access/credentials.h), which proves who the caller is; without
+// TLS if it is empty. A Unix socket needs neither. NO_SUCH_FILE, BAD_CONFIG: the file cannot be used.
+Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, const std::string& credentials,
+                                                    const grpc::ChannelArguments& arguments);
+
+}  // namespace relmap::client

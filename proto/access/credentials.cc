@@ -1,0 +1,74 @@
+#include "proto/access/credentials.h"
+
+#include <sys/stat.h>
+
+#include "proto/access/certificate.h"
+#include "proto/access/file.h"
+#include "proto/access/openssl.h"
+
+namespace relmap::access {
+
+namespace {
+
+constexpr char kTokenBlock[] = "RELMAP TOKEN";
+constexpr std::string_view kCertificateBlock = "CERTIFICATE";
+
+std::string block(const std::string& name, const unsigned char* bytes, long size) {
+  const Bio bio = memory();
+  return PEM_write_bio(bio.get(), name.c_str(), "", bytes, size) > 0 ? text_of(bio) : std::string();
+}
+
+}  // namespace
+
+std::string text_of(const Credentials& credentials) {
+  std::string text = credentials.key + credentials.certificate;
+  if (!credentials.token.empty())
+    text += block(kTokenBlock, reinterpret_cast<const unsigned char*>(credentials.token.data()),
+                  static_cast<long>(credentials.token.size()));
+  return text + credentials.authorities;
+}
+
+Result<Credentials> parse_credentials(std::string_view text) {
+  const auto bad = [](const std::string& what) { return Status(Reason::CORRUPT, what); };
+  Credentials found;
+  const Bio bio = reader_of(text);
+  char *name = nullptr, *header = nullptr;
+  unsigned char* bytes = nullptr;
+  long size = 0;
+  while (PEM_read_bio(bio.get(), &name, &header, &bytes, &size) == 1) {
+    const std::string kind = name;
+    if (kind == kTokenBlock)
+      found.token.assign(reinterpret_cast<const char*>(bytes), static_cast<std::size_t>(size));
+    else if (kind.ends_with("PRIVATE KEY"))
+      found.key = block(kind, bytes, size);
+    else if (kind == kCertificateBlock)
+      (found.key.empty() || !found.certificate.empty() ? found.authorities : found.certificate) +=
+          block(kind, bytes, size);
+    OPENSSL_free(name);
+    OPENSSL_free(header);
+    OPENSSL_free(bytes);
+  }
+  ERR_clear_error();
+  if (found.key.empty() == found.token.empty())
+    return bad(found.key.empty() ? "there is neither a private key nor a token"
+                                 : "there are a private key and a token");
+  if (!found.key.empty()) {
+    if (Status fits = check_key_pair({found.certificate, found.key}); !fits.ok())
+      return bad("the certificate after the private key: " + fits.message());
+  }
+  if (found.authorities.empty()) return bad("there is no certificate of the authority that issued the daemon's");
+  return found;
+}
+
+Result<Credentials> read_credentials(const std::string& path) {
+  const auto text = read_file(path);
+  if (!text.ok()) return text.status();
+  struct stat facts {};
+  if (stat(path.c_str(), &facts) == 0 && (facts.st_mode & (S_IRWXG | S_IRWXO)) != 0)
+    return Status(Reason::BAD_CONFIG, "others can read the credentials in " + path + ": chmod 600 " + path);
+  auto credentials = parse_credentials(*text);
+  if (!credentials.ok()) return Status(Reason::BAD_CONFIG, path + ": " + credentials.status().message());
+  return credentials;
+}
+
+}  // namespace relmap::access

@@ -1,0 +1,28 @@
+// The file that its owner shows to daemons: who issued the daemon's certificate, and a certificate with its key or a
+// token. One text of PEM blocks, which must be readable by its owner only:
+//
+//   -----BEGIN PRIVATE KEY-----       with its certificate: a caller known by certificate
+//   -----BEGIN CERTIFICATE-----       the certificate of the key, and those of the authorities that are believed
+//   -----BEGIN RELMAP TOKEN-----      a caller known by token; no key then
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "proto/base/status.h"
+
+namespace relmap::access {
+
+struct Credentials {
+  std::string authorities;       // certificates of those that may have issued a daemon's
+  std::string certificate, key;  // empty: known by token
+  std::string token;             // empty: known by certificate
+};
+
+std::string text_of(const Credentials& credentials);
+// CORRUPT if there is no certificate of an authority, or neither a key with its certificate nor a token, or both.
+Result<Credentials> parse_credentials(std::string_view text);
+// NO_SUCH_FILE. BAD_CONFIG, with the path: it is malformed, or others than its owner can read it.
+Result<Credentials> read_credentials(const std::string& path);
+
+}  // namespace relmap::access

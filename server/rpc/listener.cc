@@ -1,0 +1,227 @@
+#include "server/rpc/listener.h"
+
+#include <arpa/inet.h>
+#include <grp.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+namespace relmap::rpc {
+
+namespace {
+
+constexpr int kBacklog = 512;
+constexpr std::chrono::milliseconds kPause{100};  // when nothing can be accepted, as without a free descriptor
+constexpr std::chrono::seconds kToldAgain{1};     // between messages of what is refused
+
+std::string error_text() { return std::strerror(errno); }
+
+Result<gid_t> group_of(const std::string& name) {
+  std::array<char, 4096> buffer{};
+  group entry{};
+  group* found = nullptr;
+  if (getgrnam_r(name.c_str(), &entry, buffer.data(), buffer.size(), &found) != 0 || !found)
+    return Status(Reason::BAD_CONFIG, "there is no group " + name);
+  return found->gr_gid;
+}
+
+// Device and inode, which no other open file has.
+std::pair<dev_t, ino_t> identity_of(int descriptor) {
+  struct stat facts {};
+  return fstat(descriptor, &facts) == 0 ? std::pair(facts.st_dev, facts.st_ino) : std::pair<dev_t, ino_t>(0, 0);
+}
+
+// The address of the other side, without its port; empty for a Unix socket.
+std::string peer_of(int connection) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  if (getpeername(connection, reinterpret_cast<sockaddr*>(&address), &size) != 0) return "gone";
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (address.ss_family == AF_INET) {
+    const auto& v4 = reinterpret_cast<const sockaddr_in&>(address);
+    inet_ntop(AF_INET, &v4.sin_addr, text.data(), text.size());
+  } else if (address.ss_family == AF_INET6) {
+    const auto& v6 = reinterpret_cast<const sockaddr_in6&>(address);
+    // Whoever has one address of IPv6 has the /64 around it (RFC 6177), which counts as one peer.
+    in6_addr network = v6.sin6_addr;
+    if (!IN6_IS_ADDR_V4MAPPED(&network)) std::memset(network.s6_addr + 8, 0, 8);
+    inet_ntop(AF_INET6, &network, text.data(), text.size());
+  }
+  return text.data();
+}
+
+}  // namespace
+
+ListeningSocket::~ListeningSocket() {
+  if (fd_ < 0) return;
+  close(fd_);
+  if (!path_.empty()) unlink(path_.c_str());
+}
+
+Result<ListeningSocket> ListeningSocket::at_path(const std::string& path, const std::string& group) {
+  const std::string temporary = path + ".new";
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (temporary.size() >= sizeof address.sun_path)
+    return Status(Reason::BAD_CONFIG, "the path of the socket is too long: " + path);
+  std::memcpy(address.sun_path, temporary.data(), temporary.size());
+  const auto failed = [&] { return Status(Reason::IO_ERROR, "cannot listen at " + path + ": " + error_text()); };
+  ListeningSocket socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (socket.fd_ < 0) return failed();
+  unlink(temporary.c_str());
+  socket.path_ = temporary;
+  // bind() gives the file the mode of the socket, so that at no time anyone else can open it.
+  if (fchmod(socket.fd_, S_IRUSR | S_IWUSR) != 0 ||
+      bind(socket.fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    return failed();
+  if (!group.empty()) {
+    const auto id = group_of(group);
+    if (!id.ok()) return id.status();
+    if (chown(temporary.c_str(), static_cast<uid_t>(-1), *id) != 0 ||
+        chmod(temporary.c_str(), S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0)
+      return failed();
+  }
+  if (listen(socket.fd_, kBacklog) != 0 || std::rename(temporary.c_str(), path.c_str()) != 0) return failed();
+  socket.path_ = path;
+  return socket;
+}
+
+Result<std::vector<ListeningSocket>> ListeningSocket::at_host(const std::string& host, std::uint16_t port) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* list = nullptr;
+  if (const int error = getaddrinfo(host.c_str(), "0", &hints, &list); error != 0)
+    return Status(Reason::PORT_IN_USE, "cannot listen on " + host + ": " + gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owned(list, freeaddrinfo);
+  std::vector<ListeningSocket> sockets;
+  for (addrinfo* one = list; one; one = one->ai_next) {
+    ListeningSocket socket(::socket(one->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    if (socket.fd_ < 0) continue;  // no IPv6 on this machine, for example
+    const int on = 1, off = 0;
+    setsockopt(socket.fd_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (one->ai_family == AF_INET6) {
+      setsockopt(socket.fd_, IPPROTO_IPV6, IPV6_V6ONLY, &off, sizeof off);
+      reinterpret_cast<sockaddr_in6*>(one->ai_addr)->sin6_port = htons(port);
+    } else {
+      reinterpret_cast<sockaddr_in*>(one->ai_addr)->sin_port = htons(port);
+    }
+    if (bind(socket.fd_, one->ai_addr, one->ai_addrlen) != 0 || listen(socket.fd_, kBacklog) != 0) {
+      if (errno == EADDRNOTAVAIL) continue;  // IPv6 is switched off, for example
+      return Status(Reason::PORT_IN_USE, "cannot listen on " + host + ":" + std::to_string(port) + ": " + error_text());
+    }
+    port = socket.port();
+    sockets.push_back(std::move(socket));
+  }
+  if (sockets.empty()) return Status(Reason::PORT_IN_USE, "cannot listen on " + host + ": it has no address here");
+  return sockets;
+}
+
+std::uint16_t ListeningSocket::port() const {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  if (getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return 0;
+  return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(address).sin6_port
+                                             : reinterpret_cast<const sockaddr_in&>(address).sin_port);
+}
+
+Listener::Listener(std::vector<Source> sources, const ConnectionLimits& limits)
+    : sources_(std::move(sources)), limits_(limits), wake_(eventfd(0, EFD_CLOEXEC)) {
+  if (wake_ < 0) throw StatusError(Status(Reason::IO_ERROR, "no eventfd: " + error_text()));
+  thread_ = std::thread([this] { run(); });
+}
+
+Listener::~Listener() { stop(); }
+
+void Listener::stop() {
+  if (!thread_.joinable()) return;
+  eventfd_write(wake_, 1);
+  thread_.join();
+  close(wake_);
+  sources_.clear();  // who connects from now on is refused, and need not wait
+}
+
+void Listener::run() {
+  std::vector<pollfd> waiting;
+  for (const Source& source : sources_) waiting.push_back({source.socket.fd(), POLLIN, 0});
+  waiting.push_back({wake_, POLLIN, 0});
+  for (;;) {
+    if (poll(waiting.data(), waiting.size(), -1) < 0) continue;  // EINTR
+    if (waiting.back().revents != 0) return;
+    for (std::size_t i = 0; i < sources_.size(); ++i)
+      if (waiting[i].revents != 0) accept_from(sources_[i]);
+  }
+}
+
+void Listener::accept_from(const Source& source) {
+  const int connection = accept4(source.socket.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (connection < 0) {
+    if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;  // it has gone already
+    if (tells()) spdlog::error("no connection can be accepted: {}", error_text());
+    pollfd wake{wake_, POLLIN, 0};
+    poll(&wake, 1, static_cast<int>(kPause.count()));
+    return;
+  }
+  std::string peer = peer_of(connection);
+  if (!admit(peer)) {
+    if (tells())
+      spdlog::warn("connections are refused, the last from {}: {} are open", peer.empty() ? "the socket" : peer,
+                   open_.size());
+    close(connection);
+    return;
+  }
+  const int on = 1;
+  if (!peer.empty()) setsockopt(connection, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  if (const auto former = open_.find(connection); former != open_.end()) forget(former);
+  ++by_peer_[peer];
+  open_.emplace(connection, Open{identity_of(connection), std::move(peer)});
+  source.take(source.socket.fd(), connection);
+}
+
+// Whether a message may be logged now; true once a second at most.
+bool Listener::tells() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now - told_ < kToldAgain) return false;
+  told_ = now;
+  return true;
+}
+
+// gRPC does not tell when it closes a connection: then its descriptor is closed, or is another file's by now.
+void Listener::forget_closed() {
+  for (auto it = open_.begin(); it != open_.end();)
+    it = identity_of(it->first) == it->second.file ? std::next(it) : forget(it);
+}
+
+std::map<int, Listener::Open>::iterator Listener::forget(std::map<int, Open>::iterator it) {
+  if (--by_peer_[it->second.peer] == 0) by_peer_.erase(it->second.peer);
+  return open_.erase(it);
+}
+
+bool Listener::admit(const std::string& peer) {
+  const auto room = [&] {
+    const auto local = by_peer_.find("");
+    const std::size_t sockets = local == by_peer_.end() ? 0 : local->second;
+    if (peer.empty()) return sockets < limits_.total;
+    const auto same = by_peer_.find(peer);
+    return open_.size() - sockets < limits_.total && (same == by_peer_.end() || same->second < limits_.per_peer);
+  };
+  if (room()) return true;
+  forget_closed();
+  return room();
+}
+
+}  // namespace relmap::rpc

@@ -1,0 +1,87 @@
+// Accepts connections and hands them over to gRPC, which would neither limit their number nor show who opened a Unix
+// socket.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "proto/base/status.h"
+
+namespace relmap::rpc {
+
+// A socket that listens. Closed when destroyed, and its file removed.
+class ListeningSocket {
+ public:
+  // At a path, with mode 0600 or, for `group`, 0660 and that group. A file of this name is replaced, so the caller must
+  // own the folder. IO_ERROR; BAD_CONFIG if the path is too long or there is no such group.
+  static Result<ListeningSocket> at_path(const std::string& path, const std::string& group);
+  // At each address of `host`; port 0 is any free one, the same at all. PORT_IN_USE.
+  static Result<std::vector<ListeningSocket>> at_host(const std::string& host, std::uint16_t port);
+
+  ListeningSocket(ListeningSocket&& other) noexcept
+      : fd_(std::exchange(other.fd_, -1)), path_(std::exchange(other.path_, {})) {}
+  ~ListeningSocket();
+
+  int fd() const { return fd_; }
+  std::uint16_t port() const;  // of TCP
+
+ private:
+  explicit ListeningSocket(int fd) : fd_(fd) {}
+  int fd_;
+  std::string path_;  // removed with the socket; empty: TCP
+};
+
+struct ConnectionLimits {
+  std::size_t total = 1024;    // over TCP; as many again over the Unix socket
+  std::size_t per_peer = 256;  // from one address, over TCP
+};
+
+class Listener {
+ public:
+  // Gets a connection of its own, for which it is responsible from then on.
+  using Take = std::function<void(int listening, int connection)>;
+  struct Source {
+    ListeningSocket socket;
+    Take take;
+  };
+
+  // Starts the thread that accepts.
+  Listener(std::vector<Source> sources, const ConnectionLimits& limits);
+  // Calls stop().
+  ~Listener();
+
+  // Accepts no more, and closes the sockets.
+  void stop();
+
+ private:
+  struct Open {
+    std::pair<dev_t, ino_t> file;
+    std::string peer;  // empty: over a Unix socket
+  };
+
+  void run();
+  void accept_from(const Source& source);
+  void forget_closed();
+  std::map<int, Open>::iterator forget(std::map<int, Open>::iterator it);
+  bool admit(const std::string& peer);
+  bool tells();
+
+  std::vector<Source> sources_;  // constant while the thread runs
+  const ConnectionLimits limits_;
+  int wake_ = -1;
+  std::map<int, Open> open_;                    // by descriptor
+  std::map<std::string, std::size_t> by_peer_;  // how many of them
+  std::chrono::steady_clock::time_point told_{};
+  std::thread thread_;
+};
+
+}  // namespace relmap::rpc

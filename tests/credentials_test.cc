@@ -1,0 +1,121 @@
+// A fleet's credentials from relmap-admin to the daemon's answer, with the programs themselves.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <thread>
+
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+#include "tests/support/simulated_recording.h"
+
+namespace relmap::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class CredentialsTest : public ::testing::Test {
+ protected:
+  CredentialsTest() { expect_done(admin({"credentials", "ca", folder_ / "fleet"})); }
+
+  static Finished program(const std::string& name, std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), built_program(name));
+    return run_program(arguments);
+  }
+  static Finished admin(const std::vector<std::string>& arguments) { return program("relmap-admin", arguments); }
+  static void expect_done(const Finished& finished) { ASSERT_EQ(finished.exit_code, 0) << finished.standard_error; }
+
+  // The file of new credentials.
+  std::string issue(const std::string& role, const std::string& name, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"credentials", "new", folder_ / "fleet", name,
+                                       "--role",      role,  "--out",           folder_ / (name + ".pem")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_done(admin(arguments));
+    return folder_ / (name + ".pem");
+  }
+  DaemonOptions served() const {
+    DaemonOptions options{.data = folder_ / "map", .lcm = "", .more = {}};
+    options.credentials = folder_ / "fleet";
+    return options;
+  }
+
+  const storage::TemporaryFolder folder_;
+};
+
+TEST_F(CredentialsTest, LetEachDoWhatItsRoleMayUntilTheyAreRevoked) {
+  const std::string cart = issue("robot", "cart"), anna = issue("operator", "anna"),
+                    dash = issue("reader", "dash", {"--token"});
+  record_simulation(folder_ / "drive", {"--seed", "1", "--pairs", "12", "--laps", "0.1"});
+  RunningDaemon daemon(served());
+  const auto relmap = [&](const std::string& credentials, std::vector<std::string> command) {
+    command.insert(command.begin(), {"--server", daemon.address(), "--credentials", credentials});
+    return program("relmap", command);
+  };
+  const auto stream = [&](const std::string& robot, const std::string& credentials) {
+    return program("relmap-frontend", {folder_ / "drive", "--robot", robot, "--server", daemon.address(), "--spool",
+                                       "none", "--quiet", "--patience", "2", "--credentials", credentials});
+  };
+  expect_done(stream("cart", cart));
+  const Finished as_another = stream("train", cart);
+  EXPECT_EQ(as_another.exit_code, 3);  // keyframes are left
+  EXPECT_THAT(as_another.standard_error,
+              AllOf(HasSubstr("NOT_ALLOWED"), HasSubstr("cart may not send keyframes as train")));
+  EXPECT_NE(stream("dash", dash).exit_code, 0) << "a reader sends no keyframes";
+
+  for (const std::string& file : {cart, anna, dash}) expect_done(relmap(file, {"status"}));
+  const Finished edit = relmap(dash, {"label", "1:0", "kitchen"});
+  EXPECT_EQ(edit.exit_code, 1);
+  EXPECT_THAT(edit.standard_error,
+              HasSubstr("NOT_ALLOWED: Map.SetLabel is for the role operator, and dash has the role reader"));
+  expect_done(relmap(anna, {"label", "1:0", "kitchen"}));
+  expect_done(admin({"--server", daemon.address(), "--credentials", anna, "stats"}));
+
+  // Without TLS nothing answers, and what is not in the list is not known.
+  const Finished plain = program("relmap", {"--server", daemon.address(), "status"});
+  EXPECT_EQ(plain.exit_code, 3);
+  EXPECT_THAT(plain.standard_error, HasSubstr("needs --credentials"));
+  expect_done(program("relmap", {"--server", folder_ / "map", "status"}));  // the socket
+
+  expect_done(admin({"credentials", "revoke", folder_ / "fleet", "dash"}));
+  expect_done(admin({"credentials", "revoke", folder_ / "fleet", "anna"}));
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  for (const std::string& file : {dash, anna}) {
+    Finished refused;
+    do refused = relmap(file, {"sessions"});
+    while (refused.exit_code == 0 && std::chrono::steady_clock::now() < until);
+    EXPECT_THAT(refused.standard_error, AllOf(HasSubstr("UNAUTHENTICATED"), HasSubstr("revoked")));
+  }
+  expect_done(relmap(cart, {"sessions"}));
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
+TEST_F(CredentialsTest, AreMadeOnceAndRenewedWithTheirNames) {
+  const Finished again = admin({"--json", "credentials", "ca", folder_ / "fleet", "--host", "map.lab"});
+  expect_done(again);
+  EXPECT_THAT(again.standard_output,
+              AllOf(HasSubstr("\"new_authority\":false"), HasSubstr("map.lab"), HasSubstr("127.0.0.1")));
+  EXPECT_THAT(admin({"--json", "credentials", "ca", folder_ / "fleet"}).standard_output, HasSubstr("map.lab"));
+  issue("robot", "cart");
+  const Finished twice =
+      admin({"credentials", "new", folder_ / "fleet", "cart", "--role", "robot", "--out", folder_ / "cart.pem"});
+  EXPECT_EQ(twice.exit_code, 1);
+  EXPECT_THAT(twice.standard_error, HasSubstr("exists already"));
+  EXPECT_EQ(admin({"credentials", "revoke", folder_ / "fleet", "nobody"}).exit_code, 1);
+  EXPECT_EQ(admin({"credentials", "new", folder_ / "fleet", "x", "--role", "king"}).exit_code, 2);
+  const Finished listed = admin({"--json", "credentials", "list", folder_ / "fleet"});
+  EXPECT_THAT(listed.standard_output,
+              HasSubstr(R"({"role":"robot","name":"cart","kind":"certificate","state":"valid","expires":")"));
+
+  // On a copy without the authority's key a new one would shut everybody out.
+  std::filesystem::copy(folder_ / "fleet", folder_ / "copy");
+  std::filesystem::remove(folder_ / "copy/ca.key");
+  const Finished blind = admin({"credentials", "ca", folder_ / "copy"});
+  EXPECT_EQ(blind.exit_code, 1);
+  EXPECT_THAT(blind.standard_error, HasSubstr("needs a new folder"));
+  EXPECT_EQ(read_text(folder_ / "copy/access"), read_text(folder_ / "fleet/access"));
+}
+
+}  // namespace
+}  // namespace relmap::testing
