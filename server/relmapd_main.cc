@@ -120,9 +120,9 @@ struct CommandLine {
       if (Status status = relmap::ops::read_config(config_file, config); !status.ok())
         return {Reason::BAD_CONFIG, status.message()};
     if (data) config.data = *data;
-    if (listen) config.listen = relmap::ops::listen_of(*listen);
+    if (listen) config.listen = relmap::ops::unless_none(*listen);
     if (credentials) config.credentials = *credentials;
-    if (lcm) config.lcm = relmap::ops::lcm_url_of(*lcm);
+    if (lcm) config.lcm = relmap::ops::unless_none(*lcm);
     if (vocabulary) config.vocabulary = *vocabulary;
     if (log_level) config.log_level = *log_level;
     if (memory_budget_mb) {

@@ -34,6 +34,15 @@ Setter text(Get get) {
   return [get](const YAML::Node& node, Config& config) { return convert(node, std::invoke(get, config), "text"); };
 }
 
+Setter text_or_none(std::string Config::*member) {
+  return [member](const YAML::Node& node, Config& config) {
+    std::string said;
+    std::string wrong = convert(node, said, "text");
+    if (wrong.empty()) config.*member = unless_none(said);
+    return wrong;
+  };
+}
+
 template <typename Get>
 Setter flag(Get get) {
   return [get](const YAML::Node& node, Config& config) { return convert(node, get(config), "true or false"); };
@@ -96,13 +105,7 @@ std::string read_robots(const YAML::Node& node, Config& config) {
 const std::map<std::string, Setter>& settings() {
   static const std::map<std::string, Setter> table{
       {"data", text(&Config::data)},
-      {"listen",
-       [](const YAML::Node& node, Config& config) -> std::string {
-         std::string said;
-         if (auto wrong = convert(node, said, "text"); !wrong.empty()) return wrong;
-         config.listen = listen_of(said);
-         return {};
-       }},
+      {"listen", text_or_none(&Config::listen)},
       {"socket_group", text(&Config::socket_group)},
       {"credentials", text(&Config::credentials)},
       {"access", text(&Config::access)},
@@ -113,13 +116,7 @@ const std::map<std::string, Setter>& settings() {
       {"rpc.max_connections_per_peer",
        number([](Config& c) -> std::size_t& { return c.connections.per_peer; }, 1, 100000)},
       {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},
-      {"lcm",
-       [](const YAML::Node& node, Config& config) -> std::string {
-         std::string said;
-         if (auto wrong = convert(node, said, "text"); !wrong.empty()) return wrong;
-         config.lcm = lcm_url_of(said);
-         return {};
-       }},
+      {"lcm", text_or_none(&Config::lcm)},
       {"memory_budget_mb", number([](Config& c) -> std::uint64_t& { return c.memory_budget_mb; }, 32, 1 << 20)},
       {"disk_low_water_mb", number([](Config& c) -> std::uint64_t& { return c.disk_low_water_mb; }, 0, 1 << 20)},
       {"vocabulary", text(&Config::vocabulary)},
@@ -216,8 +213,7 @@ Status check_lcm(const std::string& url) {
 
 }  // namespace
 
-std::string lcm_url_of(const std::string& said) { return said == "none" ? std::string() : said; }
-std::string listen_of(const std::string& said) { return said == "none" ? std::string() : said; }
+std::string unless_none(const std::string& said) { return said == "none" ? std::string() : said; }
 
 void complete_config(Config& config) {
   if (config.credentials.empty()) return;

@@ -52,11 +52,9 @@ Status read_config(const std::string& path, Config& config);
 // The same for the text of a file. Messages use `name` for the file.
 Status parse_config(std::string_view text, const std::string& name, Config& config);
 
-// Config::lcm for a setting as given: "none" means off, so that the command line can override a URL in the file.
-std::string lcm_url_of(const std::string& said);
-
-// Config::listen for a setting as given, in the same way.
-std::string listen_of(const std::string& said);
+// Config::lcm or Config::listen for a setting as given: "none" means off, so that the command line can override the
+// file.
+std::string unless_none(const std::string& said);
 
 // Names the files in Config::credentials where the configuration names none.
 void complete_config(Config& config);

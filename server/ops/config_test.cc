@@ -120,7 +120,7 @@ TEST(Config, ListeningOverTcpNeedsTlsOrInsecure) {
     config.tls.key.clear();
     EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG) << "half of a pair";
   }
-  config.listen = listen_of("none");
+  config.listen = unless_none("none");
   EXPECT_EQ(config.listen, "");
 }
 
@@ -191,8 +191,8 @@ TEST(Config, LcmIsTurnedOffByName) {
   config.lcm = "udpm://";
   ASSERT_TRUE(parse_config("lcm: none", "test", config).ok());
   EXPECT_EQ(config.lcm, "");
-  EXPECT_EQ(lcm_url_of("none"), "");
-  EXPECT_EQ(lcm_url_of("udpm://"), "udpm://");
+  EXPECT_EQ(unless_none("none"), "");
+  EXPECT_EQ(unless_none("udpm://"), "udpm://");
 }
 
 TEST(Config, AnAddressNeedsHostAndPort) {

@@ -7,14 +7,13 @@
 #include <grpcpp/security/tls_certificate_provider.h>
 #include <grpcpp/security/tls_credentials_options.h>
 
-#include <fstream>
 #include <mutex>
-#include <sstream>
 #include <thread>
 #include <vector>
 
 #include "frontend/vision/picture.h"
 #include "proto/access/certificate.h"
+#include "proto/access/file.h"
 #include "server/rpc/caller.h"
 #include "server/rpc/gateway.h"
 #include "server/rpc/services.h"
@@ -47,14 +46,6 @@ constexpr int kHandshake_ms = 10'000;            // that a caller may take for t
 constexpr int kMaxIdle_ms = 600'000;             // without a call; then the connection is closed
 constexpr int kMaxStreamsOfAConnection = 1'000;  // calls at once
 
-Result<std::string> read_pem(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) return Status(Reason::BAD_CONFIG, "cannot read " + path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 // TLS 1.2 or later. A caller may show a certificate; one that cannot be verified ends the handshake.
 std::shared_ptr<grpc::ServerCredentials> tls_credentials(const TlsFiles& files) {
   grpc::experimental::TlsServerCredentialsOptions options(
@@ -85,14 +76,14 @@ Listener::Take hand_over_to(Acceptor acceptor) {
 
 Status check_files(const TlsFiles& files) {
   if (files.certificate.empty()) return {};
-  const auto certificate = read_pem(files.certificate), key = read_pem(files.key);
+  const auto certificate = access::read_file(files.certificate), key = access::read_file(files.key);
   for (const auto* text : {&certificate, &key})
-    if (!text->ok()) return text->status();
+    if (!text->ok()) return {Reason::BAD_CONFIG, text->status().message()};
   if (const Status fits = access::check_key_pair({*certificate, *key}); !fits.ok())
     return {Reason::BAD_CONFIG, files.certificate + " with " + files.key + ": " + fits.message()};
   if (files.client_authority.empty()) return {};
-  const auto authority = read_pem(files.client_authority);
-  if (!authority.ok()) return authority.status();
+  const auto authority = access::read_file(files.client_authority);
+  if (!authority.ok()) return {Reason::BAD_CONFIG, authority.status().message()};
   if (const auto facts = access::read_certificate(*authority); !facts.ok())
     return {Reason::BAD_CONFIG, files.client_authority + ": " + facts.status().message()};
   return {};
