@@ -34,6 +34,12 @@ if(RELMAP_SANITIZE)
     target_compile_options(relmap_flags INTERFACE -fno-sanitize=null,alignment,object-size,vptr)
   endif()
 endif()
+# Debian's hardening=+all, of which its compiler does PIE by itself. Sanitizers find the same, and do not go with it.
+if(CMAKE_BUILD_TYPE MATCHES "Rel" AND NOT RELMAP_SANITIZE AND NOT RELMAP_FUZZ)
+  target_compile_options(relmap_flags INTERFACE -fstack-protector-strong -Wformat -Werror=format-security
+                         -U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=2)
+  target_link_options(relmap_flags INTERFACE LINKER:-z,relro,-z,now)
+endif()
 if(RELMAP_FUZZ)
   target_compile_options(relmap_flags INTERFACE -fsanitize=fuzzer-no-link)
   target_link_options(relmap_flags INTERFACE -fsanitize=fuzzer-no-link)

@@ -36,6 +36,7 @@ constexpr const char* kFooter =
     "  relmap-frontend --source images --mono photos/ --robot phone --session tower\n"
     "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --out k.bin\n"
     "  relmap-frontend --source iidc --robot cart --server map.lab:50070 --credentials cart.pem\n"
+    "  relmap-frontend --source iidc --robot cart --lcm 'udpm://239.255.76.67:7667?ttl=1' --credentials cart.pem\n"
     "  relmap-frontend --source iidc 7140058 --rate 15 --robot cart --session morning\n"
     "  relmap-frontend --source raw drive.raw --robot cart --server /srv/map\n"
     "\n"
@@ -65,7 +66,7 @@ constexpr const char* kFooter =
 
 int main_function(int argc, char** argv) {
   RunOptions a;
-  std::string rate = "max", picture_kind = "whole", progress = "text";
+  std::string map, rate = "max", picture_kind = "whole", progress = "text";
   bool json = false;
   CLI::App app("Turns stereo pictures into keyframes of a relative map and publishes them.", "relmap-frontend");
   app.footer(kFooter);
@@ -111,9 +112,13 @@ int main_function(int argc, char** argv) {
       app.add_option("--server", a.server, "where relmapd answers over gRPC: its data folder, or HOST:PORT")
           ->excludes(lcm);
   app.add_option("--credentials", a.credentials,
-                 "file that proves which robot this is, for a relmapd that serves TLS (relmap-admin credentials\n"
-                 "makes it); $RELMAP_CREDENTIALS")
+                 "file that proves which robot this is, over TLS and over LCM (relmap-admin credentials makes it);\n"
+                 "$RELMAP_CREDENTIALS")
       ->envname("RELMAP_CREDENTIALS");
+  app.add_option("--map", map,
+                 "UUID of the map into which to send, and no other (relmap status shows it; default: that of the\n"
+                 "relmapd that answers first, and then always that one)")
+      ->type_name("UUID");
   auto* const spool = app.add_option("--spool", a.publisher.spool,
                                      "folder that keeps keyframes until they are settled (default:\n"
                                      "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it); none "
@@ -178,6 +183,11 @@ int main_function(int argc, char** argv) {
     if ((a.to == "grpc") == a.server.empty())
       throw CLI::ValidationError("--server", a.server.empty() ? "--to grpc needs it" : "--to " + a.to + " needs none");
     a.publisher.in_memory = a.publisher.spool == "none";
+    if (!map.empty()) {
+      const auto only = Uuid::parse(map);
+      if (!only) throw CLI::ValidationError("--map", "no UUID: " + map);
+      a.publisher.map = *only;
+    }
     a.progress_json = progress == "json";
     json |= a.progress_json;
   } catch (const CLI::ParseError& error) {

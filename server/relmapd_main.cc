@@ -1,13 +1,18 @@
 // relmapd: the map server.
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
@@ -20,10 +25,11 @@ namespace {
 using relmap::Reason;
 using relmap::Status;
 using relmap::ops::Config;
+using Who = relmap::ingest::LcmAuthentication::Who;
 
 constexpr const char* kFooter = R"(examples:
   relmapd --data /srv/map
-  relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0'
+  relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0' --credentials /etc/relmap/credentials
   relmapd --config /etc/relmapd.yaml --check-config
   relmap-admin credentials ca /etc/relmap/credentials --host map.lab
   relmapd --data /srv/map --listen 0.0.0.0:50070 --credentials /etc/relmap/credentials
@@ -33,10 +39,10 @@ gRPC is served at the Unix socket DIR/socket, which only the user that runs the 
 uses it. --listen serves over TCP, too, and docs/security.md tells who may do what there.
 
 Some settings have no option and are set in the configuration file: ingest.* (which robots may send, and how much),
-tls.*, access, socket_group, rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms.
+tls.*, access, lcm.*, socket_group, rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms.
 server/README.md describes them.
 
-SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
+SIGHUP reads certificates, the access list and the log level again. SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
 once, without loss: the next start applies the rest.
 
 exit codes:
@@ -78,7 +84,8 @@ int exit_code(Reason reason) {
 // The options of the command line. What they leave out keeps the value of the configuration file, or the default.
 struct CommandLine {
   std::string config_file;
-  std::optional<std::string> data, listen, credentials, lcm, vocabulary, log_level;
+  std::optional<std::string> data, listen, credentials, lcm, lcm_authentication, vocabulary, log_level;
+  std::vector<std::string> backup_roots;
   std::optional<std::uint64_t> memory_budget_mb;
   bool deterministic = false, insecure = false, no_closures = false, check_config = false;
 
@@ -92,13 +99,22 @@ struct CommandLine {
                    "DIR/endpoint; none: only at DIR/socket (default)")
         ->type_name("HOST:PORT");
     app.add_option("--credentials", credentials,
-                   "Folder made by relmap-admin credentials: the certificate to serve TLS with, and who may call")
+                   "Folder made by relmap-admin credentials: the certificate to serve TLS with, who may call, and the "
+                   "secret of the keys by which robots are known over LCM")
         ->type_name("FOLDER");
     app.add_option("--lcm", lcm,
                    "Takes keyframes over LCM: from a multicast group (udpm://GROUP:PORT?ttl=N) or from a log "
                    "(file://PATH); none "
                    "turns LCM off (default)")
         ->type_name("URL");
+    app.add_option("--lcm-authentication", lcm_authentication,
+                   "Whose messages over LCM must prove who sent them, by the keys of --credentials: all (default) or "
+                   "none; the configuration file can list robots")
+        ->check(CLI::IsMember({"all", "none"}));
+    app.add_option("--backup-root", backup_roots,
+                   "Folder below which operators may have backups made by this daemon; none by default")
+        ->type_name("FOLDER")
+        ->expected(1);
     app.add_option("--memory-budget-mb", memory_budget_mb,
                    "Memory budget for everything that grows with map and load, in MB (default 1024, at least 32)");
     app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
@@ -123,6 +139,9 @@ struct CommandLine {
     if (listen) config.listen = relmap::ops::unless_none(*listen);
     if (credentials) config.credentials = *credentials;
     if (lcm) config.lcm = relmap::ops::unless_none(*lcm);
+    if (lcm_authentication) config.lcm_authentication = *lcm_authentication == "all" ? Who::kAll : Who::kNobody;
+    for (const std::string& root : backup_roots)
+      config.backup_roots.push_back(std::filesystem::absolute(root).lexically_normal().string());
     if (vocabulary) config.vocabulary = *vocabulary;
     if (log_level) config.log_level = *log_level;
     if (memory_budget_mb) {
@@ -138,22 +157,47 @@ struct CommandLine {
 };
 
 constexpr std::size_t kOwnFiles = 1024;  // the map's, the journal's and others that are not connections
+constexpr std::size_t kFewConnections = 16;
 
 int fail(const Status& status) {
   spdlog::error("{}", status.to_string());
   return exit_code(status.reason());
 }
 
-int run(const Config& config) {
-  relmap::ops::block_stop_signals();
+// At SIGHUP: what can change while the daemon runs is read again. Nothing of it can end the daemon.
+void reload(const CommandLine& line, relmap::ops::Daemon& daemon) {
+  Config fresh;
+  if (const Status status = line.apply(fresh); status.ok())
+    spdlog::set_level(spdlog::level::from_str(fresh.log_level));
+  else
+    spdlog::error("SIGHUP: the log level stays as it was: {}", status.to_string());
+  daemon.reload();
+  spdlog::info("SIGHUP: certificates, access list and log level were read again; other settings need a restart");
+}
+
+// So few that connections cannot take the files that the map needs. They are counted over TCP and again at the socket.
+void limit_connections(Config& config) {
   const std::size_t files = relmap::ops::raise_file_limit();
-  if (files < 2 * config.connections.total + kOwnFiles)
-    spdlog::warn("{} files may be open, too few for {} connections: raise the hard limit (LimitNOFILE=)", files,
-                 2 * config.connections.total);
+  const std::size_t most = std::max(kFewConnections, (files - std::min(files, kOwnFiles)) / 2);
+  if (config.connections.total <= most) return;
+  spdlog::warn(
+      "TOO_MANY_FILES: {} files may be open, too few for {} connections; {} are taken. Raise the hard limit "
+      "(LimitNOFILE=)",
+      files, config.connections.total, most);
+  config.connections.total = most;
+  config.connections.per_peer = std::min(config.connections.per_peer, most);
+}
+
+int run(const CommandLine& line, Config config) {
+  relmap::ops::block_stop_signals();
+  limit_connections(config);
   auto daemon = relmap::ops::Daemon::start(config);
   if (!daemon.ok()) return fail(daemon.status());
   std::optional<int> signal;
-  while (!(signal = relmap::ops::wait_for_stop_signal(std::chrono::seconds(1)))) (*daemon)->tick();
+  while (!(signal = relmap::ops::wait_for_signal(std::chrono::seconds(1))) || *signal == SIGHUP) {
+    if (signal) reload(line, **daemon);
+    (*daemon)->tick();
+  }
   spdlog::info("signal {}: stopping", *signal);
   const Status stopped = (*daemon)->stop();
   if (!stopped.ok()) return fail(stopped);
@@ -164,6 +208,7 @@ int run(const Config& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  umask(S_IRWXG | S_IRWXO);  // what the daemon writes is nobody else's
   // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   spdlog::set_default_logger(spdlog::stderr_color_mt("relmapd"));
@@ -185,7 +230,7 @@ int main(int argc, char** argv) {
     return 0;
   }
   try {
-    return run(config);
+    return run(line, config);
   } catch (const std::exception& error) {
     return fail({Reason::INTERNAL, error.what()});
   }

@@ -93,7 +93,8 @@ class Admin : public ::testing::Test {
 
   const storage::TemporaryFolder folder_;
   const std::string drive_ = folder_ / "drive";
-  const DaemonOptions options_{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
+  const DaemonOptions options_{
+      .data = folder_ / "map", .lcm = random_lcm_url(), .more = {"--backup-root", folder_ / ""}};
 };
 
 TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {

@@ -1,9 +1,13 @@
 // A fleet's credentials from relmap-admin to the daemon's answer, with the programs themselves.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <thread>
+#include <vector>
 
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
@@ -78,6 +82,30 @@ TEST_F(CredentialsTest, LetEachDoWhatItsRoleMayUntilTheyAreRevoked) {
   EXPECT_THAT(plain.standard_error, HasSubstr("needs --credentials"));
   expect_done(program("relmap", {"--server", folder_ / "map", "status"}));  // the socket
 
+  // What operators did, and others tried, is on record; what was only asked is not.
+  const std::string audit = read_text(folder_ / "map/audit.jsonl");
+  EXPECT_THAT(audit, HasSubstr(R"("who":"anna","role":"operator","from":"ipv4:127.0.0.1)"));
+  EXPECT_THAT(audit, HasSubstr(R"("method":"Map.SetLabel","request":"frame { session: 1 } label: \"kitchen\")"));
+  EXPECT_THAT(audit, HasSubstr(R"("who":"dash","role":"reader")"));
+  EXPECT_THAT(audit, HasSubstr(R"("outcome":"NOT_ALLOWED")"));
+  EXPECT_THAT(audit, ::testing::Not(HasSubstr("Map.GetStatus")));
+
+  // SIGHUP reads the files again, and ends nothing, whatever they say.
+  daemon.process().signal(SIGHUP);
+  const auto patience = std::chrono::steady_clock::now() + kPatience;
+  while (daemon.log().find("SIGHUP") == std::string::npos && std::chrono::steady_clock::now() < patience)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP: certificates"));
+  const std::string server = read_text(folder_ / "fleet/server.pem");
+  std::ofstream(folder_ / "fleet/server.pem") << "no certificate";
+  daemon.process().signal(SIGHUP);
+  while (daemon.log().find("the certificate stays as it was") == std::string::npos &&
+         std::chrono::steady_clock::now() < patience)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_THAT(daemon.log(), HasSubstr("the certificate stays as it was"));
+  std::ofstream(folder_ / "fleet/server.pem") << server;
+  expect_done(relmap(anna, {"status"}));
+
   expect_done(admin({"credentials", "revoke", folder_ / "fleet", "dash"}));
   expect_done(admin({"credentials", "revoke", folder_ / "fleet", "anna"}));
   const auto until = std::chrono::steady_clock::now() + kPatience;
@@ -89,6 +117,98 @@ TEST_F(CredentialsTest, LetEachDoWhatItsRoleMayUntilTheyAreRevoked) {
   }
   expect_done(relmap(cart, {"sessions"}));
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
+// A robot proves over LCM who it is by the same file.
+TEST_F(CredentialsTest, ProveOverLcmWhichRobotSends) {
+  const std::string cart = issue("robot", "cart"), dash = issue("reader", "dash");
+  record_simulation(folder_ / "drive", {"--seed", "1", "--pairs", "12", "--laps", "0.1"});
+  DaemonOptions options = served();
+  options.lcm = random_lcm_url();
+  RunningDaemon daemon(options);
+  const auto stream = [&](const std::string& robot, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{folder_ / "drive", "--robot", robot,        "--lcm", options.lcm,
+                                       "--spool",         "none",    "--patience", "4",     "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return program("relmap-frontend", arguments);
+  };
+  expect_done(stream("cart", {"--credentials", cart}));
+  const Finished unsealed = stream("cart", {"--session", "unsealed"});
+  EXPECT_EQ(unsealed.exit_code, 3);
+  EXPECT_THAT(unsealed.standard_error, AllOf(HasSubstr("UNAUTHENTICATED"), HasSubstr("--credentials")));
+  const Finished as_another = stream("train", {"--credentials", cart});
+  EXPECT_EQ(as_another.exit_code, 3);
+  EXPECT_THAT(as_another.standard_output + as_another.standard_error, HasSubstr("NOT_ALLOWED"));
+  const Finished no_key = stream("dash", {"--credentials", dash});
+  EXPECT_NE(no_key.exit_code, 0);
+  EXPECT_THAT(no_key.standard_error, HasSubstr("has no key for LCM"));
+  EXPECT_EQ(daemon.client()->sessions().or_throw().size(), 1u);
+  EXPECT_THAT(admin({"--json", "credentials", "list", folder_ / "fleet"}).standard_output,
+              HasSubstr(R"({"role":"robot","name":"cart","kind":"key","state":"valid","expires":")"));
+
+  // Another map, which serves the same fleet, is not the one that is asked for.
+  const Finished elsewhere =
+      stream("cart", {"--credentials", cart, "--session", "elsewhere", "--map", SessionUuid::random().to_string()});
+  EXPECT_EQ(elsewhere.exit_code, 1) << elsewhere.standard_error;
+  EXPECT_THAT(elsewhere.standard_error, HasSubstr("WRONG_MAP"));
+  EXPECT_EQ(daemon.client()->sessions().or_throw().size(), 1u);
+  expect_done(admin({"credentials", "revoke", folder_ / "fleet", "cart"}));
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  Finished revoked;
+  int tries = 0;
+  do revoked = stream("cart", {"--credentials", cart, "--session", "after" + std::to_string(++tries)});
+  while (revoked.exit_code == 0 && std::chrono::steady_clock::now() < until);
+  EXPECT_THAT(revoked.standard_error, HasSubstr("UNAUTHENTICATED"));
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
+// Whatever the umask, and whatever the folder's mode was.
+TEST_F(CredentialsTest, FilesAreTheirUsersOnly) {
+  namespace fs = std::filesystem;
+  const mode_t before = umask(0);
+  fs::create_directories(folder_ / "map");
+  fs::create_directories(folder_ / "backups");
+  fs::permissions(folder_ / "map", fs::perms::all);
+  fs::permissions(folder_ / "backups", fs::perms::owner_all);
+  {
+    DaemonOptions options = served();
+    options.more = {"--backup-root", folder_ / "backups"};
+    RunningDaemon daemon(options);
+    record_simulation(folder_ / "drive", {"--seed", "1", "--pairs", "12", "--laps", "0.1"});
+    expect_done(program("relmap-frontend", {folder_ / "drive", "--robot", "cart", "--server", folder_ / "map",
+                                            "--spool", "none", "--quiet"}));
+    expect_done(admin({"backup", folder_ / "map", folder_ / "backups/monday"}));
+    const Finished elsewhere = admin({"backup", folder_ / "map", folder_ / "elsewhere"});
+    EXPECT_EQ(elsewhere.exit_code, 1);
+    EXPECT_THAT(elsewhere.standard_error, HasSubstr("NOT_ALLOWED"));
+    EXPECT_FALSE(fs::exists(folder_ / "elsewhere"));
+    EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+  }
+  expect_done(admin({"backup", folder_ / "map", folder_ / "offline"}));
+  expect_done(admin({"restore", folder_ / "offline", folder_ / "restored"}));
+  umask(before);
+  for (const std::string& root :
+       {folder_ / "map", folder_ / "backups/monday", folder_ / "offline", folder_ / "restored", folder_ / "fleet"}) {
+    std::vector<fs::path> all{root};
+    for (const auto& entry : fs::recursive_directory_iterator(root)) all.push_back(entry.path());
+    EXPECT_GT(all.size(), 4u) << root;
+    for (const fs::path& path : all)
+      EXPECT_EQ(fs::symlink_status(path).permissions() & (fs::perms::group_all | fs::perms::others_all),
+                fs::perms::none)
+          << path;
+  }
+}
+
+TEST_F(CredentialsTest, DaemonsWithoutAuthenticationSaySo) {
+  DaemonOptions options{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
+  RunningDaemon daemon(options);
+  EXPECT_THAT(daemon.log(), HasSubstr("lcm.authentication is none"));
+  std::vector<std::string> arguments = daemon_arguments(options);
+  std::erase(arguments, "--lcm-authentication");
+  std::erase(arguments, "none");
+  const Finished refused = run_program(arguments);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.standard_error, AllOf(HasSubstr("BAD_CONFIG"), HasSubstr("--lcm-authentication none")));
 }
 
 TEST_F(CredentialsTest, AreMadeOnceAndRenewedWithTheirNames) {

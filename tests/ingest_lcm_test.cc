@@ -11,10 +11,14 @@
 #include <filesystem>
 #include <mutex>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 
+#include "frontend/publishing/lcm/lcm_transport.h"
 #include "frontend/publishing/publisher.h"
+#include "proto/base/crc32c.h"
+#include "proto/base/hex.h"
 #include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
@@ -50,15 +54,34 @@ class LcmIngestTest : public ::testing::Test {
   void start_daemon() {
     BootId boot{};
     boot[0] = ++boots_;
-    server_ = std::make_unique<intake::IngestServer>(sink_, budget_, boot);
-    auto ingest = ingest::LcmIngest::start(url_, *server_, [] { return DaemonStatus{}; });
+    intake::IngestServerOptions options;
+    options.map = map_;
+    options.proving = proving_;
+    server_ = std::make_unique<intake::IngestServer>(sink_, budget_, boot, options);
+    auto ingest = ingest::LcmIngest::start({url_, {who_, secret_}}, *server_, [] { return DaemonStatus{}; });
     ASSERT_TRUE(ingest.ok()) << ingest.status().to_string();
     ingest_ = std::move(*ingest);
+    ingest_->use(list_);
   }
   void kill_daemon() {
     ingest_.reset();
     server_.reset();
     sink_.crash();
+  }
+
+  access::RobotKey issue(const std::string& robot) {
+    const access::SealKey drawn = access::random_key();
+    list_.add({access::Grant::Kind::kKey, hex(drawn), {access::Role::kRobot, robot}, INT64_MAX, false});
+    return access::robot_key(secret_, drawn);
+  }
+  Result<std::unique_ptr<publishing::Publisher>> sealed_publisher(const access::RobotKey& key) {
+    auto transport = publishing::LcmTransport::open(url_, {key});
+    if (!transport.ok()) return transport.status();
+    return publishing::Publisher::start(options_, header(), std::move(*transport));
+  }
+  std::uint64_t not_taken(Reason reason) const {
+    const intake::IngestStats stats = server_->stats();
+    return stats.messages_refused[intake::index_of(reason)] + stats.parts_refused[intake::index_of(reason)];
   }
 
   static Keyframe keyframe(const SessionHeader& session, std::uint32_t sequence) {
@@ -83,6 +106,11 @@ class LcmIngestTest : public ::testing::Test {
   storage::Budget budget_{std::size_t{256} << 20};
   publishing::PublisherOptions options_;
   std::uint8_t boots_ = 0;
+  ingest::LcmAuthentication::Who who_ = ingest::LcmAuthentication::Who::kNobody;
+  std::set<std::string> proving_;
+  const access::SealKey secret_ = access::random_key();
+  access::AccessList list_;
+  MapIdentity map_{SessionUuid::random(), 1};
   std::unique_ptr<intake::IngestServer> server_;
   std::unique_ptr<ingest::LcmIngest> ingest_;
 };
@@ -109,6 +137,176 @@ TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
     kill_daemon();
   }
   EXPECT_EQ(sink_.journal().size(), 120u);
+}
+
+// The same with seals, in packets of a network.
+TEST_F(LcmIngestTest, SealedKeyframesArriveThoughTheDaemonDiesOnTheWay) {
+  who_ = ingest::LcmAuthentication::Who::kAll;
+  for (const std::size_t part_bytes : {std::size_t{0}, std::size_t{kNetworkPartBytes}}) {
+    options_.part_bytes = part_bytes;
+    options_.spool = (folder_ / std::to_string(part_bytes)).string();
+    auto publisher = sealed_publisher(issue(header().robot));
+    ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+    start_daemon();
+    for (std::uint32_t s = 0; s < 60; ++s) {
+      ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), s)).ok());
+      if (s == 30) {
+        kill_daemon();
+        start_daemon();
+      }
+    }
+    const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + kPatience);
+    EXPECT_TRUE(summary.all_settled());
+    EXPECT_EQ(summary.settled, 60u);
+    EXPECT_TRUE(summary.refused.empty());
+    EXPECT_TRUE((*publisher)->end_session(steady_clock::now() + kPatience));
+    EXPECT_TRUE((*publisher)->trouble().ok());
+    kill_daemon();
+  }
+  EXPECT_EQ(sink_.journal().size(), 122u);
+}
+
+TEST_F(LcmIngestTest, WhoeverHasNoKeyIsToldWhyNothingIsSettled) {
+  who_ = ingest::LcmAuthentication::Who::kAll;
+  start_daemon();
+  {
+    auto publisher = publishing::Publisher::start(options_, header());
+    ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+    ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
+    const auto deadline = steady_clock::now() + kPatience;
+    while ((*publisher)->trouble().ok() && steady_clock::now() < deadline)
+      std::this_thread::sleep_for(milliseconds(20));
+    EXPECT_EQ((*publisher)->trouble().reason(), Reason::UNAUTHENTICATED);
+    EXPECT_GE(not_taken(Reason::UNAUTHENTICATED), 1u);
+  }
+  options_.spool += ".unknown";
+  auto publisher = sealed_publisher(access::robot_key(secret_, access::random_key()));
+  ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+  ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
+  const auto deadline = steady_clock::now() + kPatience;
+  while ((*publisher)->trouble().ok() && steady_clock::now() < deadline) std::this_thread::sleep_for(milliseconds(20));
+  EXPECT_EQ((*publisher)->trouble().reason(), Reason::UNAUTHENTICATED);
+  EXPECT_EQ((*publisher)->progress().settled, 0u);
+  EXPECT_TRUE(sink_.journal().empty());
+  // Once the key is issued it goes on by itself, and when it is revoked it ends.
+  const access::RobotKey key = issue(header().robot);
+  ingest_->use(list_);
+  options_.spool += ".known";
+  auto known = sealed_publisher(key);
+  ASSERT_TRUE((*known)->push(keyframe((*known)->session(), 0)).ok());
+  EXPECT_TRUE((*known)->finish(steady_clock::now() + kPatience).all_settled());
+  EXPECT_EQ(sink_.journal().size(), 1u);
+}
+
+TEST_F(LcmIngestTest, ARobotCannotSendForAnother) {
+  who_ = ingest::LcmAuthentication::Who::kAll;
+  const access::RobotKey thief = issue("thief");
+  start_daemon();
+  auto publisher = sealed_publisher(thief);  // its keyframes say that they are of the header's robot
+  ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+  ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
+  const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + kPatience);
+  EXPECT_EQ(summary.refused, (std::map<Reason, std::uint64_t>{{Reason::NOT_ALLOWED, 1}}));
+  EXPECT_TRUE(sink_.journal().empty());
+}
+
+// Some robots must prove who they are; others are older and cannot.
+TEST_F(LcmIngestTest, ThoseWhoMustProveWhoTheyAreCanBeListed) {
+  who_ = ingest::LcmAuthentication::Who::kSome;
+  proving_ = {"cart"};
+  const access::RobotKey key = issue("cart");
+  start_daemon();
+  auto old_robot = publishing::Publisher::start(options_, header());
+  ASSERT_TRUE(old_robot.ok()) << old_robot.status().to_string();
+  ASSERT_TRUE((*old_robot)->push(keyframe((*old_robot)->session(), 0)).ok());
+  EXPECT_TRUE((*old_robot)->finish(steady_clock::now() + kPatience).all_settled());
+  EXPECT_EQ(sink_.journal().size(), 1u);
+
+  SessionHeader cart = header();
+  cart.robot = "cart";
+  options_.spool += ".cart";
+  auto transport = publishing::LcmTransport::open(url_, {key});
+  ASSERT_TRUE(transport.ok()) << transport.status().to_string();
+  auto publisher = publishing::Publisher::start(options_, cart, std::move(*transport));
+  ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
+  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + kPatience).all_settled());
+  EXPECT_EQ(sink_.journal().size(), 2u);
+
+  // The same robot without its key, in the session and in a new one.
+  auto link = LcmLink::open(url_, {}).or_throw();
+  const SessionUuid session = (*publisher)->session().uuid, other = SessionUuid::random();
+  const auto deadline = steady_clock::now() + kPatience;
+  while (not_taken(Reason::NOT_ALLOWED) < 20 && steady_clock::now() < deadline) {
+    link->publish(kGapChannel, encode_lcm(Gap{session, 1, 5, Reason::DROPPED_BY_ROBOT}));
+    link->publish(kEndChannel, encode_lcm(SessionEnd{session, 1}));
+    SessionHeader stolen = cart;
+    for (const SessionUuid& uuid : {session, other}) {
+      stolen.uuid = uuid;
+      const Bytes payload = encode_keyframe(keyframe(stolen, 1));
+      for (std::uint32_t i = 0; i < count_parts(payload.size(), kMaxPartBytes); ++i)
+        link->publish(kKeyframeChannel, encode_lcm(cut_part(uuid, 1, payload, crc32c(payload), kMaxPartBytes, i)));
+    }
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  EXPECT_GE(not_taken(Reason::NOT_ALLOWED), 20u);
+  EXPECT_EQ(sink_.journal().size(), 2u);
+}
+
+// Seals are not looked at, so that recordings of sealed messages can be replayed.
+TEST_F(LcmIngestTest, WithoutAuthenticationSealsAreNoHindrance) {
+  start_daemon();
+  auto link = LcmLink::open(url_, {}).or_throw();
+  SessionHeader session = header();
+  session.uuid = SessionUuid::random();
+  const Bytes payload = encode_keyframe(keyframe(session, 0));
+  access::Sealer sealer(access::random_key());
+  const auto deadline = steady_clock::now() + kPatience;
+  while (sink_.journal().empty() && steady_clock::now() < deadline) {
+    for (std::uint32_t i = 0; i < count_parts(payload.size(), 30000); ++i) {
+      Bytes datagram = encode_lcm(cut_part(session.uuid, 0, payload, crc32c(payload), 30000, i));
+      sealer.seal(access::SealedBy::kRobot, kKeyframeChannel, {}, {}, datagram);
+      link->publish(kKeyframeChannel, datagram);
+    }
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  EXPECT_EQ(sink_.journal().size(), 1u);
+}
+
+// Two daemons, of which both know the robot's key: the robot keeps to the one that it has met first, or to the map that
+// it was told, and the other takes nothing of it.
+TEST_F(LcmIngestTest, ARobotKeepsToOneOfTwoDaemons) {
+  who_ = ingest::LcmAuthentication::Who::kAll;
+  const access::RobotKey key = issue(header().robot);
+  start_daemon();
+  intake::FakeSink other_sink;
+  other_sink.sync_at_once = true;
+  intake::IngestServerOptions other_options;
+  other_options.map = {SessionUuid::random(), 1};
+  intake::IngestServer other_server(other_sink, budget_, BootId{99}, other_options);
+  const auto other =
+      ingest::LcmIngest::start({url_, {who_, secret_}}, other_server, [] { return DaemonStatus{}; }).or_throw();
+  other->use(list_);
+  for (const bool first : {true, false}) {
+    options_.map = first ? map_.uuid : other_options.map.uuid;
+    options_.spool = (folder_ / (first ? "first" : "second")).string();
+    auto publisher = sealed_publisher(key);
+    ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+    for (std::uint32_t s = 0; s < 20; ++s) {
+      ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), s)).ok());
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    EXPECT_TRUE((*publisher)->finish(steady_clock::now() + kPatience).all_settled());
+    EXPECT_TRUE((*publisher)->trouble().ok()) << (*publisher)->trouble().to_string();
+    EXPECT_EQ(sink_.journal().size(), 20u);
+    EXPECT_EQ(other_sink.journal().size(), first ? 0u : 20u);
+  }
+  options_.map = {};
+  options_.spool = (folder_ / "third").string();
+  auto publisher = sealed_publisher(key);
+  for (std::uint32_t s = 0; s < 20; ++s) ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), s)).ok());
+  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + kPatience).all_settled());
+  EXPECT_EQ(sink_.journal().size() + other_sink.journal().size(), 60u);
+  EXPECT_TRUE(sink_.journal().size() == 20u || other_sink.journal().size() == 20u) << "one of them has all";
 }
 
 TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {

@@ -1,6 +1,6 @@
 // Both ends of the keyframe protocol over a channel that loses, doubles, reorders and damages messages, with a daemon
 // that dies and forgets what was not on disk: every sequence is settled exactly once, and the robot's view of it is
-// right.
+// right. Then the same beside peers that lie.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,6 +31,14 @@ struct Channel {
 class World {
  public:
   World(std::uint64_t seed, Channel channel) : random_(seed), channel_(channel), core_(session()) { start_daemon(); }
+
+  // From now on the robot proves who it is, and each millisecond so many messages come of others, who do not tell the
+  // truth: of a robot that proves to be another one, and of somebody who proves nothing.
+  void let_others_lie(double messages_per_ms) {
+    lies_per_ms_ = messages_per_ms;
+    robot_ = {KeyframeSampler(1).keyframe().session.robot};
+    start_daemon();
+  }
 
   static SessionUuid session() {
     SessionUuid uuid;
@@ -63,7 +71,9 @@ class World {
   void step() {
     now_ += milliseconds(1);
     for (const auto& send : core_.poll(now_, 700)) transmit(send);
+    for (double lies = lies_per_ms_; uniform() < lies; --lies) lie();
     deliver();
+    EXPECT_LE(budget_.used(), budget_.limit());
     if (uniform() < 0.3) sink_.sync(static_cast<std::size_t>(uniform() * 5) + 1);
     for (const Acknowledgement& ack : intake_->poll(now_)) carry(ack);
   }
@@ -92,12 +102,17 @@ class World {
     std::map<std::uint32_t, Reason> all;
     for (const storage::JournalRecord& record : sink_.journal()) {
       if (const auto* k = std::get_if<storage::KeyframeRecord>(&record)) {
-        const std::uint32_t sequence = decode_keyframe(k->payload)->sequence;
+        const Keyframe keyframe = *decode_keyframe(k->payload);
+        if (keyframe.session.uuid != session()) {
+          EXPECT_NE(keyframe.session.robot, robot_.robot) << "somebody has begun a session in the robot's name";
+          continue;
+        }
+        const std::uint32_t sequence = keyframe.sequence;
         EXPECT_TRUE(all.emplace(sequence, Reason::OK).second) << "doubled: " << sequence;
         EXPECT_EQ(k->payload, spool_[sequence]);
-      } else if (const auto* r = std::get_if<storage::RefusalRecord>(&record)) {
+      } else if (const auto* r = std::get_if<storage::RefusalRecord>(&record); r && r->session == own()) {
         EXPECT_TRUE(all.emplace(r->sequence, r->reason).second) << "doubled: " << r->sequence;
-      } else if (const auto* g = std::get_if<storage::GapRecord>(&record)) {
+      } else if (const auto* g = std::get_if<storage::GapRecord>(&record); g && g->session == own()) {
         for (std::uint32_t s = g->from; s <= g->to; ++s)
           EXPECT_TRUE(all.emplace(s, g->reason).second) << "doubled: " << s;
       }
@@ -108,12 +123,64 @@ class World {
  private:
   using Message = std::variant<KeyframePart, Gap, Acknowledgement>;
 
+  // The session's number in the map.
+  SessionNumber own() const {
+    for (const storage::Session& known : sink_.view()->sessions())
+      if (known.header.uuid == session()) return known.number;
+    return 0;
+  }
+
+  // A message that its sender may send, and that is not true, of the robot's session or of any other.
+  void lie() {
+    const intake::Sender sender = uniform() < 0.5 ? intake::Sender{"mallory"} : intake::Sender{{}, true};
+    SessionUuid uuid = session();
+    if (uniform() < 0.6) {
+      uuid.bytes.fill(3);
+      uuid.bytes[0] = static_cast<std::uint8_t>(random_());
+      uuid.bytes[1] = static_cast<std::uint8_t>(random_());
+    }
+    const auto sequence = static_cast<std::uint32_t>(uniform() < 0.9 ? random_() % 250 : random_());
+    switch (random_() % 5) {
+      case 0:
+        (void)intake_->take_gap({uuid, sequence, sequence + static_cast<std::uint32_t>(random_() % 300),
+                                 uniform() < 0.5 ? Reason::DROPPED_BY_ROBOT : Reason::MAP_RESTORED},
+                                now_, sender);
+        break;
+      case 1:
+        (void)intake_->take_end({uuid, uniform() < 0.5 ? sequence : core_.next_sequence()}, now_, sender);
+        break;
+      case 2: {  // a part of the robot's own keyframe, spoilt
+        if (spool_.empty()) return;
+        const Bytes& payload = spool_.rbegin()->second;
+        auto part = cut_part(uuid, spool_.rbegin()->first, payload, crc32c(payload), 700, 0);
+        part.data[random_() % part.data.size()] ^= 1;
+        part.part_crc = part_checksum(part);
+        intake_->take_part(part, now_, sender);
+        break;
+      }
+      default: {  // a whole keyframe, of its own name or of the robot's
+        Keyframe k = KeyframeSampler(random_() % 50).keyframe();
+        k.session.uuid = uuid;
+        k.session.robot = uniform() < 0.5 ? "mallory" : robot_.robot;
+        k.sequence = sequence;
+        k.time_us = static_cast<std::int64_t>(random_() % 3'000'000'000'000'000);
+        const Bytes payload = encode_keyframe(k);
+        const std::uint32_t count = count_parts(payload.size(), 60000);
+        for (std::uint32_t i = 0; i < count; ++i)
+          intake_->take_part(cut_part(uuid, sequence, payload, crc32c(payload), 60000, i), now_, sender);
+      }
+    }
+  }
+
   double uniform() { return std::uniform_real_distribution<double>(0, 1)(random_); }
 
   void start_daemon() {
     BootId boot{};
     boot[0] = ++boots_;
-    intake_ = std::make_unique<intake::Intake>(sink_, budget_, boot, intake::IntakeOptions{}, [] {});
+    intake::IntakeOptions options;
+    if (lies_per_ms_ > 0) options.proving = {robot_.robot};
+    intake_ = std::make_unique<intake::Intake>(sink_, budget_, boot, options, [] {});
+    if (lies_per_ms_ > 0) (void)intake_->claim(session(), now_, robot_);
     std::erase_if(under_way_, [](const auto& m) { return std::holds_alternative<Acknowledgement>(m.second); });
   }
 
@@ -157,8 +224,8 @@ class World {
     while (!under_way_.empty() && under_way_.begin()->first <= now_) {
       const Message message = std::move(under_way_.begin()->second);
       under_way_.erase(under_way_.begin());
-      if (const auto* part = std::get_if<KeyframePart>(&message)) intake_->take_part(*part, now_);
-      if (const auto* gap = std::get_if<Gap>(&message)) (void)intake_->take_gap(*gap, now_);
+      if (const auto* part = std::get_if<KeyframePart>(&message)) intake_->take_part(*part, now_, robot_);
+      if (const auto* gap = std::get_if<Gap>(&message)) (void)intake_->take_gap(*gap, now_, robot_);
       if (const auto* ack = std::get_if<Acknowledgement>(&message)) core_.acknowledge(*ack, now_);
     }
   }
@@ -171,6 +238,8 @@ class World {
   publishing::PublisherCore core_;
   std::unique_ptr<intake::Intake> intake_;
   std::uint8_t boots_ = 0;
+  intake::Sender robot_;
+  double lies_per_ms_ = 0;
   std::size_t parts_sent_ = 0;
   std::map<std::uint32_t, Bytes> spool_;
   std::multimap<intake::SteadyTime, Message> under_way_;
@@ -299,6 +368,34 @@ TEST(IngestSimulation, GapsAndSkippedSequencesAreSettled) {
   EXPECT_EQ(outcomes.at(6), Reason::OK);
   EXPECT_EQ(world.sink().faults, std::vector<std::string>{});
 }
+
+// Whatever others send, of its session or of a thousand of their own, the robot's keyframes are settled, as it sent
+// them.
+void settles_beside_liars(std::uint64_t seeds, std::uint32_t keyframes) {
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    World world(seed, {0.05, 0.05, 0.01, 1, 10});
+    world.let_others_lie(seed % 2 == 0 ? 0.5 : 3);
+    for (int i = 0; i < 200; ++i) world.step();  // they are there before the robot
+    std::mt19937_64 random(seed);
+    for (std::uint32_t s = 0; s < keyframes; ++s) {
+      world.push(s);
+      if (s % 50 == 49) {
+        for (int i = static_cast<int>(random() % 200); i > 0; --i) world.step();
+        if (seed % 3 == 0) world.crash();
+      }
+    }
+    ASSERT_TRUE(world.run(120'000)) << "seed " << seed << ": " << world.core().unsettled() << " unsettled";
+    const auto outcomes = world.outcomes();
+    EXPECT_EQ(outcomes.size(), keyframes) << "seed " << seed;
+    for (const auto& [sequence, reason] : outcomes) EXPECT_EQ(reason, Reason::OK) << sequence << ", seed " << seed;
+    EXPECT_EQ(world.core().counts().gaps, 0u);
+    EXPECT_TRUE(world.core().counts().refused.empty());
+    EXPECT_GT(world.stats().messages_refused[intake::index_of(Reason::NOT_ALLOWED)], 0u);
+    EXPECT_EQ(world.sink().faults, std::vector<std::string>{});
+  }
+}
+TEST(IngestSimulation, AdversariesNeitherForgeNorStarve) { settles_beside_liars(12, 150); }
+TEST(LongIngestSimulation, AdversariesNeitherForgeNorStarve) { settles_beside_liars(300, 400); }
 
 TEST(IngestSimulation, SlowSinkIsNotOverrun) {
   World world(7, {});

@@ -32,7 +32,7 @@ class MapIdentityTest : public ::testing::Test {
               0);
   }
   DaemonOptions daemon_of(const std::string& map, const std::string& lcm = {}) const {
-    return {.data = folder_ / map, .lcm = lcm, .more = {}};
+    return {.data = folder_ / map, .lcm = lcm, .more = {"--backup-root", folder_ / ""}};
   }
   std::vector<std::string> command(std::vector<std::string> more) const {
     std::vector<std::string> all{built_program("relmap-frontend"),

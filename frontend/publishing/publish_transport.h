@@ -25,6 +25,9 @@ class PublishTransport {
   // Why no messages get through, as far as is known; ok if they do, or if that is not known. Thread-safe.
   virtual Status trouble() const { return {}; }
 
+  // Called once, before listen(): which session is sent, and into which map; nil: into any.
+  virtual void sends_for(const SessionUuid& /*session*/, const Uuid& /*map*/) {}
+
   // Called from one thread. They do not block.
   virtual void send(const KeyframePart& part) = 0;
   virtual void send(const Gap& gap) = 0;

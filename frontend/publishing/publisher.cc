@@ -38,7 +38,7 @@ struct Publisher::Impl {
         session(s->session()),
         spool(std::move(s)),
         transport(std::move(t)),
-        core(session.uuid, {options.repeatable(), transport->lossless()}) {
+        core(session.uuid, {options.repeatable(), transport->lossless(), options.map}) {
     core.load_map(spool->map());
     for (const auto& [sequence, entry] : spool->keyframes()) core.load_keyframe(sequence, entry.crc, entry.bytes);
     for (const Gap& gap : spool->gaps()) core.load_gap(gap);
@@ -171,6 +171,12 @@ struct Publisher::Impl {
     return core.map() == spool->map() || spool->set_map(core.map()).ok();
   }
 
+  // The map that the session is in, or is to be in; nil if any will do.
+  Uuid map_sent_to() const {
+    const MutexLock lock(mutex);
+    return core.map().known() ? core.map().uuid : options.map;
+  }
+
   void broken() {
     const MutexLock lock(mutex);
     core.broken();
@@ -301,6 +307,7 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
   if (!spool.ok()) return spool.status();
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*spool), std::move(transport));
   Impl* const running = impl.get();
+  running->transport->sends_for(running->session.uuid, running->map_sent_to());
   running->transport->listen({[running](const Acknowledgement& ack) { running->acknowledge(ack); },
                               [running](const PoseNews& news) { running->hear(news); },
                               [running] { running->broken(); },

@@ -17,6 +17,7 @@ namespace relmap::publishing {
 
 struct PublisherOptions {
   std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
+  Uuid map = {};          // publish into this map only; nil: into that of the first daemon that answers
   std::string spool;      // folder of this session's spool; created if missing
   std::string recording;  // identifies the source of the session (DiskSpool::open())
   // Keep the spool in memory. The source can be read again and then gives the same keyframes: a run that was

@@ -35,6 +35,7 @@ struct PublisherCoreOptions {
   // The transport loses nothing without reporting it. Messages are not sent again merely because no answer has come
   // yet, since that would make a slow line slower.
   bool lossless = false;
+  Uuid map = {};  // publish into this map only; nil: into any
 };
 
 // Not thread-safe.
@@ -43,7 +44,7 @@ class PublisherCore {
   using Time = std::chrono::steady_clock::time_point;
 
   explicit PublisherCore(const SessionUuid& session, PublisherCoreOptions options = {})
-      : session_(session), options_(options), maps_({options.repeated, options.lossless}) {}
+      : session_(session), options_(options), maps_({options.repeated, options.lossless, options.map}) {}
 
   // Load what a spool held when it was opened; before all other calls. Where keyframes and gaps overlap, the gap
   // counts.

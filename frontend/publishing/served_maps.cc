@@ -19,6 +19,7 @@ MapIdentity ServedMaps::of(const BootId& boot) const {
 
 // Whether the map has what the session has published, as far as is known.
 bool ServedMaps::belongs_to(const MapIdentity& map) const {
+  if (!options_.only.is_nil() && map.uuid != options_.only) return false;
   if (!map_.known() || !map.known()) return true;
   return map.uuid == map_.uuid && (!options_.repeated || map.epoch == map_.epoch);
 }
@@ -44,7 +45,8 @@ void ServedMaps::introduce(const DaemonIdentity& daemon, const std::optional<Boo
 
 bool ServedMaps::believes(const BootId& boot, Time now) {
   if (unnamed_.size() >= kMaxDaemons) unnamed_.clear();
-  if (!daemons_.contains(boot) && map_.known() && now - unnamed_.emplace(boot, now).first->second < kUnnamed)
+  if (!daemons_.contains(boot) && (map_.known() || !options_.only.is_nil()) &&
+      now - unnamed_.emplace(boot, now).first->second < kUnnamed)
     return false;
   if (const MapIdentity map = of(boot); !belongs_to(map)) {
     hear_other(map, now);
@@ -73,18 +75,20 @@ void ServedMaps::broken() {
 
 bool ServedMaps::may_send(Time now) const {
   if (other_speaks(now)) return false;
-  if (!map_.known() || introduced_) return true;
-  return !options_.lossless && waiting_since_ && now - *waiting_since_ >= kUnnamed;
+  if (introduced_ || (!map_.known() && options_.only.is_nil())) return true;
+  return !options_.lossless && options_.only.is_nil() && waiting_since_ && now - *waiting_since_ >= kUnnamed;
 }
 
 bool ServedMaps::is_other(const BootId& boot) const { return !belongs_to(of(boot)); }
 
 Status ServedMaps::status(const SessionUuid& session, Time now) const {
   if (!other_speaks(now) || (!options_.lossless && now - other_since_ < kOtherAlone)) return {};
+  const std::string served = ", and the daemon serves map " + other_->uuid.to_string();
+  if (!options_.only.is_nil() && other_->uuid != options_.only)
+    return {Reason::WRONG_MAP, "session " + session.to_string() + " is for map " + options_.only.to_string() + served};
   if (other_->uuid == map_.uuid)
     return {Reason::MAP_RESTORED, "the map was restored from a backup since the recording was sent to it"};
-  return {Reason::WRONG_MAP, "session " + session.to_string() + " was begun in map " + map_.uuid.to_string() +
-                                 ", and the daemon serves map " + other_->uuid.to_string()};
+  return {Reason::WRONG_MAP, "session " + session.to_string() + " was begun in map " + map_.uuid.to_string() + served};
 }
 
 }  // namespace relmap::publishing

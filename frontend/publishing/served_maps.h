@@ -19,6 +19,7 @@ struct ServedMapsOptions {
   // There is one daemon at a time, and the next one introduces itself. Otherwise several daemons may be heard, a daemon
   // that is silent for a while has gone, and one that never introduces itself is an old one, whose map is not known.
   bool lossless = false;
+  Uuid only = {};  // the session may be published into this map only; nil: into any
 };
 
 // A session belongs to the map of the first daemon that acknowledged a keyframe of it. Not thread-safe.

@@ -15,8 +15,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (const auto credentials = access::parse_credentials(text); credentials.ok()) {
     const auto again = access::parse_credentials(access::text_of(*credentials));
-    if (!again.ok() || again->token != credentials->token || again->key != credentials->key ||
-        again->certificate != credentials->certificate || again->authorities != credentials->authorities)
+    if (!again.ok() || again->token != credentials->token || again->robot_key != credentials->robot_key ||
+        again->key != credentials->key || again->certificate != credentials->certificate ||
+        again->authorities != credentials->authorities)
       std::abort();
   }
   if (const auto facts = access::read_certificate(text); facts.ok() && facts->principal)

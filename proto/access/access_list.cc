@@ -35,10 +35,12 @@ Result<Grant> parse_line(std::string_view line) {
   const std::string_view kind = word_of(line);
   if (kind == "certificate")
     grant.kind = Grant::Kind::kCertificate;
+  else if (kind == "key")
+    grant.kind = Grant::Kind::kKey;
   else if (kind != "token")
-    return bad("'" + std::string(kind) + "' is neither token nor certificate");
+    return bad("'" + std::string(kind) + "' is none of token, certificate, key");
   grant.hash = word_of(line);
-  if (!is_hash(grant.hash)) return bad("the second word is no SHA-256 in hexadecimal");
+  if (!is_hash(grant.hash)) return bad("the second word has not 64 hexadecimal digits");
   const std::string_view role_word = word_of(line);
   const auto role = role_of(role_word);
   if (!role) return bad("'" + std::string(role_word) + "' is none of reader, robot, operator");
@@ -56,7 +58,17 @@ Result<Grant> parse_line(std::string_view line) {
 
 }  // namespace
 
-std::string_view kind_name(Grant::Kind kind) { return kind == Grant::Kind::kToken ? "token" : "certificate"; }
+std::string_view kind_name(Grant::Kind kind) {
+  switch (kind) {
+    case Grant::Kind::kToken:
+      return "token";
+    case Grant::Kind::kCertificate:
+      return "certificate";
+    case Grant::Kind::kKey:
+      return "key";
+  }
+  return "";
+}
 
 Result<AccessList> AccessList::parse(std::string_view text, const std::string& name) {
   // An empty file is one that was cut short: with it, what was revoked would be valid again.

@@ -1,11 +1,13 @@
-// The file by which a daemon knows tokens, and certificates that were revoked. One line for each credential that was
-// issued:
+// The file by which a daemon knows tokens, keys, and certificates that were revoked. One line for each credential that
+// was issued:
 //
 //   # KIND HASH ROLE EXPIRES STATE NAME
 //   token 2c26b4...7ae robot 2027-11-29T00:00:00Z valid cart-1
 //   certificate 9f86d0...a08 operator 2027-11-29T00:00:00Z revoked anna
+//   key 60303a...2e7 robot 2027-11-29T00:00:00Z valid cart-1
 //
-// HASH is the SHA-256 of a token, or of a certificate's DER. A token that has no valid line is refused. A certificate
+// HASH is the SHA-256 of a token, or of a certificate's DER. Of a key it is 32 random bytes, which lead to the key only
+// together with the fleet's secret (datagram_seal.h). A token or key that has no valid line is refused. A certificate
 // is refused if its line says so; one without a line is judged by its issuer alone, so that certificates of another
 // authority need none here.
 #pragma once
@@ -22,7 +24,7 @@
 namespace relmap::access {
 
 struct Grant {
-  enum class Kind : std::uint8_t { kToken, kCertificate };
+  enum class Kind : std::uint8_t { kToken, kCertificate, kKey };
 
   Kind kind = Kind::kToken;
   std::string hash;  // 64 hexadecimal digits
@@ -32,7 +34,7 @@ struct Grant {
 
   bool operator==(const Grant&) const = default;
 };
-std::string_view kind_name(Grant::Kind kind);  // "token", "certificate"
+std::string_view kind_name(Grant::Kind kind);  // "token", "certificate", "key"
 
 class AccessList {
  public:

@@ -16,6 +16,7 @@ TEST(AccessList, IsReadAsItWasWritten) {
   AccessList list;
   list.add({Grant::Kind::kToken, kHash, {Role::kReader, "dash board"}, 1'827'446'400, false});
   list.add({Grant::Kind::kCertificate, kOther, {Role::kRobot, "Wägelchen"}, 0, true});
+  list.add({Grant::Kind::kKey, std::string(64, 'c'), {Role::kRobot, "Wägelchen"}, 0, false});
   const auto again = AccessList::parse(list.text(), "file");
   ASSERT_TRUE(again.ok()) << again.status().to_string();
   EXPECT_EQ(again->grants(), list.grants());

@@ -1,6 +1,6 @@
 #include "proto/access/credentials.h"
 
-#include <sys/stat.h>
+#include <algorithm>
 
 #include "proto/access/certificate.h"
 #include "proto/access/file.h"
@@ -11,11 +11,20 @@ namespace relmap::access {
 namespace {
 
 constexpr char kTokenBlock[] = "RELMAP TOKEN";
+constexpr char kRobotKeyBlock[] = "RELMAP KEY";
 constexpr std::string_view kCertificateBlock = "CERTIFICATE";
 
 std::string block(const std::string& name, const unsigned char* bytes, long size) {
   const Bio bio = memory();
   return PEM_write_bio(bio.get(), name.c_str(), "", bytes, size) > 0 ? text_of(bio) : std::string();
+}
+
+bool read_robot_key(ByteSpan bytes, std::optional<RobotKey>& key) {
+  RobotKey& read = key.emplace();
+  if (bytes.size() != read.id.size() + read.key.size()) return false;
+  std::copy_n(bytes.begin(), read.id.size(), read.id.begin());
+  std::copy_n(bytes.begin() + read.id.size(), read.key.size(), read.key.begin());
+  return true;
 }
 
 }  // namespace
@@ -25,6 +34,11 @@ std::string text_of(const Credentials& credentials) {
   if (!credentials.token.empty())
     text += block(kTokenBlock, reinterpret_cast<const unsigned char*>(credentials.token.data()),
                   static_cast<long>(credentials.token.size()));
+  if (credentials.robot_key) {
+    Bytes bytes(credentials.robot_key->id.begin(), credentials.robot_key->id.end());
+    bytes.insert(bytes.end(), credentials.robot_key->key.begin(), credentials.robot_key->key.end());
+    text += block(kRobotKeyBlock, bytes.data(), static_cast<long>(bytes.size()));
+  }
   return text + credentials.authorities;
 }
 
@@ -35,10 +49,13 @@ Result<Credentials> parse_credentials(std::string_view text) {
   char *name = nullptr, *header = nullptr;
   unsigned char* bytes = nullptr;
   long size = 0;
+  bool key_is_whole = true;
   while (PEM_read_bio(bio.get(), &name, &header, &bytes, &size) == 1) {
     const std::string kind = name;
     if (kind == kTokenBlock)
       found.token.assign(reinterpret_cast<const char*>(bytes), static_cast<std::size_t>(size));
+    else if (kind == kRobotKeyBlock)
+      key_is_whole &= read_robot_key({bytes, static_cast<std::size_t>(size)}, found.robot_key);
     else if (kind.ends_with("PRIVATE KEY"))
       found.key = block(kind, bytes, size);
     else if (kind == kCertificateBlock)
@@ -49,6 +66,7 @@ Result<Credentials> parse_credentials(std::string_view text) {
     OPENSSL_free(bytes);
   }
   ERR_clear_error();
+  if (!key_is_whole) return bad("a robot's key has 40 bytes");
   if (found.key.empty() == found.token.empty())
     return bad(found.key.empty() ? "there is neither a private key nor a token"
                                  : "there are a private key and a token");
@@ -61,11 +79,8 @@ Result<Credentials> parse_credentials(std::string_view text) {
 }
 
 Result<Credentials> read_credentials(const std::string& path) {
-  const auto text = read_file(path);
+  const auto text = read_private_file(path);
   if (!text.ok()) return text.status();
-  struct stat facts {};
-  if (stat(path.c_str(), &facts) == 0 && (facts.st_mode & (S_IRWXG | S_IRWXO)) != 0)
-    return Status(Reason::BAD_CONFIG, "others can read the credentials in " + path + ": chmod 600 " + path);
   auto credentials = parse_credentials(*text);
   if (!credentials.ok()) return Status(Reason::BAD_CONFIG, path + ": " + credentials.status().message());
   return credentials;

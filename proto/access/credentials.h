@@ -3,12 +3,15 @@
 //
 //   -----BEGIN PRIVATE KEY-----       with its certificate: a caller known by certificate
 //   -----BEGIN CERTIFICATE-----       the certificate of the key, and those of the authorities that are believed
-//   -----BEGIN RELMAP TOKEN-----      a caller known by token; no key then
+//   -----BEGIN RELMAP TOKEN-----      a caller known by token; no private key then
+//   -----BEGIN RELMAP KEY-----        a robot's, for LCM: its id (8 bytes) and the key (32)
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "proto/access/datagram_seal.h"
 #include "proto/base/status.h"
 
 namespace relmap::access {
@@ -17,10 +20,12 @@ struct Credentials {
   std::string authorities;       // certificates of those that may have issued a daemon's
   std::string certificate, key;  // empty: known by token
   std::string token;             // empty: known by certificate
+  std::optional<RobotKey> robot_key = {};
 };
 
 std::string text_of(const Credentials& credentials);
-// CORRUPT if there is no certificate of an authority, or neither a key with its certificate nor a token, or both.
+// CORRUPT if there is no certificate of an authority, or neither a private key with its certificate nor a token, or
+// both, or if a robot's key has another length.
 Result<Credentials> parse_credentials(std::string_view text);
 // NO_SUCH_FILE. BAD_CONFIG, with the path: it is malformed, or others than its owner can read it.
 Result<Credentials> read_credentials(const std::string& path);

@@ -57,13 +57,16 @@ TEST(Credentials, AreReadAsTheyWereWritten) {
   const KeyPair pair = issued({Role::kRobot, "cart"});
   const Credentials by_certificate{authority().certificate, pair.certificate, pair.key, ""};
   const Credentials by_token{authority().certificate, "", "", new_token()};
-  for (const Credentials& given : {by_certificate, by_token}) {
+  Credentials with_key = by_certificate;
+  with_key.robot_key = robot_key(random_key(), random_key());
+  for (const Credentials& given : {by_certificate, by_token, with_key}) {
     const auto again = parse_credentials("A line before.\n" + text_of(given));
     ASSERT_TRUE(again.ok()) << again.status().to_string();
     EXPECT_EQ(again->authorities, given.authorities);
     EXPECT_EQ(again->certificate, given.certificate);
     EXPECT_EQ(again->key, given.key);
     EXPECT_EQ(again->token, given.token);
+    EXPECT_EQ(again->robot_key, given.robot_key);
   }
 }
 
@@ -71,9 +74,11 @@ TEST(Credentials, WhatIsIncompleteIsRefused) {
   const KeyPair pair = issued({Role::kRobot, "cart"}), other = issued({Role::kRobot, "other"});
   const std::string& trust = authority().certificate;
   const Credentials token{trust, "", "", new_token()};
-  for (const std::string& text : {std::string(), trust, pair.key, pair.key + pair.certificate, pair.key + trust,
-                                  pair.key + other.certificate + trust, text_of(token) + pair.key + pair.certificate,
-                                  text_of({"", "", "", "token"}), std::string("-----BEGIN PRIVATE KEY-----\n")})
+  for (const std::string& text :
+       {std::string(), trust, pair.key, pair.key + pair.certificate, pair.key + trust,
+        pair.key + other.certificate + trust, text_of(token) + pair.key + pair.certificate,
+        text_of({"", "", "", "token"}), text_of(token) + "-----BEGIN RELMAP KEY-----\nAAAA\n-----END RELMAP KEY-----\n",
+        std::string("-----BEGIN PRIVATE KEY-----\n")})
     EXPECT_EQ(parse_credentials(text).reason(), Reason::CORRUPT) << text;
 }
 

@@ -53,6 +53,14 @@ Result<std::string> read_file(const std::string& path) {
   return text;
 }
 
+Result<std::string> read_private_file(const std::string& path) {
+  auto text = read_file(path);
+  struct stat facts {};
+  if (text.ok() && stat(path.c_str(), &facts) == 0 && (facts.st_mode & (S_IRWXG | S_IRWXO)) != 0)
+    return Status(Reason::BAD_CONFIG, "others can read " + path + ": chmod 600 " + path);
+  return text;
+}
+
 Status write_private_file(const std::string& path, std::string_view text) {
   const std::string temporary = path + ".new";
   struct stat owner {};

@@ -11,6 +11,9 @@ namespace relmap::access {
 // NO_SUCH_FILE if it cannot be opened, IO_ERROR if it cannot be read to its end or is no file.
 Result<std::string> read_file(const std::string& path);
 
+// The same for a file that must be readable by its owner only: else BAD_CONFIG, with what to do.
+Result<std::string> read_private_file(const std::string& path);
+
 // Writes the file with mode 0600 whatever the umask, under a temporary name that is then renamed, so that readers see
 // the old text or the new. It belongs to the owner of the file that it replaces, or else of its folder, so that a
 // daemon of another user can still read what root has changed. IO_ERROR.

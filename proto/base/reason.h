@@ -31,7 +31,7 @@ namespace relmap {
   X(DROPPED_BY_ROBOT, 18) /* a gap: the robot's spool was full */                                                     \
   X(CAPTURE_FAILED, 19)   /* a gap: the robot's source failed */                                                      \
   X(BAD_MOTION, 20)       /* an odometry pose no robot could have (> 1e7 m) */                                        \
-  X(TIME_AHEAD, 21)       /* a time stamp more than a minute after the one before it, and alone with it */            \
+  X(TIME_AHEAD, 21)       /* a time stamp far ahead: of the pairs around it, or of the server's clock */              \
   X(NOT_ALLOWED, 22)      /* the robot is not on the daemon's list, or the caller's role does not allow it */         \
   X(RATE_LIMITED, 23)     /* more than the daemon takes from one robot; kept by the robot and sent again */           \
   X(SESSION_FROZEN, 24)   /* an operator froze the session: it accepts no more keyframes */                           \
@@ -101,6 +101,8 @@ namespace relmap {
   X(NOT_A_MAP, 121)       /* the folder is neither empty nor the data folder of a map */                              \
   X(WRONG_MAP, 122)       /* the daemon serves another map than the one that was begun in */                          \
   X(UNAUTHENTICATED, 123) /* no credentials, or they are unknown, expired or revoked */                               \
+  X(REPLAYED, 124)        /* a sealed message that came before, or is not of these seconds */                         \
+  X(TOO_MANY_FILES, 125)  /* the process may open no more files and connections */                                    \
   /* A camera. */                                                                                                     \
   X(NO_CAMERA, 140)        /* none at all, or none of that serial number */                                           \
   X(CAMERA_GONE, 141)      /* unplugged, or the process that serves its bus has ended */                              \

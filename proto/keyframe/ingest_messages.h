@@ -20,7 +20,7 @@ inline constexpr std::int16_t kStreamMinor = 0;
 
 inline constexpr std::uint32_t kMinPartBytes = 512;       // of payload; the last part of a keyframe may be shorter
 inline constexpr std::uint32_t kMaxPartBytes = 60000;     // fits one UDP datagram: best if nothing leaves the machine
-inline constexpr std::uint32_t kNetworkPartBytes = 1376;  // its datagram fits an Ethernet frame of 1500 bytes
+inline constexpr std::uint32_t kNetworkPartBytes = 1328;  // its datagram, sealed, fits a frame of 1500 bytes
 inline constexpr std::uint32_t kMaxParts = kMaxKeyframeBytes / kMinPartBytes;
 
 // New at every start of the daemon.

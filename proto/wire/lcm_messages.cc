@@ -8,6 +8,7 @@
 #include "proto/wire/convert.h"
 #include "relmap_lcm/acknowledgement_t.hpp"
 #include "relmap_lcm/gap_t.hpp"
+#include "relmap_lcm/hello_t.hpp"
 #include "relmap_lcm/keyframe_part_t.hpp"
 #include "relmap_lcm/map_identity_t.hpp"
 #include "relmap_lcm/pose_t.hpp"
@@ -223,6 +224,15 @@ Result<DaemonIdentity> decode_lcm_map(ByteSpan message) {
   return daemon;
 }
 
+Result<Hello> decode_lcm_hello(ByteSpan message) {
+  LcmReader in(message);
+  if (Status s = in.begin(relmap_lcm::hello_t::getHash()); !s.ok()) return s;
+  Hello hello;
+  in.array(hello.session.bytes);
+  if (!in.at_end()) return malformed("hello");
+  return hello;
+}
+
 Bytes encode_lcm(const KeyframePart& part) {
   relmap_lcm::keyframe_part_t message;
   put_version(message);
@@ -308,6 +318,13 @@ Bytes encode_lcm(const DaemonIdentity& daemon) {
   put_array(daemon.boot, message.daemon_boot_id);
   put_array(daemon.map.uuid.bytes, message.map_uuid);
   message.map_epoch = static_cast<std::int64_t>(daemon.map.epoch);
+  return encode(message);
+}
+
+Bytes encode_lcm(const Hello& hello) {
+  relmap_lcm::hello_t message;
+  put_version(message);
+  put_array(hello.session.bytes, message.session_uuid);
   return encode(message);
 }
 

@@ -17,12 +17,19 @@ Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message);
 Result<PoseNews> decode_lcm_pose(ByteSpan message);
 Result<DaemonIdentity> decode_lcm_map(ByteSpan message);
 
+// A robot asks who listens; see hello_t.
+struct Hello {
+  SessionUuid session;
+};
+Result<Hello> decode_lcm_hello(ByteSpan message);
+
 Bytes encode_lcm(const KeyframePart& part);
 Bytes encode_lcm(const Gap& gap);
 Bytes encode_lcm(const SessionEnd& end);
 Bytes encode_lcm(const Acknowledgement& ack);
 Bytes encode_lcm(const PoseNews& news);
 Bytes encode_lcm(const DaemonIdentity& daemon);
+Bytes encode_lcm(const Hello& hello);
 
 // Channel RELMAP_STATUS, once a second.
 struct DaemonStatus {

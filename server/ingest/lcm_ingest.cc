@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <atomic>
 #include <chrono>
 #include <thread>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
 #include "proto/wire/receive_buffer.h"
+#include "server/ingest/sealed_robots.h"
 
 namespace relmap::ingest {
 
@@ -19,31 +21,96 @@ namespace {
 constexpr std::chrono::seconds kStatusInterval{1};
 constexpr std::chrono::milliseconds kMapInterval{100};  // while acknowledgements are sent
 
-template <typename Message, typename Take>
-LcmLink::Handler handler(intake::IngestServer& server, Result<Message> (*decode)(ByteSpan), Take take) {
-  return [&server, decode, take](ByteSpan bytes) {
-    Result<Message> message = decode(bytes);
-    if (message.ok())
-      take(std::move(*message));
-    else
-      server.count_foreign(message.reason());
-  };
-}
+using Who = LcmAuthentication::Who;
+
+SealedRobots::Time now() { return std::chrono::steady_clock::now(); }
+std::int64_t utc_s() { return now_us() / 1'000'000; }
 
 }  // namespace
 
 struct LcmIngest::Impl {
-  Impl(intake::IngestServer& s, StatusSource source, std::unique_ptr<LcmLink> l)
-      : server(s), status(std::move(source)), link(std::move(l)) {}
+  Impl(const LcmOptions& options, intake::IngestServer& s, StatusSource source)
+      : server(s),
+        status(std::move(source)),
+        who(options.authentication.who),
+        sealed(s.identity().boot, options.authentication.secret, started) {}
+
+  // The handler of a channel: opens the datagrams, and gives their messages to `take` with who sent them.
+  template <typename Message, typename Take>
+  LcmLink::Handlers::value_type on(const char* channel, Result<Message> (*decode)(ByteSpan), Take take) {
+    return {channel, [this, channel, decode, take](ByteSpan datagram) {
+              intake::Sender sender;
+              Result<Message> message = open(channel, datagram, decode, sender);
+              if (message.ok())
+                take(std::move(*message), std::move(sender));
+              else
+                server.count_foreign(message.reason());
+            }};
+  }
+
+  // Messages end by themselves, so one that is not sealed is told from one that is: nothing follows it.
+  template <typename Message>
+  Result<Message> open(const char* channel, ByteSpan datagram, Result<Message> (*decode)(ByteSpan),
+                       intake::Sender& sender) {
+    if (who != Who::kAll) {
+      Result<Message> message = decode(datagram);
+      sender.anyone = true;
+      if (message.ok()) return message;
+      if (who == Who::kNobody) {
+        const auto split = access::split_sealed(datagram);
+        return split && message.reason() == Reason::CORRUPT ? decode(split->message) : message;
+      }
+      if (message.reason() != Reason::CORRUPT) return message;
+    }
+    const MutexLock lock(mutex);
+    const auto opened = sealed.open(channel, datagram, now(), utc_s());
+    if (!opened.ok()) return opened.status();
+    Result<Message> message = decode(opened->message);
+    if (message.ok()) sealed.sends(*opened, message->session);
+    sender = {opened->robot, false};
+    return message;
+  }
+
+  void take_hello(ByteSpan datagram) {
+    if (who == Who::kNobody) return;
+    Bytes welcome;
+    SessionUuid session;
+    intake::Sender sender;
+    {
+      const MutexLock lock(mutex);
+      const auto opened = sealed.open_hello(datagram, utc_s());
+      const auto hello = opened.ok() ? decode_lcm_hello(opened->message) : opened.status();
+      if (hello.ok()) welcome = sealed.welcome(*opened, encode_lcm(server.identity()), now());
+      if (!hello.ok()) return server.count_foreign(hello.reason());
+      session = hello->session;
+      sender.robot = opened->robot;
+    }
+    // From now on its uuid is known to everyone on the network.
+    (void)server.claim(session, sender);
+    LcmLink* const out = opened_link;
+    if (out && !welcome.empty()) out->publish(kMapChannel, welcome);
+  }
+
+  // Publishes what concerns a session: sealed for those who have sealed what they sent of it, and as it is where others
+  // may have sent it.
+  void tell(const SessionUuid& session, const char* channel, const Bytes& message) {
+    std::vector<Bytes> for_robots;
+    if (who != Who::kNobody) {
+      const MutexLock lock(mutex);
+      for_robots = sealed.seal(session, channel, message, now());
+    }
+    for (const Bytes& one : for_robots) link->publish(channel, one);
+    if (who != Who::kAll && for_robots.empty()) link->publish(channel, message);
+  }
 
   // Called by the server's thread. Robots believe no acknowledgement before they know which map it is about.
   void acknowledge(const Acknowledgement& ack) {
-    const auto now = std::chrono::steady_clock::now();
-    if (now - map_said >= kMapInterval) {
-      map_said = now;
+    const auto time = now();
+    if (time - map_said >= kMapInterval) {
+      map_said = time;
       say_map();
     }
-    link->publish(kAckChannel, encode_lcm(ack));
+    tell(ack.session, kAckChannel, encode_lcm(ack));
   }
 
   void say_map() { link->publish(kMapChannel, encode_lcm(server.identity())); }
@@ -70,11 +137,14 @@ struct LcmIngest::Impl {
 
   intake::IngestServer& server;
   const StatusSource status;
-  const std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
-  const std::unique_ptr<LcmLink> link;
+  const Who who;
+  const SealedRobots::Time started = now();
+  std::unique_ptr<LcmLink> link;
+  std::atomic<LcmLink*> opened_link = nullptr;       // for the link's own thread, which runs before `link` is set
   std::chrono::steady_clock::time_point map_said{};  // used by the server's thread only
   std::unique_ptr<intake::IngestServer::Subscription> said;
   Mutex mutex;
+  SealedRobots sealed RELMAP_GUARDED_BY(mutex);
   ConditionVariable stopped;
   bool stopping RELMAP_GUARDED_BY(mutex) = false;
   std::thread status_thread;
@@ -82,29 +152,41 @@ struct LcmIngest::Impl {
 
 LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, intake::IngestServer& server,
-                                                    StatusSource status, std::size_t queue_bytes) {
+Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const LcmOptions& options, intake::IngestServer& server,
+                                                    StatusSource status) {
+  auto impl = std::make_unique<Impl>(options, server, std::move(status));
+  Impl* const running = impl.get();
+  using intake::Sender;
   Result<std::unique_ptr<LcmLink>> link = LcmLink::open(
-      url,
-      {{kKeyframeChannel,
-        handler(server, decode_lcm_part, [&](KeyframePart part) { server.take_part(std::move(part)); })},
-       {kGapChannel, handler(server, decode_lcm_gap, [&](const Gap& gap) { (void)server.take_gap(gap); })},
-       {kEndChannel, handler(server, decode_lcm_end, [&](const SessionEnd& end) { (void)server.take_end(end); })}},
-      queue_bytes);
+      options.url,
+      {running->on(kKeyframeChannel, decode_lcm_part,
+                   [&](KeyframePart part, Sender from) { server.take_part(std::move(part), std::move(from)); }),
+       running->on(kGapChannel, decode_lcm_gap,
+                   [&](const Gap& gap, const Sender& from) { (void)server.take_gap(gap, from); }),
+       running->on(kEndChannel, decode_lcm_end,
+                   [&](const SessionEnd& end, const Sender& from) { (void)server.take_end(end, from); }),
+       {kHelloChannel, [running](ByteSpan datagram) { running->take_hello(datagram); }}},
+      options.queue_bytes);
   if (!link.ok()) return link.status();
-  auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
-  LcmLink* const out = impl->link.get();
-  impl->said = server.subscribe({[said = impl.get()](const Acknowledgement& ack) { said->acknowledge(ack); },
-                                 [out](const PoseNews& news) { out->publish(kPoseChannel, encode_lcm(news)); },
-                                 {}});
-  if (impl->status) impl->status_thread = std::thread([running = impl.get()] { running->run(); });
-  spdlog::info("LCM: listening on {}", url);
-  if (const auto complete = complete_lcm_url(url); complete.ok())
+  impl->link = std::move(*link);
+  impl->opened_link = impl->link.get();
+  impl->said = server.subscribe(
+      {[running](const Acknowledgement& ack) { running->acknowledge(ack); },
+       [running](const PoseNews& news) { running->tell(news.session, kPoseChannel, encode_lcm(news)); },
+       {}});
+  if (impl->status) impl->status_thread = std::thread([running] { running->run(); });
+  spdlog::info("LCM: listening on {}", options.url);
+  if (const auto complete = complete_lcm_url(options.url); complete.ok())
     if (const std::string advice = receive_buffer_advice(*complete); !advice.empty()) spdlog::warn("LCM: {}", advice);
   return std::unique_ptr<LcmIngest>(new LcmIngest(std::move(impl)));
 }
 
 LcmIngest::~LcmIngest() { stop(); }
+
+void LcmIngest::use(const access::AccessList& list) {
+  const MutexLock lock(impl_->mutex);
+  impl_->sealed.use(list);
+}
 
 bool LcmIngest::at_end() const { return impl_->link->at_end(); }
 

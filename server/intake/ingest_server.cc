@@ -107,20 +107,24 @@ struct IngestServer::Impl {
     return status;
   }
 
-  void enqueue(KeyframePart part) {
+  void enqueue(KeyframePart part, Sender sender) {
     if (const Status sound = check_part(part); !sound.ok()) {
       const MutexLock lock(queue_mutex);
       ++unsound[index_of(sound.reason())];
       return;
     }
     const MutexLock lock(queue_mutex);
-    const bool answers = begun.contains(part.session);
-    queue.push(answers ? part.session : SessionUuid{}, std::move(part));
+    PartQueue::Line line;
+    if (begun.contains(part.session))
+      line.session = part.session;
+    else
+      line.robot = sender.robot;
+    queue.push(line, {std::move(part), std::move(sender)});
     queue_condition.notify_one();
   }
 
   void serve_parts() {
-    std::vector<KeyframePart> parts;
+    std::vector<PartQueue::Sent> parts;
     for (;;) {
       parts.clear();
       {
@@ -136,7 +140,7 @@ struct IngestServer::Impl {
       if (parts.empty()) return;
       std::optional<std::set<SessionUuid>> changed;
       (void)take([&](Intake& i) RELMAP_REQUIRES(mutex) {
-        for (const KeyframePart& part : parts) i.take_part(part, now());
+        for (const PartQueue::Sent& sent : parts) i.take_part(sent.part, now(), sent.sender);
         if (std::exchange(begun_version, i.begun_version()) != i.begun_version()) changed = i.begun();
         return Status();
       });
@@ -200,20 +204,24 @@ IngestServer::IngestServer(KeyframeSink& sink, storage::Budget& budget, const Bo
 
 IngestServer::~IngestServer() { stop(); }
 
-void IngestServer::take_part(KeyframePart part) { impl_->enqueue(std::move(part)); }
+void IngestServer::take_part(KeyframePart part, Sender sender) { impl_->enqueue(std::move(part), std::move(sender)); }
 
 Status IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                                  const std::string& robot) {
+                                  const Sender& sender) {
   return impl_->take(
-      [&](Intake& intake) { return intake.take_payload(session, sequence, crc, std::move(payload), now(), robot); });
+      [&](Intake& intake) { return intake.take_payload(session, sequence, crc, std::move(payload), now(), sender); });
 }
 
-Status IngestServer::take_gap(const Gap& gap, const std::string& robot) {
-  return impl_->take([&](Intake& intake) { return intake.take_gap(gap, now(), robot); });
+Status IngestServer::take_gap(const Gap& gap, const Sender& sender) {
+  return impl_->take([&](Intake& intake) { return intake.take_gap(gap, now(), sender); });
 }
 
-Status IngestServer::take_end(const SessionEnd& end, const std::string& robot) {
-  return impl_->take([&](Intake& intake) { return intake.take_end(end, now(), robot); });
+Status IngestServer::take_end(const SessionEnd& end, const Sender& sender) {
+  return impl_->take([&](Intake& intake) { return intake.take_end(end, now(), sender); });
+}
+
+Status IngestServer::claim(const SessionUuid& session, const Sender& sender) {
+  return impl_->take([&](Intake& intake) { return intake.claim(session, now(), sender); });
 }
 
 void IngestServer::count_foreign(Reason reason) {

@@ -26,12 +26,13 @@ class IngestServer {
   // All methods but stop() are thread-safe.
 
   // For transports without flow control: checks the part, queues it for its sender (part_queue.h) and returns at once.
-  void take_part(KeyframePart part);
+  void take_part(KeyframePart part, Sender sender = {});
   // As Intake's. They may block while a session begins.
   Status take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                      const std::string& robot = {});
-  Status take_gap(const Gap& gap, const std::string& robot = {});
-  Status take_end(const SessionEnd& end, const std::string& robot = {});
+                      const Sender& sender = {});
+  Status take_gap(const Gap& gap, const Sender& sender = {});
+  Status take_end(const SessionEnd& end, const Sender& sender = {});
+  Status claim(const SessionUuid& session, const Sender& sender);
   void count_foreign(Reason reason);
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;

@@ -50,9 +50,27 @@ Intake::~Intake() {
   outcomes_->wake = nullptr;
 }
 
+// Whether the sender may send for the session. What has not begun is of the robot that first proved to send for it.
+Status Intake::check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const {
+  const bool proved = !entry.begun && entry.sender && !entry.sender->robot.empty();
+  const std::string& owner = entry.begun ? entry.intake.header().robot : proved ? entry.sender->robot : sender.robot;
+  if (!sender.robot.empty() && sender.robot != owner)
+    return {Reason::NOT_ALLOWED,
+            sender.robot + " may not send to session " + session.to_string() + ", which is another robot's"};
+  if (sender.anyone && (proved || (entry.begun && options_.proving.contains(owner))))
+    return {Reason::NOT_ALLOWED,
+            "nobody may send to session " + session.to_string() + " who does not prove to be robot " + owner};
+  return {};
+}
+
 // The session's entry, which is made if it is not there. BUDGET_EXCEEDED: there are too many. NOT_ALLOWED.
-Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, const std::string& robot) {
+Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, const Sender& sender) {
   auto it = sessions_.find(session);
+  // What anyone has sent must not stand in the way of the robot itself.
+  if (it != sessions_.end() && !it->second.begun && it->second.sender && it->second.sender->anyone && !sender.anyone) {
+    forget(session);
+    it = sessions_.end();
+  }
   const bool fresh = it == sessions_.end();
   if (fresh) {
     if (sessions_.size() >= options_.max_sessions && !make_room(now))
@@ -65,27 +83,33 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
       });
     };
     it = sessions_
-             .emplace(session, Entry{SessionIntake(session, sink_, std::move(submit), stats_, options_.robots),
-                                     AcknowledgementSchedule(options_.times)})
+             .emplace(session,
+                      Entry{SessionIntake(session, sink_, std::move(submit), stats_, options_.robots, options_.proving),
+                            AcknowledgementSchedule(options_.times)})
              .first;
     it->second.schedule.news();  // tells the robot what the daemon has
     it->second.begun = it->second.intake.begun();
     it->second.heard_first = now;
   }
   Entry& entry = it->second;
-  const std::string owner = entry.begun ? entry.intake.header().robot : entry.sender.value_or(robot);
-  if (!robot.empty() && robot != owner) {
+  if (Status may = check_sender(session, entry, sender); !may.ok()) {
     if (fresh) sessions_.erase(it);
-    return Status(Reason::NOT_ALLOWED,
-                  robot + " may not send to session " + session.to_string() + ", which is another robot's");
+    return may;
   }
   if (fresh) {
     silent_.erase(session);
     ++begun_version_;
   }
-  if (!entry.sender) entry.sender = robot;
+  if (!entry.sender) entry.sender = sender;
   entry.schedule.heard(now);
   return &entry;
+}
+
+void Intake::forget(const SessionUuid& session) {
+  reassembly_.forget(session, UINT64_MAX);
+  leave_line(session);
+  sessions_.erase(session);
+  ++begun_version_;
 }
 
 bool Intake::make_room(SteadyTime now) {
@@ -95,11 +119,8 @@ bool Intake::make_room(SteadyTime now) {
     if (!it->second.intake.begun() || it->second.intake.idle()) oldest = it;
   }
   if (oldest == sessions_.end()) return false;
-  reassembly_.forget(oldest->first, UINT64_MAX);
   remember(oldest->first, oldest->second, now);
-  leave_line(oldest->first);
-  sessions_.erase(oldest);
-  ++begun_version_;
+  forget(SessionUuid(oldest->first));
   return true;
 }
 
@@ -130,6 +151,7 @@ void Intake::forget_silent(SteadyTime now) {
     }
     it = gone ? sessions_.erase(it) : std::next(it);
   }
+  std::erase_if(allowances_, [&](const auto& item) { return item.second.at + std::chrono::minutes(1) <= now; });
   std::erase_if(silent_, [&](const auto& item) { return item.second.heard + options_.remember <= now; });
 }
 
@@ -215,10 +237,10 @@ bool Intake::wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc) {
   return false;
 }
 
-void Intake::take_part(const KeyframePart& part, SteadyTime now) try {
+void Intake::take_part(const KeyframePart& part, SteadyTime now, const Sender& sender) try {
   ++stats_.parts;
   if (const Status s = check_part(part); !s.ok()) return count_part(s.reason());
-  const auto opened = open(part.session, now, {});
+  const auto opened = open(part.session, now, sender);
   if (!opened.ok()) return count_part(opened.reason());
   Entry* const entry = *opened;
   entry->by_parts = true;
@@ -227,13 +249,13 @@ void Intake::take_part(const KeyframePart& part, SteadyTime now) try {
   entry->intake.seen(part.sequence);
   auto whole = reassembly_.add(part, entry->begun ? part.session : SessionUuid{});
   if (!whole.ok()) return count_part(*entry, whole.reason());
-  if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now, {});
+  if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now, sender);
 } catch (const StatusError& error) {
   count_part(error.status().reason());
 }
 
 Status Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                            SteadyTime now, const std::string& robot) try {
+                            SteadyTime now, const Sender& sender) try {
   ++stats_.parts;
   const auto refuse = [this](Reason reason) {
     count_part(reason);
@@ -241,14 +263,14 @@ Status Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, 
   };
   if (payload.empty() || payload.size() > kMaxKeyframeBytes) return refuse(Reason::BAD_SIZE);
   if (crc32c(payload) != crc) return refuse(Reason::CORRUPT);
-  const auto opened = open(session, now, robot);
+  const auto opened = open(session, now, sender);
   if (!opened.ok()) return count_not_opened(stats_.parts_refused, opened.status());
   Entry& entry = **opened;
   entry.by_parts = false;
   entry.bytes.add(now, static_cast<double>(payload.size()));
   if (!wanted(entry, sequence, crc)) return {};
   if (auto charge = reassembly_.take_room(payload.size()))
-    take_whole(entry, session, sequence, {crc, std::move(payload), std::move(charge)}, now, robot);
+    take_whole(entry, session, sequence, {crc, std::move(payload), std::move(charge)}, now, sender);
   else
     count_part(entry, Reason::BUDGET_EXCEEDED);
   return {};
@@ -258,17 +280,18 @@ Status Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, 
 }
 
 void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
-                        SteadyTime now, const std::string& robot) {
+                        SteadyTime now, const Sender& sender) {
   ++stats_.keyframes_received;
+  if (!may_begin(entry, sender, now)) return count_part(entry, Reason::RATE_LIMITED);
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
-  const bool sound = entry.intake.take(sequence, std::move(payload), robot).ok();
+  const bool sound = entry.intake.take(sequence, std::move(payload), sender).ok();
   if (!sound) entry.schedule.news();
   advance(session, entry, now);
   if (sound && entry.begun && !std::exchange(entry.announced, true))
     note(RobotEvent::Kind::kHeard, session, entry, now);
 }
 
-Status Intake::take_gap(const Gap& gap, SteadyTime now, const std::string& robot) try {
+Status Intake::take_gap(const Gap& gap, SteadyTime now, const Sender& sender) try {
   const auto refuse = [this](Reason reason) {
     count_foreign(reason);
     return Status();
@@ -279,7 +302,7 @@ Status Intake::take_gap(const Gap& gap, SteadyTime now, const std::string& robot
     return refuse(Reason::INVALID_ARGUMENT);
   if (gap.to - gap.from >= kMaxGapSequences) return refuse(Reason::BAD_SIZE);
   if (gap.to > kMaxSequence) return refuse(Reason::INVALID_ARGUMENT);
-  const auto opened = open(gap.session, now, robot);
+  const auto opened = open(gap.session, now, sender);
   if (!opened.ok()) return count_not_opened(stats_.messages_refused, opened.status());
   Entry& entry = **opened;
   entry.schedule.news();
@@ -291,12 +314,12 @@ Status Intake::take_gap(const Gap& gap, SteadyTime now, const std::string& robot
   return {};
 }
 
-Status Intake::take_end(const SessionEnd& end, SteadyTime now, const std::string& robot) try {
+Status Intake::take_end(const SessionEnd& end, SteadyTime now, const Sender& sender) try {
   if (end.session.is_nil()) {
     count_foreign(Reason::INVALID_ARGUMENT);
     return {};
   }
-  const auto opened = open(end.session, now, robot);
+  const auto opened = open(end.session, now, sender);
   if (!opened.ok()) return count_not_opened(stats_.messages_refused, opened.status());
   Entry& entry = **opened;
   entry.schedule.news();
@@ -306,6 +329,12 @@ Status Intake::take_end(const SessionEnd& end, SteadyTime now, const std::string
 } catch (const StatusError& error) {
   count_foreign(error.status().reason());
   return {};
+}
+
+Status Intake::claim(const SessionUuid& session, SteadyTime now, const Sender& sender) {
+  if (session.is_nil()) return {Reason::INVALID_ARGUMENT, "the nil session"};
+  const auto opened = open(session, now, sender);
+  return opened.ok() ? Status() : count_not_opened(stats_.messages_refused, opened.status());
 }
 
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
@@ -394,6 +423,22 @@ void Intake::replenish(Entry& entry, SteadyTime now) {
   entry.paced_at = now;
   entry.paced_end = std::clamp(entry.paced_end, next, max_end);
   if (entry.paced_end < next + kNearLimit * rate) entry.limited_at = now;
+}
+
+// Whether the session, if it has not begun, may do so. Sessions stay for good, so whoever begins them without end fills
+// the map. Operators may.
+bool Intake::may_begin(Entry& entry, const Sender& sender, SteadyTime now) {
+  constexpr double kAnyones = 10;
+  const bool limited = sender.anyone || !sender.robot.empty();
+  if (options_.max_new_sessions_per_min <= 0 || entry.begun || entry.may_begin || !limited) return true;
+  const double most = options_.max_new_sessions_per_min * (sender.anyone ? kAnyones : 1);
+  const auto [it, fresh] = allowances_.try_emplace(sender.robot, Allowance{most, now});
+  Allowance& allowance = it->second;
+  const double minutes = std::chrono::duration<double, std::ratio<60>>(now - allowance.at).count();
+  allowance = {std::min(most, allowance.left + minutes * most), now};
+  if (allowance.left < 1) return false;
+  --allowance.left;
+  return entry.may_begin = true;
 }
 
 bool Intake::paced(Entry& entry, std::uint32_t sequence, SteadyTime now) {

@@ -29,7 +29,11 @@ struct IntakeOptions {
   // Mean number of keyframes that a session may send in parts, per second; 0: no limit. A session that sent less may
   // catch up by kIntakeWindow keyframes or two seconds' worth, whichever is more.
   double max_keyframes_per_s = 0;
-  std::set<std::string> robots;  // names of the robots whose keyframes are taken; empty: all
+  // Mean number of sessions that one robot may begin, per minute, if it is proved who it is; so many may be begun at
+  // once. All who prove nothing may begin ten times as many together. 0: no limit.
+  double max_new_sessions_per_min = 0;
+  std::set<std::string> robots;   // names of the robots whose keyframes are taken; empty: all
+  std::set<std::string> proving;  // for these nobody may send who proves nothing (Sender::anyone)
 };
 
 class Intake {
@@ -39,13 +43,16 @@ class Intake {
          std::function<void()> wake);
   ~Intake();
 
-  // Errors are counted by reason, and the next acknowledgement tells the robot what to do. `robot` is the robot that
-  // has proved to be the sender; empty: it may be any. NOT_ALLOWED, and nothing is done, if the session is another's.
-  void take_part(const KeyframePart& part, SteadyTime now);
+  // Errors are counted by reason, and the next acknowledgement tells the robot what to do. NOT_ALLOWED, and nothing is
+  // done, if the sender may not send for the session: it is another robot's, or its robot must be proved.
+  void take_part(const KeyframePart& part, SteadyTime now, const Sender& sender = {});
   Status take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                      SteadyTime now, const std::string& robot = {});
-  Status take_gap(const Gap& gap, SteadyTime now, const std::string& robot = {});
-  Status take_end(const SessionEnd& end, SteadyTime now, const std::string& robot = {});
+                      SteadyTime now, const Sender& sender = {});
+  Status take_gap(const Gap& gap, SteadyTime now, const Sender& sender = {});
+  Status take_end(const SessionEnd& end, SteadyTime now, const Sender& sender = {});
+  // The robot announces that it will send the session: if it has not begun, it is this robot's, whoever knows its uuid
+  // now. NOT_ALLOWED if it is another's.
+  Status claim(const SessionUuid& session, SteadyTime now, const Sender& sender);
   // Counts bytes that are no message (CORRUPT) or a message of another protocol (UNKNOWN_PROTOCOL_VERSION).
   void count_foreign(Reason reason);
 
@@ -72,8 +79,8 @@ class Intake {
   struct Entry {
     SessionIntake intake;
     AcknowledgementSchedule schedule;
-    std::optional<std::string> sender{};  // of the first message, while it has not begun; empty: it may be any
-    double payload_bytes = 64 * 1024;     // running mean of keyframe sizes
+    std::optional<Sender> sender{};    // of the first message, while it has not begun
+    double payload_bytes = 64 * 1024;  // running mean of keyframe sizes
     RateMeter keyframes{}, bytes{};
     std::int64_t lag_us = -1;
     std::map<Reason, std::uint64_t> not_taken{};
@@ -85,6 +92,7 @@ class Intake {
     SteadyTime slowed_at{};        // when it was last told to slow down; epoch: never, or told to resume
     SteadyTime heard_first{};
     bool in_line = false;
+    bool may_begin = false;  // counted among the new sessions of its sender
     bool begun = false;
     bool announced = false;      // kHeard has been logged
     bool namesake_told = false;  // kSameName has been logged
@@ -93,6 +101,11 @@ class Intake {
   struct Silent {
     RobotStats stats;
     SteadyTime heard;
+  };
+  // What is left of the sessions that a sender may begin.
+  struct Allowance {
+    double left = 0;
+    SteadyTime at{};
   };
   using Namesakes = std::map<SessionUuid, std::vector<SessionUuid>>;
   // Outcomes of submitted records, from the sink's threads until poll().
@@ -107,7 +120,9 @@ class Intake {
     std::function<void()> wake RELMAP_GUARDED_BY(mutex);
   };
 
-  Result<Entry*> open(const SessionUuid& session, SteadyTime now, const std::string& robot);
+  Result<Entry*> open(const SessionUuid& session, SteadyTime now, const Sender& sender);
+  Status check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const;
+  void forget(const SessionUuid& session);
   bool make_room(SteadyTime now);
   bool drop_waiting(std::size_t more_than);
   void forget_silent(SteadyTime now);
@@ -119,11 +134,12 @@ class Intake {
   const Status& blocked(const Entry& entry) const;
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void replenish(Entry& entry, SteadyTime now);
+  bool may_begin(Entry& entry, const Sender& sender, SteadyTime now);
   bool paced(Entry& entry, std::uint32_t sequence, SteadyTime now);
   void tell_pace(const SessionUuid& session, Entry& entry, SteadyTime now);
   void tell(const SessionUuid& session, PoseNews::Kind kind, double rate_hz = 0);
   void take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
-                  SteadyTime now, const std::string& robot);
+                  SteadyTime now, const Sender& sender);
   void take_outcomes(SteadyTime now);
   void advance(const SessionUuid& session, Entry& entry, SteadyTime now);
   void join_line(const SessionUuid& session, Entry& entry);
@@ -148,6 +164,7 @@ class Intake {
   std::map<SessionUuid, Entry> sessions_;
   std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};
+  std::map<std::string, Allowance> allowances_;  // by robot; "": of all who prove nothing
   // Sessions that have something to submit, each once, in the order in which they are served, one record at a time. It
   // is empty but while the sink has no room: then a session that sends more than others waits longer than they do.
   std::deque<SessionUuid> line_;

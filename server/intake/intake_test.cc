@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "proto/base/clock.h"
 #include "proto/base/crc32c.h"
 #include "proto/keyframe/keyframe_samples.h"
 #include "server/intake/testing/fake_sink.h"
@@ -997,6 +998,80 @@ TEST_F(IntakeTest, TheSessionWithMostWaitingKeyframesGivesWay) {
   const Acknowledgement ack = settle();
   EXPECT_GT(ack.next_sequence, 10u);
   EXPECT_EQ(ack.missing.back().to, kIntakeWindow - 1);
+}
+
+// Sessions stay for good, so nobody may begin them without end; what is refused is not settled, and comes again.
+TEST_F(IntakeTest, NewSessionsAreLimitedByRobot) {
+  IntakeOptions options;
+  options.max_new_sessions_per_min = 5;
+  restart(options);
+  const auto begin = [&](const Sender& sender, const std::string& robot) {
+    Keyframe k = keyframe(0);
+    k.session.uuid = SessionUuid::random();
+    k.session.robot = robot;
+    const Bytes payload = encode_keyframe(k);
+    EXPECT_TRUE(intake_->take_payload(k.session.uuid, 0, crc32c(payload), payload, now_, sender).ok());
+  };
+  const auto begun = [&] { return sink_.view()->sessions().size(); };
+  for (int i = 0; i < 20; ++i) begin({"flood"}, "flood");
+  EXPECT_EQ(begun(), 5u);
+  EXPECT_EQ(intake_->stats(now_).parts_refused[index_of(Reason::RATE_LIMITED)], 15u);
+  begin({"cart"}, "cart");
+  EXPECT_EQ(begun(), 6u) << "another robot's sessions are its own";
+  now_ += std::chrono::seconds(24);
+  for (int i = 0; i < 20; ++i) begin({"flood"}, "flood");
+  EXPECT_EQ(begun(), 8u) << "two in 24 s";
+  for (int i = 0; i < 100; ++i) begin({{}, true}, "robot " + std::to_string(i));
+  EXPECT_EQ(begun(), 58u) << "who proves nothing is one of many";
+  for (int i = 0; i < 100; ++i) begin({}, "robot " + std::to_string(i));
+  EXPECT_EQ(begun(), 158u) << "operators know what they do";
+}
+
+TEST_F(IntakeTest, TimesFarAheadOfTheServerAreRefusedByName) {
+  Keyframe late = keyframe(0);
+  late.time_us = now_us() + 23 * 3600 * 1'000'000LL;  // a clock in another time zone
+  send(late);
+  EXPECT_EQ(settle().next_sequence, 1u);
+  EXPECT_TRUE(acknowledge().refused.empty());
+  uuid_.bytes[0] ^= 1;
+  Keyframe far = keyframe(0);
+  far.time_us = now_us() + 25 * 3600 * 1'000'000LL;
+  send(far);
+  send(1);
+  settle();
+  const Acknowledgement ack = acknowledge();
+  EXPECT_EQ(ack.next_sequence, 2u) << "what follows is taken";
+  ASSERT_EQ(ack.refused.size(), 1u);
+  EXPECT_EQ(ack.refused[0].reason, Reason::TIME_AHEAD);
+}
+
+// What anyone has sent of a session is no hindrance to the robot itself, nor can it speak for the robot.
+TEST_F(IntakeTest, NobodySpeaksForARobotThatProvesWhoItIs) {
+  const std::string robot = keyframe(0).session.robot;
+  IntakeOptions options;
+  options.proving = {robot};
+  restart(options);
+  const Sender anyone{{}, true}, own{robot};
+  const Bytes payload = encode_keyframe(keyframe(0)), other = encode_keyframe(keyframe(1));
+  (void)intake_->take_gap({uuid_, 0, 5, Reason::DROPPED_BY_ROBOT}, now_, anyone);
+  EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_, anyone).ok());
+  EXPECT_EQ(sink_.view()->sessions().size(), 0u);
+  EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_, own).ok());
+  EXPECT_EQ(settle().next_sequence, 1u) << "the gap is forgotten";
+  EXPECT_EQ(intake_->take_gap({uuid_, 1, 5, Reason::DROPPED_BY_ROBOT}, now_, anyone).reason(), Reason::NOT_ALLOWED);
+  EXPECT_EQ(intake_->take_end({uuid_, 1}, now_, anyone).reason(), Reason::NOT_ALLOWED);
+  EXPECT_EQ(intake_->take_payload(uuid_, 1, crc32c(other), other, now_, anyone).reason(), Reason::NOT_ALLOWED);
+  // Before it has begun, too: what the robot has said first counts.
+  uuid_.bytes[0] ^= 1;
+  EXPECT_TRUE(intake_->take_gap({uuid_, 0, 0, Reason::DROPPED_BY_ROBOT}, now_, own).ok());
+  EXPECT_EQ(intake_->take_gap({uuid_, 1, 5, Reason::DROPPED_BY_ROBOT}, now_, anyone).reason(), Reason::NOT_ALLOWED);
+  // A robot that need not prove itself is as free as ever.
+  Keyframe free = keyframe(0);
+  free.session.robot = "old";
+  free.session.uuid = SessionUuid::random();
+  const Bytes bytes = encode_keyframe(free);
+  EXPECT_TRUE(intake_->take_payload(free.session.uuid, 0, crc32c(bytes), bytes, now_, anyone).ok());
+  EXPECT_EQ(sink_.view()->sessions().size(), 2u);
 }
 
 }  // namespace

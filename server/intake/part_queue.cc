@@ -7,7 +7,7 @@ namespace relmap::intake {
 
 namespace {
 constexpr std::size_t kTurnBytes = 16 * 1024;
-std::size_t cost(const KeyframePart& part) { return sizeof part + part.data.size(); }
+std::size_t cost(const PartQueue::Sent& sent) { return sizeof sent + sent.part.data.size(); }
 }  // namespace
 
 void PartQueue::drop_last(Queue& queue) {
@@ -19,9 +19,9 @@ void PartQueue::drop_last(Queue& queue) {
   if (queue.parts.empty()) turns_.erase(queue.turn);
 }
 
-void PartQueue::push(const SessionUuid& sender, KeyframePart part) {
-  Queue& queue = queues_[sender];
-  const std::size_t bytes = cost(part);
+void PartQueue::push(const Line& line, Sent sent) {
+  Queue& queue = queues_[line];
+  const std::size_t bytes = cost(sent);
   while (bytes_ + bytes > capacity_) {
     const auto longest = std::max_element(queues_.begin(), queues_.end(),
                                           [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
@@ -32,15 +32,15 @@ void PartQueue::push(const SessionUuid& sender, KeyframePart part) {
     drop_last(longest->second);
   }
   if (queue.parts.empty()) {
-    queue.turn = turns_.insert(turns_.end(), sender);
+    queue.turn = turns_.insert(turns_.end(), line);
     queue.deficit = 0;
   }
-  queue.parts.push_back(std::move(part));
+  queue.parts.push_back(std::move(sent));
   queue.bytes += bytes;
   bytes_ += bytes;
 }
 
-std::optional<KeyframePart> PartQueue::pop() {
+std::optional<PartQueue::Sent> PartQueue::pop() {
   if (turns_.empty()) return std::nullopt;
   for (;;) {
     Queue& queue = queues_.find(turns_.front())->second;
@@ -51,23 +51,24 @@ std::optional<KeyframePart> PartQueue::pop() {
       continue;
     }
     queue.deficit -= bytes;
-    KeyframePart part = std::move(queue.parts.front());
+    Sent sent = std::move(queue.parts.front());
     queue.parts.pop_front();
     queue.bytes -= bytes;
     bytes_ -= bytes;
     if (queue.parts.empty()) turns_.erase(queue.turn);
-    return part;
+    return sent;
   }
 }
 
-PartQueue::Facts PartQueue::of(const SessionUuid& sender) const {
-  const auto found = queues_.find(sender);
+PartQueue::Facts PartQueue::of(const SessionUuid& session) const {
+  const auto found = queues_.find({session, {}});
   if (found == queues_.end()) return {};
   return {static_cast<std::uint32_t>(found->second.parts.size()), found->second.dropped};
 }
 
 void PartQueue::keep_only(const std::set<SessionUuid>& known) {
-  std::erase_if(queues_, [&](const auto& entry) { return entry.second.parts.empty() && !known.contains(entry.first); });
+  std::erase_if(queues_,
+                [&](const auto& entry) { return entry.second.parts.empty() && !known.contains(entry.first.session); });
 }
 
 }  // namespace relmap::intake

@@ -10,8 +10,10 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
 
 #include "proto/keyframe/ingest_messages.h"
+#include "server/intake/session_intake.h"
 
 namespace relmap::intake {
 
@@ -19,11 +21,22 @@ class PartQueue {
  public:
   explicit PartQueue(std::size_t capacity_bytes) : capacity_(capacity_bytes) {}
 
-  // Adds a part to its sender's queue, or drops it if that queue would become the longest. A nil `sender` is a sender
-  // like any other.
-  void push(const SessionUuid& sender, KeyframePart part);
+  // Whose queue it is: that of a session that has begun, or of the others of one robot, if the robot is proved, or else
+  // of all others together.
+  struct Line {
+    SessionUuid session;
+    std::string robot;
+    auto operator<=>(const Line&) const = default;
+  };
+  struct Sent {
+    KeyframePart part;
+    Sender sender;
+  };
+
+  // Adds a part to its queue, or drops it if that queue would become the longest.
+  void push(const Line& line, Sent sent);
   // The next part; nullopt if all queues are empty.
-  std::optional<KeyframePart> pop();
+  std::optional<Sent> pop();
 
   bool empty() const { return turns_.empty(); }
   std::size_t bytes() const { return bytes_; }  // waiting, overhead included
@@ -32,24 +45,24 @@ class PartQueue {
     std::uint32_t waiting = 0;
     std::uint64_t dropped = 0;
   };
-  Facts of(const SessionUuid& sender) const;
-  // Forgets the counts of senders that are not `known` and have nothing waiting.
+  Facts of(const SessionUuid& session) const;
+  // Forgets the counts of sessions that are not `known` and have nothing waiting.
   void keep_only(const std::set<SessionUuid>& known);
 
  private:
   struct Queue {
-    std::deque<KeyframePart> parts;
+    std::deque<Sent> parts;
     std::size_t bytes = 0;
     std::size_t deficit = 0;  // bytes that it may still send in this turn
     std::uint64_t dropped = 0;
-    std::list<SessionUuid>::iterator turn;  // valid while the queue is not empty
+    std::list<Line>::iterator turn;  // valid while the queue is not empty
   };
   void drop_last(Queue& queue);
 
   const std::size_t capacity_;
   std::size_t bytes_ = 0;
-  std::map<SessionUuid, Queue> queues_;
-  std::list<SessionUuid> turns_;  // senders with non-empty queues; the first is being served
+  std::map<Line, Queue> queues_;
+  std::list<Line> turns_;  // those with non-empty queues; the first is being served
 };
 
 }  // namespace relmap::intake

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace relmap::intake {
 namespace {
 
@@ -19,13 +21,17 @@ KeyframePart part(std::uint8_t from, std::uint32_t sequence, std::size_t bytes =
   return part;
 }
 
-constexpr std::size_t kPart = sizeof(KeyframePart) + 1400;
+constexpr std::size_t kPart = sizeof(PartQueue::Sent) + 1400;
+
+void push(PartQueue& queue, std::uint8_t from, KeyframePart sent) {
+  queue.push({sender(from), {}}, {std::move(sent), {}});
+}
 
 TEST(PartQueue, IsFirstInFirstOutForOneSender) {
   PartQueue queue(100 * kPart);
-  for (std::uint32_t s = 0; s < 50; ++s) queue.push(sender(1), part(1, s));
+  for (std::uint32_t s = 0; s < 50; ++s) push(queue, 1, part(1, s));
   EXPECT_EQ(queue.of(sender(1)).waiting, 50u);
-  for (std::uint32_t s = 0; s < 50; ++s) EXPECT_EQ(queue.pop()->sequence, s);
+  for (std::uint32_t s = 0; s < 50; ++s) EXPECT_EQ(queue.pop()->part.sequence, s);
   EXPECT_FALSE(queue.pop());
   EXPECT_TRUE(queue.empty());
   EXPECT_EQ(queue.bytes(), 0u);
@@ -34,22 +40,22 @@ TEST(PartQueue, IsFirstInFirstOutForOneSender) {
 // A sender with few parts does not wait behind one with many; turns are counted in bytes, not in parts.
 TEST(PartQueue, SendersAreServedInTurnByBytes) {
   PartQueue queue(std::size_t{64} << 20);
-  for (std::uint32_t s = 0; s < 1000; ++s) queue.push(sender(1), part(1, s, 1400));
-  for (std::uint32_t s = 0; s < 1000; ++s) queue.push(sender(2), part(2, s, 14000));
+  for (std::uint32_t s = 0; s < 1000; ++s) push(queue, 1, part(1, s, 1400));
+  for (std::uint32_t s = 0; s < 1000; ++s) push(queue, 2, part(2, s, 14000));
   std::size_t bytes[3] = {};
   for (int i = 0; i < 600; ++i) {
     const auto next = queue.pop();
     ASSERT_TRUE(next);
-    bytes[next->session.bytes[0]] += next->data.size();
+    bytes[next->part.session.bytes[0]] += next->part.data.size();
   }
   EXPECT_NEAR(static_cast<double>(bytes[1]) / static_cast<double>(bytes[2]), 1, 0.15);
 }
 
 TEST(PartQueue, TheLongestQueueGivesWay) {
   PartQueue queue(100 * kPart);
-  for (std::uint32_t s = 0; s < 10; ++s) queue.push(sender(2), part(2, s));
-  for (std::uint32_t s = 0; s < 1000; ++s) queue.push(sender(1), part(1, s));
-  for (std::uint32_t s = 10; s < 20; ++s) queue.push(sender(2), part(2, s));
+  for (std::uint32_t s = 0; s < 10; ++s) push(queue, 2, part(2, s));
+  for (std::uint32_t s = 0; s < 1000; ++s) push(queue, 1, part(1, s));
+  for (std::uint32_t s = 10; s < 20; ++s) push(queue, 2, part(2, s));
   EXPECT_LE(queue.bytes(), 100 * kPart);
   EXPECT_EQ(queue.of(sender(2)).waiting, 20u);
   EXPECT_EQ(queue.of(sender(2)).dropped, 0u);
@@ -57,27 +63,39 @@ TEST(PartQueue, TheLongestQueueGivesWay) {
   EXPECT_EQ(queue.of(sender(1)).dropped, 920u);
   for (std::uint32_t s = 0, mine = 0, others = 0; s < 100; ++s) {
     const auto next = queue.pop();
-    if (next->session == sender(1))
-      EXPECT_EQ(next->sequence, others++);  // what it sent last was dropped
+    if (next->part.session == sender(1))
+      EXPECT_EQ(next->part.sequence, others++);  // what it sent last was dropped
     else
-      EXPECT_EQ(next->sequence, mine++);
+      EXPECT_EQ(next->part.sequence, mine++);
   }
 }
 
 TEST(PartQueue, APartLargerThanTheQueueIsDropped) {
   PartQueue queue(kPart);
-  queue.push(sender(1), part(1, 0, 2000));
+  push(queue, 1, part(1, 0, 2000));
   EXPECT_FALSE(queue.pop());
-  queue.push(sender(2), part(2, 0));
-  queue.push(sender(1), part(1, 1));  // as long a queue as the other's: who came first stays
-  EXPECT_EQ(queue.pop()->session, sender(2));
+  push(queue, 2, part(2, 0));
+  push(queue, 1, part(1, 1));  // as long a queue as the other's: who came first stays
+  EXPECT_EQ(queue.pop()->part.session, sender(2));
   EXPECT_EQ(queue.of(sender(1)).dropped, 1u + 1u);
+}
+
+// Who floods with sessions that have not begun delays only what else is his.
+TEST(PartQueue, WhatHasNotBegunWaitsByRobot) {
+  PartQueue queue(100 * kPart);
+  for (std::uint32_t s = 0; s < 1000; ++s) queue.push({{}, "flood"}, {part(1, s), {"flood"}});
+  queue.push({{}, "cart"}, {part(2, 0), {"cart"}});
+  queue.push({}, {part(3, 0), {{}, true}});
+  std::size_t floods = 0;
+  for (auto next = queue.pop(); next->sender.robot != "cart"; next = queue.pop())
+    floods += next->sender.robot == "flood";
+  EXPECT_LT(floods, 15u);
 }
 
 TEST(PartQueue, ForgetsUnknownSenders) {
   PartQueue queue(100 * kPart);
-  for (const std::uint8_t n : {1, 2, 3}) queue.push(sender(n), part(n, 0));
-  for (int i = 0; i < 200; ++i) queue.push(sender(3), part(3, 1));
+  for (const std::uint8_t n : {1, 2, 3}) push(queue, n, part(n, 0));
+  for (int i = 0; i < 200; ++i) push(queue, 3, part(3, 1));
   for (int i = 0; i < 2; ++i) (void)queue.pop();
   queue.keep_only({sender(2)});
   EXPECT_EQ(queue.of(sender(1)).waiting, 0u);

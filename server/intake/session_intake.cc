@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "proto/base/clock.h"
 #include "proto/keyframe/keyframe.h"
 
 namespace relmap::intake {
@@ -26,11 +27,21 @@ Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Resu
   return check_keyframe(*keyframe);
 }
 
+// A keyframe of the far future would make TIME_BACKWARDS of all that follow. Clocks in another time zone are no fault.
+// A server whose own clock has not been set judges nobody's.
+Status check_clock(std::int64_t time_us) {
+  constexpr std::int64_t kDay = 86'400'000'000, kSet = 1'700'000'000'000'000;
+  const std::int64_t now = now_us();
+  if (now < kSet || time_us <= now + kDay) return {};
+  return {Reason::TIME_AHEAD,
+          "the time stamp is " + std::to_string((time_us - now) / kDay) + " days ahead of the server's clock"};
+}
+
 }  // namespace
 
 SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
-                             const std::set<std::string>& robots)
-    : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats), robots_(robots) {
+                             const std::set<std::string>& robots, const std::set<std::string>& proving)
+    : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats), robots_(robots), proving_(proving) {
   const auto view = sink_.view();
   for (const storage::Session& session : view->sessions()) {
     if (session.header.uuid != uuid) continue;
@@ -81,7 +92,7 @@ SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint
   return Verdict::kTake;
 }
 
-Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload, const std::string& robot) {
+Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload, const Sender& sender) {
   seen(sequence);
   const Result<Keyframe> keyframe = decode_keyframe(payload.bytes);
   Held held;
@@ -89,8 +100,11 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload, 
   held.verdict = check_payload(uuid_, sequence, keyframe);
   if (held.verdict.ok() && !robots_.empty() && !robots_.contains(keyframe->session.robot))
     held.verdict = {Reason::NOT_ALLOWED, "robot " + keyframe->session.robot + " is not on the list"};
-  if (held.verdict.ok() && !robot.empty() && keyframe->session.robot != robot)
-    held.verdict = {Reason::NOT_ALLOWED, robot + " sent a keyframe of robot " + keyframe->session.robot};
+  if (held.verdict.ok() && !sender.robot.empty() && keyframe->session.robot != sender.robot)
+    held.verdict = {Reason::NOT_ALLOWED, sender.robot + " sent a keyframe of robot " + keyframe->session.robot};
+  if (held.verdict.ok() && sender.anyone && proving_.contains(keyframe->session.robot))
+    held.verdict = {Reason::NOT_ALLOWED, "robot " + keyframe->session.robot + " must prove who it is"};
+  if (held.verdict.ok()) held.verdict = check_clock(keyframe->time_us);
   const Status verdict = held.verdict;
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;

@@ -23,22 +23,29 @@ namespace relmap::intake {
 inline constexpr std::uint32_t kIntakeWindow = 64;         // how far beyond the settled sequences keyframes are taken
 inline constexpr std::uint32_t kMaxSequence = 0xfffffffe;  // so that its successor fits in 32 bits, too
 
+// Who has sent a message, as far as that is proved.
+struct Sender {
+  std::string robot;    // proved to be this one; empty: an operator, who may send for any robot, or anyone
+  bool anyone = false;  // nothing is proved
+};
+
 class SessionIntake {
  public:
   // Journals a record as KeyframeSink::submit() does; the caller passes the outcome to settle() with this ticket.
   using Submit = std::function<Status(storage::JournalRecord record, std::uint64_t ticket)>;
 
   // Resumes from what the map knows of the session. `robots` names the robots whose keyframes are taken; empty: all.
+  // `proving` names those whose keyframes nobody may send who proves nothing.
   SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
-                const std::set<std::string>& robots);
+                const std::set<std::string>& robots, const std::set<std::string>& proving);
 
   // What a keyframe with this sequence and checksum would be now.
   enum class Verdict { kTake, kRepeat, kConflict, kSettled, kDeleted, kTooFar };
   Verdict classify(std::uint32_t sequence, std::uint32_t crc);
 
   // Takes a complete payload for which classify() returned kTake. Not OK: the reason for which the sequence will be
-  // refused when its turn comes, NOT_ALLOWED if the keyframe is not of `robot` (empty: it may be of any).
-  Status take(std::uint32_t sequence, Reassembly::Payload payload, const std::string& robot = {});
+  // refused when its turn comes, NOT_ALLOWED if the sender may not send the keyframes of its robot.
+  Status take(std::uint32_t sequence, Reassembly::Payload payload, const Sender& sender = {});
   // Takes a gap. Requires from <= to.
   void give_up(std::uint32_t from, std::uint32_t to, Reason reason);
   // Notes that something came of a sequence, so that lower ones of which nothing came are missing.
@@ -140,6 +147,7 @@ class SessionIntake {
   const Submit submit_;
   IngestStats& stats_;
   const std::set<std::string>& robots_;
+  const std::set<std::string>& proving_;
 
   std::optional<SessionNumber> number_;  // nullopt: nothing is durable yet
   SessionHeader header_;

@@ -203,7 +203,8 @@ Status Mapper::Impl::load() {
   if (acquired.ok())
     epoch = *acquired;
   else if (acquired.reason() == Reason::READ_ONLY || acquired.reason() == Reason::DISK_FULL ||
-           acquired.reason() == Reason::IO_ERROR || acquired.reason() == Reason::DATA_LOSS)  // it can still be served
+           acquired.reason() == Reason::IO_ERROR || acquired.reason() == Reason::TOO_MANY_FILES ||
+           acquired.reason() == Reason::DATA_LOSS)  // it can still be served
     read_only = acquired.status();
   else
     return acquired.status();

@@ -89,7 +89,7 @@ std::string read_mixes(const YAML::Node& node, Config& config) {
   return {};
 }
 
-std::string read_robots(const YAML::Node& node, Config& config) {
+std::string read_names(const YAML::Node& node, std::vector<std::string>& names) {
   if (!node.IsSequence()) return "needs a list of names";
   std::vector<std::string> robots;
   for (const YAML::Node& name : node) {
@@ -98,7 +98,30 @@ std::string read_robots(const YAML::Node& node, Config& config) {
       return "has a name that no robot can have: " + valid.message();
     robots.push_back(name.Scalar());
   }
-  config.robots = std::move(robots);
+  names = std::move(robots);
+  return {};
+}
+
+std::string read_backup_roots(const YAML::Node& node, Config& config) {
+  std::vector<std::string> roots;
+  if (!node.IsSequence()) return "needs a list of folders";
+  for (const YAML::Node& root : node) {
+    if (!root.IsScalar()) return "needs a list of folders";
+    roots.push_back(root.Scalar());
+  }
+  config.backup_roots = std::move(roots);
+  return {};
+}
+
+std::string read_lcm_authentication(const YAML::Node& node, Config& config) {
+  using Who = ingest::LcmAuthentication::Who;
+  if (node.IsSequence()) {
+    config.lcm_authentication = Who::kSome;
+    return read_names(node, config.lcm_proving);
+  }
+  if (!node.IsScalar() || (node.Scalar() != "all" && node.Scalar() != "none"))
+    return "needs all, none or a list of names";
+  config.lcm_authentication = node.Scalar() == "all" ? Who::kAll : Who::kNobody;
   return {};
 }
 
@@ -109,6 +132,7 @@ const std::map<std::string, Setter>& settings() {
       {"socket_group", text(&Config::socket_group)},
       {"credentials", text(&Config::credentials)},
       {"access", text(&Config::access)},
+      {"audit", text(&Config::audit)},
       {"tls.certificate", text([](Config& c) -> std::string& { return c.tls.certificate; })},
       {"tls.key", text([](Config& c) -> std::string& { return c.tls.key; })},
       {"tls.client_authority", text([](Config& c) -> std::string& { return c.tls.client_authority; })},
@@ -117,8 +141,11 @@ const std::map<std::string, Setter>& settings() {
        number([](Config& c) -> std::size_t& { return c.connections.per_peer; }, 1, 100000)},
       {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},
       {"lcm", text_or_none(&Config::lcm)},
+      {"lcm.authentication", read_lcm_authentication},
+      {"lcm.key", text(&Config::lcm_key)},
       {"memory_budget_mb", number([](Config& c) -> std::uint64_t& { return c.memory_budget_mb; }, 32, 1 << 20)},
       {"disk_low_water_mb", number([](Config& c) -> std::uint64_t& { return c.disk_low_water_mb; }, 0, 1 << 20)},
+      {"backup.roots", read_backup_roots},
       {"vocabulary", text(&Config::vocabulary)},
       {"log_level", text(&Config::log_level)},
       {"deterministic", flag([](Config& c) -> bool& { return c.map.deterministic; })},
@@ -137,7 +164,15 @@ const std::map<std::string, Setter>& settings() {
       {"rpc.max_search_frames", number([](Config& c) -> std::uint64_t& { return c.rpc.max_search_frames; }, 1, 1e9)},
       {"rpc.default_deadline_s", number([](Config& c) -> double& { return c.rpc.default_deadline_s; }, 0.001, 3600)},
       {"ingest.max_keyframes_per_s", number([](Config& c) -> double& { return c.max_keyframes_per_s; }, 0, 1e6)},
-      {"ingest.robots", read_robots},
+      {"ingest.max_new_sessions_per_min",
+       number([](Config& c) -> double& { return c.max_new_sessions_per_min; }, 0, 1e6)},
+      {"ingest.robots", [](const YAML::Node& node, Config& config) { return read_names(node, config.robots); }},
+      {"rpc.max_concurrent_per_caller",
+       number([](Config& c) -> int& { return c.rpc.max_concurrent_per_caller; }, 1, 100000)},
+      {"rpc.max_ingest_streams_per_caller",
+       number([](Config& c) -> int& { return c.rpc.max_ingest_streams_per_caller; }, 1, 100000)},
+      {"rpc.max_waiting", number([](Config& c) -> int& { return c.rpc.max_waiting; }, 1, 100000)},
+      {"rpc.stalled_s", number([](Config& c) -> double& { return c.rpc.stalled_s; }, 1, 3600)},
       {"rpc.max_ingest_streams", number([](Config& c) -> int& { return c.rpc.max_ingest_streams; }, 1, 100000)},
       {"routes.mixes", read_mixes},
       {"rba.window", number([](Config& c) -> std::uint32_t& { return c.map.rba.window; }, 0, 1000)},
@@ -198,14 +233,24 @@ Status read_config(const std::string& path, Config& config) {
 namespace {
 
 // What keyframes can come from: a multicast group, or a log that is replayed.
-Status check_lcm(const std::string& url) {
+Status check_lcm(const Config& config) {
+  const std::string& url = config.lcm;
   if (url.empty()) return {};
   const auto bad = [&](const std::string& what) { return Status(Reason::BAD_CONFIG, "lcm: " + what); };
   const auto complete = complete_lcm_url(url);
   if (!complete.ok()) return bad(complete.status().message());
   const LcmUrl parsed = parse_lcm_url(url).or_throw();
   if (parsed.provider == "memq") return bad("memq:// reaches nobody outside of this process");
-  if (parsed.provider != "file") return {};
+  const bool proves = config.lcm_authentication != ingest::LcmAuthentication::Who::kNobody;
+  if (parsed.provider != "file") {
+    if (proves && (config.lcm_key.empty() || config.access.empty()))
+      return bad("anyone who can send to " + url +
+                 " could send in the name of any robot; give --credentials FOLDER (relmap-admin credentials makes it), "
+                 "by whose "
+                 "keys robots are known, or allow that with --lcm-authentication none");
+    return {};
+  }
+  if (proves) return bad("nothing in a log can prove who sent it, so it takes --lcm-authentication none");
   if (!is_replay(url)) return bad("the daemon replays logs and writes none: mode=r");
   if (!std::filesystem::exists(parsed.network)) return bad("there is no log " + parsed.network);
   return {};
@@ -224,6 +269,7 @@ void complete_config(Config& config) {
   complete(config.tls.key, "server.pem");
   complete(config.tls.client_authority, "ca.crt");
   complete(config.access, "access");
+  complete(config.lcm_key, "lcm.key");
 }
 
 Status check_config(const Config& config) {
@@ -239,7 +285,10 @@ Status check_config(const Config& config) {
                 : "listening on " + config.listen +
                       " would let anyone who can reach it edit the map; give --credentials FOLDER (relmap-admin "
                       "credentials makes it), or allow that with --insecure"};
-  if (Status lcm = check_lcm(config.lcm); !lcm.ok()) return lcm;
+  if (Status lcm = check_lcm(config); !lcm.ok()) return lcm;
+  for (const std::string& root : config.backup_roots)
+    if (!std::filesystem::path(root).is_absolute())
+      return {Reason::BAD_CONFIG, "the folder for backups '" + root + "' is not an absolute path"};
   static const std::set<std::string> levels{"trace", "debug", "info", "warning", "error"};
   if (!levels.contains(config.log_level))
     return {Reason::BAD_CONFIG, "log_level '" + config.log_level + "' is none of trace, debug, info, warning, error"};

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/base/status.h"
+#include "server/ingest/lcm_ingest.h"
 #include "server/map/mapper.h"
 #include "server/map/way_around.h"
 #include "server/route/weight.h"
@@ -23,13 +24,19 @@ struct Config {
   bool insecure = false;     // no TLS: everyone who can reach `listen` is an operator
   std::string credentials;   // folder of `relmap-admin credentials`, whose files the next two take if they name none
   rpc::TlsFiles tls;
+  std::string audit;   // file of the audit log; empty: audit.jsonl in `data`; "none": there is none
   std::string access;  // file of tokens and revocations (proto/access/access_list.h)
   rpc::ConnectionLimits connections;
-  std::string lcm;                   // LCM URL; empty: off
-  double max_keyframes_per_s = 100;  // mean that one robot may send over LCM; 0: no limit
-  std::vector<std::string> robots;   // names of the robots whose keyframes are taken; empty: all
+  std::string lcm;  // LCM URL; empty: off
+  ingest::LcmAuthentication::Who lcm_authentication = ingest::LcmAuthentication::Who::kAll;
+  std::vector<std::string> lcm_proving;  // with kSome: the robots whose messages must be sealed
+  std::string lcm_key;                   // file of the fleet's secret (proto/access/datagram_seal.h)
+  double max_keyframes_per_s = 100;      // mean that one robot may send over LCM; 0: no limit
+  double max_new_sessions_per_min = 60;  // that one robot may begin (IntakeOptions); 0: no limit
+  std::vector<std::string> robots;       // names of the robots whose keyframes are taken; empty: all
   std::uint64_t memory_budget_mb = 1024;
   std::uint64_t disk_low_water_mb = 256;  // with less free disk space nothing is taken in
+  std::vector<std::string> backup_roots;  // absolute paths of folders below which backups may be made; empty: nowhere
   std::string vocabulary;                 // file; empty: the shipped one
   std::string log_level = "info";
   rpc::RpcLimits rpc;

@@ -142,9 +142,37 @@ TEST(Config, AFolderOfCredentialsNamesWhatNothingElseNames) {
   EXPECT_EQ(plain.access + plain.tls.certificate, "");
 }
 
+TEST(Config, LcmNeedsKeysUnlessItIsSaidThatItNeedsNone) {
+  using Who = ingest::LcmAuthentication::Who;
+  Config config;
+  config.data = "map";
+  config.lcm = "udpm://239.255.76.67:7667";
+  EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG);
+  EXPECT_NE(check_config(config).message().find("--lcm-authentication none"), std::string::npos);
+  config.credentials = "fleet";
+  complete_config(config);
+  EXPECT_EQ(config.lcm_key, "fleet/lcm.key");
+  EXPECT_TRUE(check_config(config).ok());
+  ASSERT_TRUE(parse_config("lcm.authentication: [cart-1, cart-2]", "test", config).ok());
+  EXPECT_EQ(config.lcm_authentication, Who::kSome);
+  EXPECT_EQ(config.lcm_proving, (std::vector<std::string>{"cart-1", "cart-2"}));
+  EXPECT_TRUE(check_config(config).ok());
+  config.lcm_key.clear();
+  EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG);
+  ASSERT_TRUE(parse_config("lcm.authentication: none\nlcm.key: other", "test", config).ok());
+  EXPECT_EQ(config.lcm_authentication, Who::kNobody);
+  EXPECT_EQ(config.lcm_key, "other");
+  EXPECT_TRUE(check_config(config).ok());
+  ASSERT_TRUE(parse_config("lcm.authentication: all", "test", config).ok());
+  EXPECT_EQ(config.lcm_authentication, Who::kAll);
+  for (const char* bad : {"lcm.authentication: some", "lcm.authentication: {a: b}", "lcm.authentication: [[a]]"})
+    EXPECT_EQ(parse_config(bad, "test", config).reason(), Reason::BAD_CONFIG) << bad;
+}
+
 TEST(Config, RefusesLcmUrlsThatCannotDeliverKeyframes) {
   Config config;
   config.data = "map";
+  config.lcm_authentication = ingest::LcmAuthentication::Who::kNobody;
   const std::string log = testing::TempDir() + "lcmlog_" + std::to_string(getpid());
   std::ofstream(log) << "";
   for (const std::string& url :
@@ -183,6 +211,9 @@ TEST(Config, RefusesLcmUrlsThatCannotDeliverKeyframes) {
     EXPECT_TRUE(status.message().starts_with("lcm: ")) << status.message();
     EXPECT_NE(status.message().find(why), std::string::npos) << url << ": " << status.message();
   }
+  config.lcm = "file://" + log;
+  config.lcm_authentication = ingest::LcmAuthentication::Who::kAll;
+  EXPECT_NE(check_config(config).message().find("nothing in a log can prove"), std::string::npos);
   std::filesystem::remove(log);
 }
 

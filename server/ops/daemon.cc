@@ -14,6 +14,7 @@
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
 #include "server/ops/endpoint.h"
+#include "server/ops/private_folder.h"
 #include "server/ops/process.h"
 #include "server/ops/socket_path.h"
 #include "server/route/overlay/route_index.h"
@@ -63,6 +64,15 @@ Status with_advice(const Status& status, const Config& config) {
   return status;
 }
 
+// The secret of the fleet's keys for LCM; zeros if it is not needed.
+Result<access::SealKey> read_lcm_secret(const Config& config) {
+  if (config.lcm.empty() || config.lcm_authentication == ingest::LcmAuthentication::Who::kNobody)
+    return access::SealKey{};
+  auto secret = access::read_secret(config.lcm_key);
+  if (!secret.ok()) return Status(Reason::BAD_CONFIG, secret.status().message());
+  return secret;
+}
+
 void log(const intake::RobotEvent& event) {
   const std::string session = "session " + std::to_string(event.session) + " '" + event.name + "'";
   switch (event.kind) {
@@ -105,9 +115,12 @@ struct Daemon::Impl {
   Status lcm_refusal RELMAP_GUARDED_BY(lcm_mutex);  // why LCM ingest does not run
   std::unique_ptr<rpc::Core> core;
   std::unique_ptr<rpc::Gatekeeper> gatekeeper;
+  std::unique_ptr<rpc::AuditLog> audit;
   std::unique_ptr<rpc::RpcServer> server;
   std::string socket, address;
-  std::string access_problem;  // with the access list, which is logged once
+  access::SealKey lcm_secret{};
+  std::uint64_t lcm_access_version = 0;  // of the access list that LCM uses
+  std::string access_problem;            // with the access list, which is logged once
 
   std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
   bool stopped = false;
@@ -119,6 +132,10 @@ Status Daemon::Impl::open_map() {
   if (!vocabulary.ok()) return vocabulary.status();
   if (Status made = storage::create_durable_directories(*storage::posix_file_system(), config.data); !made.ok())
     return made;
+  if (const Status closed = make_private(config.data, config.socket_group); closed.reason() == Reason::BAD_CONFIG)
+    return closed;
+  else if (!closed.ok())
+    spdlog::warn("others may be able to read the map: {}", closed.to_string());
   budget = std::make_shared<storage::Budget>(config.memory_budget_mb << 20);
   storage::RocksDbOptions options;
   options.cache_bytes = budget->allowance(storage::Share::kEngine);
@@ -142,7 +159,9 @@ Status Daemon::Impl::open_map() {
   intake::IngestServerOptions ingest_options;
   ingest_options.map = mapper->identity();
   ingest_options.max_keyframes_per_s = config.max_keyframes_per_s;
+  ingest_options.max_new_sessions_per_min = config.max_new_sessions_per_min;
   ingest_options.robots = {config.robots.begin(), config.robots.end()};
+  ingest_options.proving = {config.lcm_proving.begin(), config.lcm_proving.end()};
   ingest_options.part_queue_bytes = config.lcm.empty() ? 0 : budget->allowance(storage::Share::kReassembly) / 4;
   ingest = std::make_unique<intake::IngestServer>(*sink, *budget, boot, std::move(ingest_options));
   robot_log = ingest->subscribe({.acknowledged = {}, .news = {}, .stopping = {}, .robot = log});
@@ -158,6 +177,7 @@ Status Daemon::Impl::serve() {
   facts.boot_id = hex(boot);
   facts.data_folder = std::filesystem::absolute(config.data).string();
   facts.lcm_url = config.lcm;
+  facts.backup_roots = config.backup_roots;
   facts.deterministic = config.map.deterministic;
   facts.pid = static_cast<std::uint64_t>(getpid());
   facts.started_us = started_us;
@@ -181,6 +201,13 @@ Status Daemon::Impl::serve() {
   if (!path.ok()) return path.status();
   socket = std::move(*path);
   rpc::ServerOptions options{socket, config.socket_group, {}, 0, config.tls, config.connections};
+  if (config.audit != "none") {
+    auto opened = rpc::AuditLog::open(config.audit.empty() ? config.data + "/audit.jsonl" : config.audit);
+    if (!opened.ok() && !config.audit.empty()) return {Reason::BAD_CONFIG, opened.status().message()};
+    if (!opened.ok()) spdlog::warn("there is no audit log: {}", opened.status().to_string());
+    if (opened.ok()) audit = std::move(*opened);
+    options.audit = audit.get();
+  }
   if (!config.listen.empty()) {
     const auto where = parse_host_port(config.listen);
     if (!where.ok()) return where.status();
@@ -189,6 +216,9 @@ Status Daemon::Impl::serve() {
   }
   gatekeeper = std::make_unique<rpc::Gatekeeper>(config.access, config.insecure);
   if (Status known = gatekeeper->reload(); !known.ok()) return {Reason::BAD_CONFIG, known.message()};
+  const auto secret = read_lcm_secret(config);
+  if (!secret.ok()) return secret.status();
+  lcm_secret = *secret;
   if (config.insecure && !config.listen.empty())
     spdlog::warn("--insecure: everyone who can reach {} may edit the map", config.listen);
   auto started = rpc::RpcServer::start(*core, *gatekeeper, options);
@@ -196,7 +226,9 @@ Status Daemon::Impl::serve() {
   server = std::move(started).value();
   if (!options.host.empty()) address = HostPort{options.host, server->port()}.to_string();
   start_lcm();
-  const Status written = write_endpoint(config.data, {socket, address, getpid(), hex(boot)});
+  Status written = write_endpoint(config.data, {socket, address, getpid(), hex(boot)});
+  if (written.ok() && !config.socket_group.empty())
+    written = share_with_group(config.data + "/endpoint", config.socket_group);
   if (written.ok() || mapper->stats().storage.reason() != Reason::READ_ONLY) return written;
   spdlog::warn("clients find the daemon only by --server unix:{}{}: {}", socket,
                address.empty() ? std::string() : " or " + address, written.to_string());
@@ -205,12 +237,19 @@ Status Daemon::Impl::serve() {
 
 void Daemon::Impl::start_lcm() {
   if (config.lcm.empty()) return;
-  const std::size_t queue_bytes = budget->allowance(storage::Share::kReassembly) / 4;
-  auto started = ingest::LcmIngest::start(
-      config.lcm, *ingest, [this] { return lcm_status(); }, queue_bytes);
+  ingest::LcmOptions options;
+  options.url = config.lcm;
+  options.queue_bytes = budget->allowance(storage::Share::kReassembly) / 4;
+  options.authentication.who = config.lcm_authentication;
+  if (options.authentication.who == ingest::LcmAuthentication::Who::kNobody)
+    spdlog::warn("lcm.authentication is none: whoever can send to {} can send in the name of any robot", config.lcm);
+  else
+    options.authentication.secret = lcm_secret;
+  auto started = ingest::LcmIngest::start(options, *ingest, [this] { return lcm_status(); });
   if (started.ok()) {
-    budget->charge(storage::Share::kReassembly, queue_bytes);  // while the daemon runs
+    budget->charge(storage::Share::kReassembly, options.queue_bytes);  // while the daemon runs
     lcm = std::move(started).value();
+    lcm->use(*gatekeeper->list());
     return;
   }
   spdlog::error("no LCM ingest: {}; gRPC goes on serving", started.status().to_string());
@@ -248,6 +287,10 @@ void Daemon::Impl::reload_access() {
   if (!read.ok() && read.message() != access_problem)
     spdlog::error("the access list stays as it was: {}", read.to_string());
   access_problem = read.message();
+  if (lcm && gatekeeper->version() != lcm_access_version) {
+    lcm_access_version = gatekeeper->version();
+    lcm->use(*gatekeeper->list());
+  }
 }
 
 Status Daemon::Impl::stop() {
@@ -283,6 +326,7 @@ Status Daemon::check(const Config& config) {
   if (const auto vocabulary = load_vocabulary(config); !vocabulary.ok()) return vocabulary.status();
   if (Status sound = rpc::check_files(config.tls); !sound.ok()) return sound;
   if (Status known = rpc::Gatekeeper(config.access).reload(); !known.ok()) return {Reason::BAD_CONFIG, known.message()};
+  if (const auto secret = read_lcm_secret(config); !secret.ok()) return secret.status();
   return storage::check_data_folder(config.data);
 }
 
@@ -313,6 +357,14 @@ void Daemon::tick() {
     impl_->reported = now;
     impl_->report();
   }
+}
+
+void Daemon::reload() {
+  impl_->access_problem.clear();
+  if (const Status read = impl_->gatekeeper->reload(); !read.ok())
+    spdlog::error("the access list stays as it was: {}", read.to_string());
+  if (const Status sound = rpc::check_files(impl_->config.tls); !sound.ok())
+    spdlog::error("the certificate stays as it was: {}", sound.to_string());
 }
 
 Status Daemon::stop() { return impl_->stop(); }

@@ -90,6 +90,11 @@ TEST_F(DaemonTest, RefusesUnusableConfigurations) {
   EXPECT_EQ(Daemon::start(config).reason(), Reason::BAD_CONFIG);
   EXPECT_EQ(Daemon::check(config).reason(), Reason::BAD_CONFIG);
   config = config_;
+  config.lcm = "udpm://239.255.76.67:7667?ttl=0";
+  config.lcm_key = folder_ + "/lcm.key";
+  config.access = folder_ + "/access";
+  EXPECT_EQ(Daemon::check(config).reason(), Reason::BAD_CONFIG) << "the files are not there";
+  config = config_;
   config.vocabulary = folder_ + "/nowhere.vocab";
   EXPECT_EQ(Daemon::start(config).reason(), Reason::NO_SUCH_FILE);
   std::filesystem::create_directories(folder_);
@@ -102,6 +107,7 @@ TEST_F(DaemonTest, RefusesUnusableConfigurations) {
 TEST_F(DaemonTest, ServesWithoutLcmIfLcmCannotStart) {
   std::filesystem::create_directories(folder_ + "/log");  // LCM reads no folder
   config_.lcm = "file://" + folder_ + "/log";
+  config_.lcm_authentication = ingest::LcmAuthentication::Who::kNobody;
   auto daemon = Daemon::start(config_);
   ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
   EXPECT_TRUE((*daemon)->stop().ok());
@@ -155,6 +161,11 @@ TEST_F(DaemonTest, ConfigurationsThatCannotStartFailTheCheck) {
   EXPECT_EQ(Daemon::check(config).reason(), Reason::BAD_CONFIG);
   EXPECT_EQ(Daemon::start(config).reason(), Reason::BAD_CONFIG);
   EXPECT_FALSE(std::filesystem::exists(config_.data));
+  config = config_;
+  config.lcm = "udpm://239.255.76.67:7667?ttl=0";
+  config.lcm_key = folder_ + "/lcm.key";
+  config.access = folder_ + "/access";
+  EXPECT_EQ(Daemon::check(config).reason(), Reason::BAD_CONFIG) << "the files are not there";
   config = config_;
   config.vocabulary = folder_ + "/nowhere.vocab";
   EXPECT_EQ(Daemon::check(config).reason(), Reason::NO_SUCH_FILE);

@@ -15,22 +15,28 @@ sigset_t stop_signals() {
   return set;
 }
 
+sigset_t all_signals() {
+  sigset_t set = stop_signals();
+  sigaddset(&set, SIGHUP);
+  return set;
+}
+
 }  // namespace
 
 void block_stop_signals() {
-  const sigset_t set = stop_signals();
+  const sigset_t set = all_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-std::optional<int> wait_for_stop_signal(std::chrono::milliseconds timeout) {
-  const sigset_t set = stop_signals();
+std::optional<int> wait_for_signal(std::chrono::milliseconds timeout) {
+  const sigset_t set = all_signals(), stop = stop_signals();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);
   const std::chrono::nanoseconds rest = timeout - seconds;
   const timespec patience{static_cast<time_t>(seconds.count()), static_cast<long>(rest.count())};
   const int signal = sigtimedwait(&set, nullptr, &patience);
   if (signal < 0) return std::nullopt;
-  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+  if (signal != SIGHUP) pthread_sigmask(SIG_UNBLOCK, &stop, nullptr);
   return signal;
 }
 

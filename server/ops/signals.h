@@ -1,4 +1,4 @@
-// Handles SIGTERM and SIGINT by a thread that waits for them instead of a signal handler.
+// Handles SIGTERM, SIGINT and SIGHUP by a thread that waits for them instead of a signal handler.
 #pragma once
 
 #include <chrono>
@@ -6,12 +6,12 @@
 
 namespace relmap::ops {
 
-// Blocks SIGTERM and SIGINT in this thread and all that it starts, and ignores SIGPIPE. Call it before the first thread
+// Blocks these signals in this thread and all that it starts, and ignores SIGPIPE. Call it before the first thread
 // starts.
 void block_stop_signals();
 
-// Waits for SIGTERM or SIGINT and returns its number; nullopt after `timeout`. After it has returned a signal, another
-// one ends the process at once. That loses nothing acknowledged, since it is in the journal.
-std::optional<int> wait_for_stop_signal(std::chrono::milliseconds timeout);
+// Waits for one of them and returns its number; nullopt after `timeout`. After it has returned SIGTERM or SIGINT,
+// another one of these ends the process at once. That loses nothing acknowledged, since it is in the journal.
+std::optional<int> wait_for_signal(std::chrono::milliseconds timeout);
 
 }  // namespace relmap::ops

@@ -284,9 +284,9 @@ TEST_F(AccessTest, ASessionThatHasNotBegunIsOfWhoSentForItFirst) {
   const Bytes payload = encode_keyframe(world.keyframe(0));
   const std::uint64_t frames = map_.mapper->view()->state().keyframes;
   // The keyframe is of another robot than the sender: it is refused for good, and begins nothing.
-  EXPECT_TRUE(intake_->take_payload(uuid, 0, crc32c(payload), payload, "thief").ok());
-  EXPECT_EQ(intake_->take_payload(uuid, 0, crc32c(payload), payload, "second").reason(), Reason::NOT_ALLOWED);
-  EXPECT_EQ(intake_->take_end({uuid, 1}, "second").reason(), Reason::NOT_ALLOWED);
+  EXPECT_TRUE(intake_->take_payload(uuid, 0, crc32c(payload), payload, {"thief"}).ok());
+  EXPECT_EQ(intake_->take_payload(uuid, 0, crc32c(payload), payload, {"second"}).reason(), Reason::NOT_ALLOWED);
+  EXPECT_EQ(intake_->take_end({uuid, 1}, {"second"}).reason(), Reason::NOT_ALLOWED);
   EXPECT_EQ(intake_->stats().refused_before_begin[intake::index_of(Reason::NOT_ALLOWED)], 1u);
   EXPECT_EQ(map_.mapper->view()->state().keyframes, frames);
 }

@@ -150,24 +150,29 @@ Result<Producer<v1::Progress>> reindex_request(const v1::ReindexRequest&, const 
 }
 
 Result<Producer<v1::Progress>> backup(const v1::BackupRequest& request, const Deadline& deadline, map::Mapper& mapper,
-                                      MaintenanceTurn& maintenance) {
+                                      MaintenanceTurn& maintenance, const DaemonFacts& facts) {
   const std::string folder = request.folder();
   if (!std::filesystem::path(folder).is_absolute())
     return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is not an absolute path on the daemon's machine");
-  return start<v1::Progress>(
-      maintenance, "Admin.Backup", deadline, [&mapper, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
-        storage::Engine& engine = mapper.engine();
-        (void)mapper.commit(deadline.at);  // if it fails, the backup has the rest in its journal
-        const std::uint64_t durable = engine.last_journal_sequence();
-        if (Status made = engine.checkpoint(folder, engine_progress(stream, "backing up")); !made.ok()) return made;
-        const std::uint64_t bytes = bytes_in(folder);
-        v1::Progress done = progress_of("backed up", bytes, bytes, "bytes");
-        done.mutable_backup()->set_folder(folder);
-        done.mutable_backup()->set_bytes(bytes);
-        done.mutable_backup()->set_durable_sequence(durable);
-        stream.send(std::move(done));
-        return {};
-      });
+  if (facts.backup_roots.empty())
+    return Status(Reason::NOT_ALLOWED, "this daemon has no folder for backups: start it with --backup-root FOLDER");
+  const storage::NewFolder to(folder, facts.backup_roots);
+  return start<v1::Progress>(maintenance, "Admin.Backup", deadline,
+                             [&mapper, to, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
+                               storage::Engine& engine = mapper.engine();
+                               (void)mapper.commit(deadline.at);  // if it fails, the backup has the rest in its journal
+                               const std::uint64_t durable = engine.last_journal_sequence();
+                               if (Status made = engine.checkpoint(to, engine_progress(stream, "backing up"));
+                                   !made.ok())
+                                 return made;
+                               const std::uint64_t bytes = bytes_in(folder);
+                               v1::Progress done = progress_of("backed up", bytes, bytes, "bytes");
+                               done.mutable_backup()->set_folder(folder);
+                               done.mutable_backup()->set_bytes(bytes);
+                               done.mutable_backup()->set_durable_sequence(durable);
+                               stream.send(std::move(done));
+                               return {};
+                             });
 }
 
 Result<Producer<v1::Progress>> compact(const v1::CompactRequest&, const Deadline& deadline, map::Mapper& mapper,

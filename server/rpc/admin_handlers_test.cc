@@ -87,6 +87,10 @@ TEST_F(AdminHandlers, BackupNeedsAnAbsolutePathAndAnEngineThatSupportsIt) {
   request.set_folder("copy");
   EXPECT_EQ(call(*map_.core, backup, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
   request.set_folder("/tmp/copy");
+  const auto nowhere = call(*map_.core, backup, request, deadline_);
+  EXPECT_EQ(nowhere.reason(), Reason::NOT_ALLOWED);
+  EXPECT_THAT(nowhere.status().message(), HasSubstr("--backup-root"));
+  map_.core->facts.backup_roots = {"/tmp"};
   auto stream = call(*map_.core, backup, request, deadline_).or_throw();
   Result<std::optional<v1::Progress>> message = stream();
   while (message.ok() && message->has_value()) message = stream();

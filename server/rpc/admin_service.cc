@@ -11,7 +11,7 @@ class AdminService final : public v1::Admin::CallbackService {
   AdminService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}
 
   Unary* WaitIdle(Context* context, const v1::WaitIdleRequest* request, v1::WaitIdleReply* reply) override {
-    return unary(context, "Admin.WaitIdle", request, reply, wait_idle);
+    return unary(context, "Admin.WaitIdle", request, reply, wait_idle, Lane::kWaits);
   }
   Stream<v1::VerifyReply>* Verify(Context* context, const v1::VerifyRequest* request) override {
     return stream<v1::VerifyReply>(context, "Admin.Verify", request, verify_request);
@@ -32,12 +32,12 @@ class AdminService final : public v1::Admin::CallbackService {
     return unary(context, "Admin.GetStats", request, reply, get_stats);
   }
   Unary* Commit(Context* context, const v1::CommitRequest* request, v1::CommitReply* reply) override {
-    return unary(context, "Admin.Commit", request, reply, commit);
+    return unary(context, "Admin.Commit", request, reply, commit, Lane::kEdits);
   }
 
   Unary* FreezeSession(Context* context, const v1::FreezeSessionRequest* request,
                        v1::FreezeSessionReply* reply) override {
-    return unary(context, "Admin.FreezeSession", request, reply, freeze_session);
+    return unary(context, "Admin.FreezeSession", request, reply, freeze_session, Lane::kEdits);
   }
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
     return stream<v1::Progress>(context, "Admin.DeleteSession", request, delete_session);
@@ -46,8 +46,8 @@ class AdminService final : public v1::Admin::CallbackService {
  private:
   template <typename Request, typename Reply, typename... Parts>
   Unary* unary(Context* context, const char* method, const Request* request, Reply* reply,
-               Result<Reply> (*handler)(const Request&, const Deadline&, Parts...)) {
-    return gateway_.unary(context, method, Lane::kGeneral, request, reply,
+               Result<Reply> (*handler)(const Request&, const Deadline&, Parts...), Lane lane = Lane::kGeneral) {
+    return gateway_.unary(context, method, lane, request, reply,
                           [this, handler](const Request& r, const Deadline& d) { return call(core_, handler, r, d); });
   }
   template <typename Reply, typename Request, typename... Parts>

@@ -34,7 +34,8 @@ struct DaemonFacts {
   std::string lcm_url;  // empty if LCM is off
   bool deterministic = false;
   std::uint64_t pid = 0;
-  std::int64_t started_us = 0;  // UTC
+  std::int64_t started_us = 0;                 // UTC
+  std::vector<std::string> backup_roots = {};  // folders below which backups may be made; empty: nowhere
 };
 
 // Counts of the intake since the daemon started.

@@ -1,5 +1,7 @@
 #include "server/rpc/edit_log.h"
 
+#include <algorithm>
+#include <chrono>
 #include <memory>
 
 #include "proto/base/mutex.h"
@@ -8,6 +10,7 @@ namespace relmap::rpc {
 
 namespace {
 constexpr std::size_t kMaxNoteBytes = 1024;
+constexpr std::chrono::milliseconds kLook{100};
 }  // namespace
 
 Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& content, const Deadline& deadline,
@@ -18,8 +21,12 @@ Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& c
   const std::size_t hash = std::hash<std::string>()(content);
   {
     const MutexLock lock(mutex_);
-    if (!ended_.wait_until(mutex_, deadline.at, [this]() RELMAP_REQUIRES(mutex_) { return !running_; }))
-      return {Reason::DEADLINE, "another edit is still running"};
+    // The turn may be long in coming: another edit may wait for a disk that does not answer.
+    while (running_) {
+      if (Status going = deadline.check(); !going.ok())
+        return {going.reason(), "another edit is still running; " + going.message()};
+      ended_.wait_until(mutex_, std::min(deadline.at, std::chrono::steady_clock::now() + kLook));
+    }
     const auto found = key.empty() ? done_.end() : done_.find(key);
     if (found != done_.end()) {
       if (found->second.content == hash) return found->second.sequence;

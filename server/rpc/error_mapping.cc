@@ -91,10 +91,12 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::CAMERA_FORBIDDEN:
       return grpc::StatusCode::PERMISSION_DENIED;
     case Reason::UNAUTHENTICATED:
+    case Reason::REPLAYED:
       return grpc::StatusCode::UNAUTHENTICATED;
     case Reason::BUDGET_EXCEEDED:
     case Reason::RATE_LIMITED:
     case Reason::DISK_FULL:
+    case Reason::TOO_MANY_FILES:
     case Reason::NO_BANDWIDTH:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::VIEW_EXPIRED:

@@ -69,7 +69,7 @@ Result<Identity> Gatekeeper::identify(const Evidence& evidence) const {
     identity.version = version_;
   }
   if (evidence.way == Evidence::Way::kSocket || (evidence.way == Evidence::Way::kOpen && open_)) {
-    identity.name = evidence.way == Evidence::Way::kSocket ? "local" : "anonymous";
+    identity.name = evidence.way == Evidence::Way::kSocket ? "local" : kAnonymous;
     identity.role = Role::kOperator;
     return identity;
   }

@@ -30,6 +30,9 @@ struct Evidence {
   std::string_view token;        // of "authorization: Bearer TOKEN"; empty: none. It decides if both are there
 };
 
+// The name of a caller over TCP without TLS.
+inline constexpr char kAnonymous[] = "anonymous";
+
 struct Identity {
   std::string name;
   Role role = Role::kReader;
@@ -53,6 +56,12 @@ class Gatekeeper {
   Status reload_if_changed();
   // Raised by each reload, after which identities may have been revoked.
   std::uint64_t version() const { return version_; }
+
+  // The list in force.
+  std::shared_ptr<const access::AccessList> list() const {
+    const MutexLock lock(mutex_);
+    return list_;
+  }
 
   // UNAUTHENTICATED with what is missing, unknown, expired or revoked.
   Result<Identity> identify(const Evidence& evidence) const;

@@ -6,11 +6,18 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <thread>
 
+#include "proto/base/mutex.h"
+#include "server/rpc/audit_log.h"
 #include "server/rpc/charge.h"
 #include "server/rpc/deadline.h"
 #include "server/rpc/gatekeeper.h"
@@ -24,14 +31,20 @@ namespace relmap::rpc {
 
 // The lanes of calls, which have separate threads and limits. Pictures are described one at a time by a thread of their
 // own, since this needs a fixed reserve of memory. Maintenance streams wait for hours of work on another thread, so
-// that no query waits behind them. Streams of keyframes last as long as a robot drives: they have a limit of their own,
-// but no deadline and no thread.
-enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest };
+// that no query waits behind them. Edits wait for the disk, and WaitIdle for all that was sent: each kind has threads
+// and a limit of its own, so that many of them hold up nothing else. Streams of keyframes last as long as a robot
+// drives: they have a limit of their own, but no deadline and no thread.
+enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest, kEdits, kWaits };
+
+class Call;
 
 class Gateway {
  public:
-  // `budget`, `metrics` and `gatekeeper` must outlive it.
-  Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics, const Gatekeeper& gatekeeper);
+  // `budget`, `metrics`, `gatekeeper` and `audit` must outlive it. `audit`: where edits and calls of operators are
+  // written down; null: nowhere.
+  Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics, const Gatekeeper& gatekeeper,
+          AuditLog* audit = nullptr);
+  ~Gateway();
 
   // From now on refuses new calls with SHUTTING_DOWN and interrupts running ones (Deadline::check()).
   void drain() { draining_ = true; }
@@ -51,15 +64,37 @@ class Gateway {
  private:
   friend class Call;
 
+  void watch();
+  void forget(Call* call);
+  // The calls of one caller, and the memory that they hold for replies.
+  struct Load {
+    int calls = 0;
+    std::size_t bytes = 0;
+  };
+  // Counts a call of this caller; BUDGET_EXCEEDED if it has as many as one may have, or half of the memory for replies.
+  Status enter(const std::string& caller, Lane lane, std::size_t bytes);
+  void leave(const std::string& caller, Lane lane, std::size_t bytes);
+
   const RpcLimits limits_;
   storage::Budget& budget_;
   Metrics& metrics_;
   const Gatekeeper& gatekeeper_;
+  AuditLog* const audit_;
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
   // Calls that are not answered yet; gRPC may hold a call a little longer.
-  std::atomic<int> running_{0}, pictures_{0}, ingest_{0};
-  TaskPool general_, picture_thread_, maintenance_thread_;  // declared last, so that they are joined first
+  std::atomic<int> running_{0}, pictures_{0}, ingest_{0}, edits_{0}, waits_{0};
+
+  Mutex mutex_;
+  ConditionVariable stop_;
+  bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
+  std::set<Call*> open_ RELMAP_GUARDED_BY(mutex_);                   // admitted, and not destroyed yet
+  Call* cancelling_ RELMAP_GUARDED_BY(mutex_) = nullptr;             // by watch_, which is about to cancel it
+  std::map<std::string, Load> callers_ RELMAP_GUARDED_BY(mutex_);    // calls that run, streams of keyframes apart
+  std::map<std::string, Load> streamers_ RELMAP_GUARDED_BY(mutex_);  // streams of keyframes
+  // Declared last, so that they are joined first.
+  TaskPool general_, picture_thread_, maintenance_thread_, edit_threads_, wait_threads_;
+  std::thread watch_;
 };
 
 // One call, unary or stream.
@@ -78,9 +113,14 @@ class Call {
   Status check_caller() const;
   const Deadline& deadline() const { return deadline_; }
   std::string peer() const { return context_->peer(); }
+  // What is asked, for the audit log, if the method is one that it has.
+  void asks(const google::protobuf::Message& request);
+  // A message was given to gRPC, or has left it. A call whose message does not leave in time is cancelled.
+  void writing() { writing_since_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
+  void written() { writing_since_ = 0; }
   void cancel() { cancelled_ = true; }
   void post(std::function<void()> task);
-  // Counts and logs the call, and returns what the caller gets. Must be called last, once.
+  // Counts and logs the call, and returns what the caller gets, to be written at once. Must be called last, once.
   grpc::Status end(const Status& status);
 
   // Runs `body`, which returns a Status, and turns exceptions into a Status.
@@ -88,9 +128,13 @@ class Call {
   Status guarded(Body body);
 
  private:
+  friend class Gateway;
+
   static Status from_current_exception();
-  Result<Identity> identify() const;
+  Status admit_caller(std::size_t bytes);
+  Status check_role(const Identity& caller) const;
   void leave();
+  bool stalled(std::chrono::steady_clock::time_point now) const;
 
   Gateway& gateway_;
   grpc::CallbackServerContext* const context_;
@@ -101,7 +145,11 @@ class Call {
   Identity caller_;
   std::atomic<bool> cancelled_{false};
   Deadline deadline_;
-  bool counted_ = false, running_ = false;
+  std::atomic<std::int64_t> writing_since_{0};  // 0: nothing is being written
+  bool counted_ = false, running_ = false, entered_ = false;
+  std::string entered_as_;  // whose calls it is counted among
+  std::size_t entered_bytes_ = 0;
+  std::string asked_;  // the request, for the audit log
   std::optional<Charge> charge_;
 };
 
@@ -125,6 +173,7 @@ grpc::ServerUnaryReactor* Gateway::unary(grpc::CallbackServerContext* context, c
     Call call;
   };
   auto* reactor = new Reactor(*this, context, method, lane);
+  reactor->call.asks(*request);
   if (Status status = reactor->call.admit(request->ByteSizeLong()); !status.ok()) {
     reactor->Finish(reactor->call.end(status));
     return reactor;
@@ -153,6 +202,7 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
     void OnCancel() override { call.cancel(); }
     void OnDone() override { delete this; }
     void OnWriteDone(bool ok) override {
+      call.written();
       if (!ok) call.cancel();
       call.post([this] { step(); });
     }
@@ -166,7 +216,10 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
         if (more) message = std::move(**next);
         return {};
       });
-      if (status.ok() && more) return this->StartWrite(&message);
+      if (status.ok() && more) {
+        call.writing();
+        return this->StartWrite(&message);
+      }
       producer = nullptr;
       this->Finish(call.end(status));
     }
@@ -175,6 +228,7 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
     Reply message;
   };
   auto* reactor = new Reactor(*this, context, method, lane);
+  reactor->call.asks(*request);
   if (Status status = reactor->call.admit(request->ByteSizeLong() + 2 * kUsualStreamMessageBytes); !status.ok()) {
     reactor->Finish(reactor->call.end(status));
     return reactor;

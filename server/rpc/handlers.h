@@ -118,7 +118,7 @@ Result<Producer<v1::VerifyReply>> repair_request(const v1::RepairRequest& reques
 Result<Producer<v1::Progress>> reindex_request(const v1::ReindexRequest& request, const Deadline& deadline,
                                                const DaemonFacts& facts);
 Result<Producer<v1::Progress>> backup(const v1::BackupRequest& request, const Deadline& deadline, map::Mapper& mapper,
-                                      MaintenanceTurn& maintenance);
+                                      MaintenanceTurn& maintenance, const DaemonFacts& facts);
 Result<Producer<v1::Progress>> compact(const v1::CompactRequest& request, const Deadline& deadline, map::Mapper& mapper,
                                        MaintenanceTurn& maintenance);
 Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest& request, const Deadline& deadline, map::Mapper& mapper,

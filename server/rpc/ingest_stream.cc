@@ -54,20 +54,20 @@ Status IngestStream::take(v1::IngestRequest& request) {
         return {Reason::BAD_SIZE, "a keyframe of " + std::to_string(keyframe.payload().size()) + " bytes; at most " +
                                       std::to_string(kMaxKeyframeBytes)};
       return leave_unless(intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
-                                              Bytes(keyframe.payload().begin(), keyframe.payload().end()), robot),
+                                              Bytes(keyframe.payload().begin(), keyframe.payload().end()), {robot}),
                           *uuid);
     }
     case v1::IngestRequest::kGap: {
       const auto gap = read_gap(request.gap());
       if (!gap.ok()) break;
       if (Status joined = join(gap->session); !joined.ok()) return joined;
-      return leave_unless(intake.take_gap(*gap, robot), gap->session);
+      return leave_unless(intake.take_gap(*gap, {robot}), gap->session);
     }
     case v1::IngestRequest::kEnd: {
       const auto ended = read_end(request.end());
       if (!ended.ok()) break;
       if (Status joined = join(ended->session); !joined.ok()) return joined;
-      return leave_unless(intake.take_end(*ended, robot), ended->session);
+      return leave_unless(intake.take_end(*ended, {robot}), ended->session);
     }
     case v1::IngestRequest::kHello:
     case v1::IngestRequest::CONTENT_NOT_SET:
@@ -156,10 +156,12 @@ void IngestStream::go_on() {
     return;
   }
   write_under_way_ = true;
+  call_.writing();
   StartWrite(&writing_);
 }
 
 void IngestStream::OnWriteDone(bool ok) {
+  call_.written();
   const MutexLock lock(mutex_);
   write_under_way_ = false;
   if (!ok) {

@@ -1,6 +1,7 @@
 #include "server/rpc/listener.h"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <grp.h>
 #include <netdb.h>
 #include <netinet/in.h>
@@ -28,16 +29,9 @@ constexpr int kBacklog = 512;
 constexpr std::chrono::milliseconds kPause{100};  // when nothing can be accepted, as without a free descriptor
 constexpr std::chrono::seconds kToldAgain{1};     // between messages of what is refused
 
-std::string error_text() { return std::strerror(errno); }
+int open_spare() { return open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
-Result<gid_t> group_of(const std::string& name) {
-  std::array<char, 4096> buffer{};
-  group entry{};
-  group* found = nullptr;
-  if (getgrnam_r(name.c_str(), &entry, buffer.data(), buffer.size(), &found) != 0 || !found)
-    return Status(Reason::BAD_CONFIG, "there is no group " + name);
-  return found->gr_gid;
-}
+std::string error_text() { return std::strerror(errno); }
 
 // Device and inode, which no other open file has.
 std::pair<dev_t, ino_t> identity_of(int descriptor) {
@@ -65,6 +59,15 @@ std::string peer_of(int connection) {
 }
 
 }  // namespace
+
+Result<gid_t> group_of(const std::string& name) {
+  std::array<char, 4096> buffer{};
+  group entry{};
+  group* found = nullptr;
+  if (getgrnam_r(name.c_str(), &entry, buffer.data(), buffer.size(), &found) != 0 || !found)
+    return Status(Reason::BAD_CONFIG, "there is no group " + name);
+  return found->gr_gid;
+}
 
 ListeningSocket::~ListeningSocket() {
   if (fd_ < 0) return;
@@ -140,7 +143,7 @@ std::uint16_t ListeningSocket::port() const {
 }
 
 Listener::Listener(std::vector<Source> sources, const ConnectionLimits& limits)
-    : sources_(std::move(sources)), limits_(limits), wake_(eventfd(0, EFD_CLOEXEC)) {
+    : sources_(std::move(sources)), limits_(limits), wake_(eventfd(0, EFD_CLOEXEC)), spare_(open_spare()) {
   if (wake_ < 0) throw StatusError(Status(Reason::IO_ERROR, "no eventfd: " + error_text()));
   thread_ = std::thread([this] { run(); });
 }
@@ -152,6 +155,7 @@ void Listener::stop() {
   eventfd_write(wake_, 1);
   thread_.join();
   close(wake_);
+  if (spare_ >= 0) close(spare_);
   sources_.clear();  // who connects from now on is refused, and need not wait
 }
 
@@ -171,7 +175,12 @@ void Listener::accept_from(const Source& source) {
   const int connection = accept4(source.socket.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (connection < 0) {
     if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;  // it has gone already
-    if (tells()) spdlog::error("no connection can be accepted: {}", error_text());
+    const int why = errno;
+    if (tells())
+      spdlog::error("{}: no connection can be accepted: {}",
+                    reason_name(why == EMFILE || why == ENFILE ? Reason::TOO_MANY_FILES : Reason::IO_ERROR),
+                    std::strerror(why));
+    if ((why == EMFILE || why == ENFILE) && turn_away(source.socket.fd())) return;
     pollfd wake{wake_, POLLIN, 0};
     poll(&wake, 1, static_cast<int>(kPause.count()));
     return;
@@ -190,6 +199,17 @@ void Listener::accept_from(const Source& source) {
   ++by_peer_[peer];
   open_.emplace(connection, Open{identity_of(connection), std::move(peer)});
   source.take(source.socket.fd(), connection);
+}
+
+// Where no file can be opened any more, a caller is told so at once, by the descriptor that is kept for this: it would
+// wait otherwise, and this thread would be woken for it again and again.
+bool Listener::turn_away(int listening) {
+  if (spare_ < 0) return false;
+  close(spare_);
+  const int connection = accept4(listening, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (connection >= 0) close(connection);
+  spare_ = open_spare();
+  return connection >= 0;
 }
 
 // Whether a message may be logged now; true once a second at most.

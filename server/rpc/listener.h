@@ -18,6 +18,9 @@
 
 namespace relmap::rpc {
 
+// The number of a group of users. BAD_CONFIG: there is none of this name.
+Result<gid_t> group_of(const std::string& name);
+
 // A socket that listens. Closed when destroyed, and its file removed.
 class ListeningSocket {
  public:
@@ -74,10 +77,12 @@ class Listener {
   std::map<int, Open>::iterator forget(std::map<int, Open>::iterator it);
   bool admit(const std::string& peer);
   bool tells();
+  bool turn_away(int listening);
 
   std::vector<Source> sources_;  // constant while the thread runs
   const ConnectionLimits limits_;
   int wake_ = -1;
+  int spare_ = -1;                              // for turn_away()
   std::map<int, Open> open_;                    // by descriptor
   std::map<std::string, std::size_t> by_peer_;  // how many of them
   std::chrono::steady_clock::time_point told_{};

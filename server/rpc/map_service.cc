@@ -38,16 +38,16 @@ class MapService final : public v1::Map::CallbackService {
     return unary(context, "Map.ListEdges", request, reply, list_edges);
   }
   Unary* SetEdgeState(Context* context, const v1::SetEdgeStateRequest* request, v1::SetEdgeStateReply* reply) override {
-    return unary(context, "Map.SetEdgeState", request, reply, set_edge_state);
+    return unary(context, "Map.SetEdgeState", request, reply, set_edge_state, Lane::kEdits);
   }
   Unary* ProposeEdge(Context* context, const v1::ProposeEdgeRequest* request, v1::ProposeEdgeReply* reply) override {
     return unary(context, "Map.ProposeEdge", request, reply, propose_edge, Lane::kPictures);
   }
   Unary* SetLabel(Context* context, const v1::SetLabelRequest* request, v1::SetLabelReply* reply) override {
-    return unary(context, "Map.SetLabel", request, reply, set_label);
+    return unary(context, "Map.SetLabel", request, reply, set_label, Lane::kEdits);
   }
   Unary* ImportGraph(Context* context, const v1::ImportGraphRequest* request, v1::ImportGraphReply* reply) override {
-    return unary(context, "Map.ImportGraph", request, reply, import_graph);
+    return unary(context, "Map.ImportGraph", request, reply, import_graph, Lane::kEdits);
   }
   Unary* FindLabels(Context* context, const v1::FindLabelsRequest* request, v1::FindLabelsReply* reply) override {
     return unary(context, "Map.FindLabels", request, reply, find_labels);

@@ -53,4 +53,6 @@ std::optional<Role> required_role(std::string_view method) {
   return found == kTable.end() ? std::nullopt : std::optional(found->role);
 }
 
+bool is_audited(std::string_view method) { return required_role(method) == Role::kOperator; }
+
 }  // namespace relmap::rpc

@@ -91,8 +91,8 @@ Status check_files(const TlsFiles& files) {
 
 struct RpcServer::Impl {
   // The mapper's budget outlives the server: the core holds both.
-  Impl(Core& core, const Gatekeeper& gatekeeper)
-      : gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper) {}
+  Impl(Core& core, const Gatekeeper& gatekeeper, AuditLog* audit)
+      : gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, audit) {}
 
   Gateway gateway;
   std::vector<std::unique_ptr<grpc::Service>> services;
@@ -109,7 +109,7 @@ RpcServer::~RpcServer() { stop(std::chrono::milliseconds(0)); }
 Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper& gatekeeper,
                                                     const ServerOptions& options) {
   enable_plugins();
-  auto impl = std::make_unique<Impl>(core, gatekeeper);
+  auto impl = std::make_unique<Impl>(core, gatekeeper, options.audit);
   impl->services.push_back(make_map_service(core, impl->gateway));
   impl->services.push_back(make_ingest_service(core, impl->gateway));
   impl->services.push_back(make_admin_service(core, impl->gateway));

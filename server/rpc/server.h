@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "server/rpc/audit_log.h"
 #include "server/rpc/core.h"
 #include "server/rpc/gatekeeper.h"
 #include "server/rpc/listener.h"
@@ -25,6 +26,7 @@ struct ServerOptions {
   std::uint16_t port = 0;         // 0 means any free port
   TlsFiles tls = {};
   ConnectionLimits connections = {};
+  AuditLog* audit = nullptr;  // outlives the server; null: none
 };
 
 // BAD_CONFIG unless the files can be read and belong together; nothing is checked without TLS.

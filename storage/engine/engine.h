@@ -57,6 +57,23 @@ struct EngineStats {
   std::vector<std::pair<std::string, std::string>> properties;  // specific to the engine, for people to read
 };
 
+// A folder that is to be made.
+struct NewFolder {
+  NewFolder(std::string folder, std::vector<std::string> folders = {})  // NOLINT: a path is one anywhere
+      : path(std::move(folder)), roots(std::move(folders)) {}
+
+  std::string path;
+  // Not empty: it may only be made below one of these, by a path without links, through folders that only this user or
+  // root can change. So whoever may ask for copies, but is not this user, cannot have anything else overwritten.
+  std::vector<std::string> roots;
+};
+
+// The number that follows `last` after so many that are skipped. BUDGET_EXCEEDED if there is none.
+inline Result<SessionNumber> next_session(SessionNumber last, SessionNumber skipped) {
+  if (~last <= skipped) return Status(Reason::BUDGET_EXCEEDED, "no session numbers are left");
+  return last + skipped + 1;
+}
+
 class Engine {
  public:
   virtual ~Engine() = default;
@@ -86,14 +103,16 @@ class Engine {
   virtual std::uint64_t applied_sequence() const = 0;  // of the last commit
   virtual std::shared_ptr<const EngineSnapshot> snapshot() const = 0;
 
-  // Returns a session number that was never returned before, and makes that durable. Numbers begin at 1.
-  virtual Result<SessionNumber> allocate_session(std::uint64_t epoch) = 0;
+  // Returns a session number that was never returned before, and makes that durable. Numbers begin at 1; `skipped` of
+  // them are passed over, and are never returned either. BUDGET_EXCEEDED if there are not so many left.
+  virtual Result<SessionNumber> allocate_session(std::uint64_t epoch, SessionNumber skipped = 0) = 0;
 
-  // Copies the store to `directory`, which must be missing or empty and must not overlap the store (INVALID_ARGUMENT).
+  // Copies the store to a folder, which must be missing or empty and must not overlap the store (INVALID_ARGUMENT), and
+  // must be one that may be made (NOT_ALLOWED).
   // Appends and commits go on meanwhile. The copy holds everything that was durable before the call and, where all of
   // the map can be read, the hash of its map. The directory gets its name when the copy is complete and durable.
   // UNSUPPORTED if the engine cannot make copies.
-  virtual Status checkpoint(const std::string& directory, const EngineProgress& progress) = 0;
+  virtual Status checkpoint(const NewFolder& to, const EngineProgress& progress) = 0;
   // Frees the space of what was replaced and deleted, as far as no snapshot holds it. Commits go on meanwhile.
   // DISK_FULL if there is no room for a second copy of what is kept.
   virtual Status compact(const EngineProgress& progress) = 0;

@@ -75,13 +75,15 @@ class MemoryEngine final : public Engine {
     return std::make_shared<TableSnapshot>(table_, commits_);
   }
 
-  Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
+  Result<SessionNumber> allocate_session(std::uint64_t epoch, SessionNumber skipped) override {
     const MutexLock lock(mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
-    return ++session_;
+    const auto next = next_session(session_, skipped);
+    if (next.ok()) session_ = *next;
+    return next;
   }
 
-  Status checkpoint(const std::string&, const EngineProgress&) override {
+  Status checkpoint(const NewFolder&, const EngineProgress&) override {
     return Status(Reason::UNSUPPORTED, "the memory engine keeps nothing that could be copied to a folder");
   }
   Status compact(const EngineProgress&) override { return {}; }  // a table holds no replaced values

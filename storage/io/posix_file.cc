@@ -22,6 +22,9 @@ Reason reason_of(int error) {
       return Reason::DISK_FULL;
     case EROFS:
       return Reason::READ_ONLY;
+    case EMFILE:
+    case ENFILE:
+      return Reason::TOO_MANY_FILES;
     default:
       return Reason::IO_ERROR;
   }

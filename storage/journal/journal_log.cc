@@ -240,6 +240,18 @@ Status JournalLog::trim(std::uint64_t through) {
   return {};
 }
 
+Status JournalLog::leave_applied() {
+  std::uint64_t last = 0;
+  {
+    const MutexLock lock(mutex_);
+    if (options_.read_only || !loss_.ok() || first_ <= last_) return {};
+    if (!segments_.empty() && segments_.back().first > last_) return {};  // it holds none
+    if (Status begun = begin_segment(); !begun.ok()) return begun;
+    last = last_;
+  }
+  return trim(last);
+}
+
 Result<std::vector<JournalLog::KeptFile>> JournalLog::keep() const {
   const MutexLock lock(mutex_);
   std::vector<KeptFile> kept;

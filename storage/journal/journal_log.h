@@ -42,6 +42,10 @@ class JournalLog {
   // Deletes the segments that hold nothing above `through`. Other records up to `through` can no longer be read either.
   Status trim(std::uint64_t through);
 
+  // Where all records are trimmed, deletes the last segment that held any, too, and begins a new one. The bytes of a
+  // record are then not on the disk any more.
+  Status leave_applied();
+
   // The files that hold the records from first() on, open: they can be read even if they are trimmed later. Of each
   // file, the first `bytes` bytes are durable.
   struct KeptFile {

@@ -128,6 +128,7 @@ Result<SegmentReader> SegmentReader::open(const FileSystem& files, const std::st
 Result<std::optional<SegmentRecord>> SegmentReader::record_at(std::uint64_t offset) const {
   const std::size_t salt_size = salt_ ? kSaltBytes : 0;
   const std::size_t head_size = salt_size + kRecordHeaderBytes;
+  if (searched_ && searched_->begin <= offset) return searched_at(offset, 0, ~std::uint64_t{0});
   if (offset > size() || size() - offset < head_size) return std::optional<SegmentRecord>();
   const auto head = file_->read(offset, head_size);
   if (!head.ok()) return head.status();
@@ -146,31 +147,45 @@ Result<std::optional<SegmentRecord>> SegmentReader::record_at(std::uint64_t offs
       {h.sequence, h.acknowledged_through, offset, offset + head_size + h.length, std::move(*payload)});
 }
 
+// The record at `offset` of what was read for a search, if its sequence is after `after`, by at most `far`.
+std::optional<SegmentRecord> SegmentReader::searched_at(std::uint64_t offset, std::uint64_t after,
+                                                        std::uint64_t far) const {
+  const std::size_t salt_size = salt_ ? kSaltBytes : 0;
+  const std::size_t head_size = salt_size + kRecordHeaderBytes;
+  const std::size_t at = offset - searched_->begin;
+  const ByteSpan all(searched_->bytes);
+  if (at > all.size() || all.size() - at < head_size) return std::nullopt;
+  const ByteSpan head = all.subspan(at, head_size);
+  ByteReader r(head);
+  if (salt_ && r.get<std::uint64_t>() != *salt_) return std::nullopt;
+  const RecordHeader h = get_record_header(r);
+  if (h.sequence <= after || h.sequence - after > far || h.acknowledged_through >= h.sequence ||
+      h.length > kMaxRecordBytes || h.length > all.size() - at - head_size)
+    return std::nullopt;
+  const std::uint32_t of_head =
+      record_crc(head.first(salt_size + sizeof h.length), head.subspan(salt_size + sizeof h.length + sizeof h.crc), {});
+  if (h.crc != searched_->crc.of(at + head_size, h.length, of_head)) return std::nullopt;
+  const ByteSpan payload = all.subspan(at + head_size, h.length);
+  return SegmentRecord{
+      h.sequence, h.acknowledged_through, offset, offset + head_size + h.length, {payload.begin(), payload.end()}};
+}
+
 Result<std::optional<SegmentRecord>> SegmentReader::find_after(std::uint64_t offset, std::uint64_t after) const {
   constexpr std::uint64_t kFar = 1u << 24;  // more records than a segment can hold: a sequence beyond is not one
   if (offset >= size()) return std::optional<SegmentRecord>();
-  const auto rest = file_->read(offset, size() - offset);
-  if (!rest.ok()) return rest.status();
-  const auto found_at = [&](std::size_t i) -> Result<std::optional<SegmentRecord>> {
-    ByteReader r(ByteSpan(*rest).subspan(i + (salt_ ? kSaltBytes : 0)));
-    const RecordHeader h = get_record_header(r);
-    if (!r.ok() || h.sequence <= after || h.sequence - after > kFar) return std::optional<SegmentRecord>();
-    return record_at(offset + i);
-  };
-  if (salt_) {
-    const auto salt = salt_bytes(*salt_);
-    for (auto at = rest->begin();; ++at) {
-      at = std::search(at, rest->end(), salt.begin(), salt.end());
-      if (at == rest->end()) return std::optional<SegmentRecord>();
-      auto record = found_at(static_cast<std::size_t>(at - rest->begin()));
-      if (!record.ok() || *record) return record;
-    }
+  if (!searched_ || searched_->begin > offset) {
+    auto rest = file_->read(offset, size() - offset);
+    if (!rest.ok()) return rest.status();
+    searched_ = std::make_unique<Searched>(offset, std::move(*rest));
   }
-  for (std::size_t i = 0; i + kRecordHeaderBytes <= rest->size(); ++i) {
-    auto record = found_at(i);
-    if (!record.ok() || *record) return record;
+  const Bytes& bytes = searched_->bytes;
+  const auto salt = salt_bytes(salt_.value_or(0));
+  for (auto at = bytes.begin() + static_cast<std::ptrdiff_t>(offset - searched_->begin);; ++at) {
+    if (salt_) at = std::search(at, bytes.end(), salt.begin(), salt.end());
+    if (at == bytes.end()) return std::optional<SegmentRecord>();
+    auto record = searched_at(searched_->begin + static_cast<std::uint64_t>(at - bytes.begin()), after, kFar);
+    if (record) return record;
   }
-  return std::optional<SegmentRecord>();
 }
 
 }  // namespace relmap::storage

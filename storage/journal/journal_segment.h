@@ -11,10 +11,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "proto/base/bytes.h"
 #include "proto/base/status.h"
 #include "storage/io/file.h"
+#include "storage/journal/range_crc.h"
 
 namespace relmap::storage {
 
@@ -52,10 +54,22 @@ class SegmentReader {
   std::uint64_t first_offset() const;  // of the first record
   // The record at `offset`; nullopt if none begins there, or if it is damaged or cut off.
   Result<std::optional<SegmentRecord>> record_at(std::uint64_t offset) const;
-  // The first whole record at `offset` or behind it whose sequence is above `after`; nullopt if there is none.
+  // The first whole record at `offset` or behind it whose sequence is above `after`; nullopt if there is none. The
+  // first call reads the file from there on into memory. Whatever the bytes say, the calls of this and of record_at()
+  // that follow, each further on, together take a time in proportion to the file's size. Not thread-safe.
   Result<std::optional<SegmentRecord>> find_after(std::uint64_t offset, std::uint64_t after) const;
 
  private:
+  // The file from `begin` on, once a search has read it.
+  struct Searched {
+    Searched(std::uint64_t from, Bytes rest) : begin(from), bytes(std::move(rest)), crc(bytes) {}
+    const std::uint64_t begin;
+    const Bytes bytes;
+    const RangeCrc crc;
+  };
+  std::optional<SegmentRecord> searched_at(std::uint64_t offset, std::uint64_t after, std::uint64_t far) const;
+
+  mutable std::unique_ptr<const Searched> searched_;
   std::unique_ptr<ReadFile> file_;
   std::optional<std::uint64_t> salt_;
   bool header_whole_ = false;

@@ -1,8 +1,10 @@
 #include "storage/maintenance/journal_repair.h"
 
 #include <algorithm>
+#include <deque>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "storage/journal/journal_log.h"
 #include "storage/journal/journal_record.h"
@@ -10,6 +12,11 @@
 
 namespace relmap::storage {
 namespace {
+
+// A journal is trimmed once a second, so a name or a record is wrong that claims that more records than these were
+// durable and are lost. Without a limit, one such number would have the repair write substitutes for ever.
+constexpr std::uint64_t kMostLost = 1u << 24;
+constexpr std::size_t kGroup = 1024;  // records that are written at a time
 
 // Where a whole record stands.
 struct Place {
@@ -20,37 +27,54 @@ struct Place {
 struct Contents {
   std::map<std::uint64_t, Place> whole;  // by sequence, those behind `applied`
   std::uint64_t durable = 0;             // the highest sequence known to have been durable
+  bool left_out = false;                 // a segment that cannot belong to the journal
 };
 
 // Finds every record that can still be read. Where segments overlap, the later one has what was written last.
-Result<Contents> read_all(const FileSystem& files, const std::string& directory, std::uint64_t applied) {
+Result<Contents> read_all(const FileSystem& files, const std::string& directory, std::uint64_t applied,
+                          const OnFinding& on_finding) {
   Contents contents;
   contents.durable = applied;
   const auto names = files.list(directory);
   if (names.reason() == Reason::NO_SUCH_FILE) return contents;
   if (!names.ok()) return names.status();
+  const auto last_known = [&] {
+    return std::max(contents.durable, contents.whole.empty() ? applied : contents.whole.rbegin()->first);
+  };
   for (const std::string& name : *names) {
     const auto parsed = SegmentName::parse(name);
     if (!parsed) continue;
     const std::uint64_t first = parsed->first;
+    const std::string path = directory + "/" + name;
+    if (first > last_known() && first - last_known() > kMostLost) {
+      contents.left_out = true;
+      if (on_finding)
+        on_finding(
+            {Reason::DATA_LOSS,
+             {},
+             path + " claims to begin at record " + std::to_string(first) + ", far behind all others, and is left out",
+             true});
+      continue;
+    }
     contents.durable = std::max(contents.durable, first - 1);  // a segment is begun when all before it is durable
     contents.whole.erase(contents.whole.lower_bound(first), contents.whole.end());
-    const std::string path = directory + "/" + name;
     const auto reader = SegmentReader::open(files, path);
     if (reader.reason() == Reason::CORRUPT) continue;  // not the segment that its name says: its records do not count
     if (!reader.ok()) return reader.status();
     std::uint64_t previous = first - 1;
     for (std::uint64_t offset = reader->first_offset();;) {
       auto record = reader->record_at(offset);
-      if (record.ok() && (!*record || (*record)->sequence <= previous)) record = reader->find_after(offset, previous);
+      if (record.ok() && (!*record || (*record)->sequence <= previous || (*record)->sequence - previous > kMostLost))
+        record = reader->find_after(offset, previous);
       if (!record.ok()) return record.status();
       if (!*record) break;
       const SegmentRecord& found = **record;
+      offset = found.end;
+      if (found.sequence - previous > kMostLost) continue;
       contents.durable = std::max(contents.durable, found.acknowledged_through);
       if (found.sequence > applied && decode_record(found.payload).ok())
         contents.whole[found.sequence] = {path, found.offset};
       previous = found.sequence;
-      offset = found.end;
     }
   }
   // The rest of the last group may have been acknowledged, if it is whole. What is torn behind it was not.
@@ -76,15 +100,16 @@ class JournalRepair {
     if (!log.ok()) return log.status();
     JournalCopy copy;
     copy.sound = false;
+    if (Status indexed = index(); !indexed.ok()) return indexed;
+    std::vector<Bytes> group;
     for (std::uint64_t sequence = applied_ + 1; sequence <= contents_.durable; ++sequence) {
       if (on_progress_ && !on_progress_({"journal", sequence - applied_, contents_.durable - applied_, "records"}))
         return Status(Reason::SHUTTING_DOWN, "the repair was stopped; it can be run again");
-      Bytes bytes;
       if (const auto place = contents_.whole.find(sequence); place != contents_.whole.end()) {
         auto read = read_at(place->second);
         if (!read.ok()) return read.status();
-        bytes = std::move(*read);
-        if (const auto decoded = decode_record(bytes); decoded.ok()) note(decoded->record);
+        if (const auto decoded = decode_record(*read); decoded.ok()) note(decoded->record);
+        group.push_back(std::move(*read));
         substitutes_.clear();
       } else {
         if (copy.lost.empty() || copy.lost.back().last + 1 != sequence) {
@@ -93,10 +118,12 @@ class JournalRepair {
           if (!looked.ok()) return looked;
         }
         copy.lost.back().last = sequence;
-        bytes = encode_record(next_substitute(), sequence - 1);
+        group.push_back(encode_record(next_substitute(), sequence - 1));
       }
-      const auto appended = (*log)->append({&bytes, 1});
+      if (group.size() < kGroup && sequence < contents_.durable) continue;
+      const auto appended = (*log)->append(group);
       if (!appended.ok()) return appended.status();
+      group.clear();
     }
     for (const RecordRange& range : copy.lost)
       tell("journal records " + std::to_string(range.first) + ".." + std::to_string(range.last) +
@@ -106,6 +133,14 @@ class JournalRepair {
   }
 
  private:
+  // Where frames of a session begin: in this record, with this frame.
+  struct Begins {
+    enum Kind : std::uint8_t { kSession, kKeyframe, kSkipped };
+    std::uint64_t sequence = 0;
+    std::uint32_t frame = 0;
+    Kind kind = kSession;
+  };
+
   void tell(const std::string& what) {
     if (on_finding_) on_finding_({Reason::DATA_LOSS, {}, what, true});
   }
@@ -132,47 +167,68 @@ class JournalRepair {
     if (known != expected_.end()) known->second = std::max(known->second, std::uint64_t{sequence} + 1);
   }
 
-  // Works out what the records of a hole must have been, from the first record of each session behind the hole.
-  Status find_substitutes(std::uint64_t hole) {
-    substitutes_.clear();
-    std::map<SessionNumber, bool> seen;
-    for (auto place = contents_.whole.upper_bound(hole); place != contents_.whole.end(); ++place) {
-      const auto bytes = read_at(place->second);
+  // Notes where the frames of each session begin again, so that a hole is filled without reading all that is behind it.
+  Status index() {
+    for (const auto& [sequence, place] : contents_.whole) {
+      const auto bytes = read_at(place);
       if (!bytes.ok()) return bytes.status();
       const auto decoded = decode_record(*bytes);
       if (!decoded.ok()) continue;
       const JournalRecord& record = decoded->record;
-      if (const auto* begun = std::get_if<SessionRecord>(&record)) seen[begun->number] = true;
-      if (const auto* gap = std::get_if<GapRecord>(&record)) bridge(seen, gap->session, gap->from, nullptr);
+      if (const auto* begun = std::get_if<SessionRecord>(&record))
+        sessions_[begun->number].push_back({sequence, 0, Begins::kSession});
+      if (const auto* gap = std::get_if<GapRecord>(&record))
+        sessions_[gap->session].push_back({sequence, gap->from, Begins::kSkipped});
       if (const auto* refusal = std::get_if<RefusalRecord>(&record))
-        bridge(seen, refusal->session, refusal->sequence, nullptr);
+        sessions_[refusal->session].push_back({sequence, refusal->sequence, Begins::kSkipped});
       if (const auto* keyframe = std::get_if<KeyframeRecord>(&record))
         if (const auto frame = decode_keyframe(keyframe->payload); frame.ok())
-          bridge(seen, keyframe->session, frame->sequence, &frame->session);
+          sessions_[keyframe->session].push_back({sequence, frame->sequence, Begins::kKeyframe});
     }
     return {};
   }
-  void bridge(std::map<SessionNumber, bool>& seen, SessionNumber session, std::uint32_t sequence,
-              const SessionHeader* header) {
-    if (seen[session]) return;
-    if (!expected_.contains(session)) {  // the session began in the hole
-      if (!header) return;
-      expected_[session] = 0;
-      substitutes_.push_back(SessionRecord{session, header->name, *header});
+
+  // Works out what the records of a hole must have been, from the first record of each session behind the hole.
+  Status find_substitutes(std::uint64_t hole) {
+    substitutes_.clear();
+    // In the order of the records behind the hole: a hole has room for those that come before the next hole.
+    std::map<std::uint64_t, std::pair<SessionNumber, const Begins*>> behind;
+    for (const auto& [session, begins] : sessions_) {
+      auto next = std::upper_bound(begins.begin(), begins.end(), hole,
+                                   [](std::uint64_t sequence, const Begins& one) { return sequence < one.sequence; });
+      // A session that began in the hole is known again by its first keyframe.
+      if (next != begins.end() && !expected_.contains(session) && next->kind == Begins::kSkipped)
+        next = std::find_if(next, begins.end(), [](const Begins& one) { return one.kind != Begins::kSkipped; });
+      if (next != begins.end() && next->kind != Begins::kSession) behind[next->sequence] = {session, &*next};
     }
-    seen[session] = true;
+    for (const auto& [sequence, next] : behind)
+      if (Status bridged = bridge(next.first, *next.second); !bridged.ok()) return bridged;
+    return {};
+  }
+  Status bridge(SessionNumber session, const Begins& begins) {
+    if (!expected_.contains(session)) {
+      const auto bytes = read_at(contents_.whole.at(begins.sequence));
+      if (!bytes.ok()) return bytes.status();
+      const auto decoded = decode_record(*bytes);
+      if (!decoded.ok()) return decoded.status();
+      const auto keyframe = decode_keyframe(std::get<KeyframeRecord>(decoded->record).payload);
+      if (!keyframe.ok()) return keyframe.status();
+      expected_[session] = 0;
+      substitutes_.push_back(SessionRecord{session, keyframe->session.name, keyframe->session});
+    }
     const std::uint64_t next = expected_[session];
-    if (next >= sequence) return;
-    const GapRecord gap{session, static_cast<std::uint32_t>(next), sequence - 1, Reason::DATA_LOSS};
+    if (next >= begins.frame) return {};
+    const GapRecord gap{session, static_cast<std::uint32_t>(next), begins.frame - 1, Reason::DATA_LOSS};
     tell("frames " + FrameId{session, gap.from}.to_string() + ".." + std::to_string(gap.to) +
          " are lost with their journal records; they are recorded as a gap");
     substitutes_.push_back(gap);
+    return {};
   }
   // Each substitute stands for at least one record that was lost, so there is room for all.
   JournalRecord next_substitute() {
     if (substitutes_.empty()) return IdleWorkRecord{0};
     JournalRecord record = std::move(substitutes_.front());
-    substitutes_.erase(substitutes_.begin());
+    substitutes_.pop_front();
     note(record);
     return record;
   }
@@ -183,8 +239,9 @@ class JournalRepair {
   const Contents& contents_;
   const OnFinding& on_finding_;
   const OnProgress& on_progress_;
-  std::map<SessionNumber, std::uint64_t> expected_;  // next sequence
-  std::vector<JournalRecord> substitutes_;           // for the hole at hand
+  std::map<SessionNumber, std::uint64_t> expected_;        // next sequence
+  std::map<SessionNumber, std::vector<Begins>> sessions_;  // of the whole records, in their order
+  std::deque<JournalRecord> substitutes_;                  // for the hole at hand
 };
 
 }  // namespace
@@ -192,11 +249,11 @@ class JournalRepair {
 Result<JournalCopy> repair_journal(const std::shared_ptr<FileSystem>& files, const std::string& from,
                                    const std::string& to, std::uint64_t applied, const std::vector<Session>& sessions,
                                    const OnFinding& on_finding, const OnProgress& on_progress) {
-  const auto contents = read_all(*files, from, applied);
+  const auto contents = read_all(*files, from, applied, on_finding);
   if (!contents.ok()) return contents.status();
-  // All records from applied + 1 to the last durable one are whole. At most a tail that was not acknowledged is cut off
-  // when the engine opens.
-  if (contents->whole.size() == contents->durable - applied) {
+  // If all records from applied + 1 to the last durable one are whole, at most a tail that was not acknowledged is cut
+  // off when the engine opens.
+  if (contents->whole.size() == contents->durable - applied && !contents->left_out) {
     JournalCopy copy;
     copy.last = contents->durable;
     return copy;

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 // What a first start makes before FORMAT is in the folder, and what a file system has in its root.
 bool may_be_in_a_new_folder(const std::string& name) {
-  return name == "LOCK" || name == "FORMAT.new" || name == "lost+found";
+  return name == "LOCK" || name == "FORMAT.new" || name == "lost+found" || name == "PARTIAL";
 }
 
 // Whether a map's own files are there: the database's, or segments of the journal.

@@ -17,6 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr SessionNumber kSkippedSessions = 1u << 20;
+
 // The files of a map, relative to its folder. The file of the present owner (LOCK) is left out.
 std::vector<std::string> files_of_map(const std::string& folder) {
   std::vector<std::string> files{"FORMAT"};
@@ -62,6 +64,8 @@ Result<MapIdentity> mark_restored(Engine& engine, std::uint64_t now_us) {
   const Put put{keys::map_state(), encode_state(*state)};
   const Status done = engine.commit(*owner, engine.applied_sequence(), std::span(&put, 1), {});
   if (!done.ok()) return done;
+  // What the map that was backed up has given out since must not be given out again: someone may have noted it.
+  if (const auto skipped = engine.allocate_session(*owner, kSkippedSessions); !skipped.ok()) return skipped.status();
   return state->identity;
 }
 
@@ -98,9 +102,9 @@ Result<Restored> restore_folder(const std::string& backup, const std::string& to
   if (!owned.ok()) return owned.status();
   const auto copy = PartialFolder::begin(to, backup);
   if (!copy.ok()) return copy.status();
-  if (Status copied = copy_files(backup, (*copy)->path(), progress); !copied.ok()) return copied;
+  if (Status copied = copy_files(backup, (*copy)->path(), progress); !copied.ok()) return (*copy)->named(copied);
   const auto restored = mark((*copy)->path(), now_us);
-  if (!restored.ok()) return restored.status();
+  if (!restored.ok()) return (*copy)->named(restored.status());
   if (Status complete = (*copy)->complete(); !complete.ok()) return complete;
   return *restored;
 } catch (const fs::filesystem_error& error) {

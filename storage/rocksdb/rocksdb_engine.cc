@@ -128,7 +128,7 @@ class RocksDbEngine final : public Engine {
         root_(root),
         snapshot_(std::make_shared<RocksDbSnapshot>(database_, root_.commits)),
         resumption_(database_->db()),
-        reclaimer_(*database_->map) {}
+        reclaimer_(*database_->map, *journal_, !read_only_.ok(), options_.now) {}
 
   Result<std::uint64_t> acquire() override {
     const MutexLock append_lock(append_mutex_),
@@ -175,12 +175,17 @@ class RocksDbEngine final : public Engine {
     for (const Put& put : puts)
       batch.Put(database_->map->family(put.key), put.key,
                 rocksdb::Slice(reinterpret_cast<const char*>(put.value.data()), put.value.size()));
-    for (const std::string& key : deletes) batch.Delete(database_->map->family(key), key);
+    bool deleted_for_good = false;  // of what is written once
+    for (const std::string& key : deletes) {
+      auto* const family = database_->map->family(key);
+      deleted_for_good |= family == database_->map->families().back();
+      batch.Delete(family, key);
+    }
     Root next = root;
     next.applied = applied_sequence;
     ++next.commits;
     if (Status status = write(next, batch); !status.ok()) return status;
-    reclaimer_.look();
+    reclaimer_.look(deleted_for_good);
     return {};
   }
 
@@ -194,39 +199,23 @@ class RocksDbEngine final : public Engine {
     return snapshot_;
   }
 
-  Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
+  Result<SessionNumber> allocate_session(std::uint64_t epoch, SessionNumber skipped) override {
     const MutexLock lock(write_mutex_);
     Root next = writers_root();
     if (Status owner = check_owner(epoch, next); !owner.ok()) return owner;
     if (Status room = database_->space->check(); !room.ok()) return room;
-    ++next.session;
+    const auto number = next_session(next.session, skipped);
+    if (!number.ok()) return number;
+    next.session = *number;
     rocksdb::WriteBatch batch;
     if (Status status = write(next, batch); !status.ok()) return status;
     return next.session;
   }
 
-  // The journal's files are opened first: what is applied and trimmed before the map is looked at is then in the map.
-  Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
-    const auto journal = journal_->keep();
-    if (!journal.ok()) return journal.status();
-    const auto folder = PartialFolder::begin(directory, directory_);
+  Status checkpoint(const NewFolder& to, const EngineProgress& progress) override {
+    const auto folder = PartialFolder::begin(to, directory_);
     if (!folder.ok()) return folder.status();
-    if (Status format = check_format((*folder)->path(), false); !format.ok()) return format;
-    const auto live = LiveFiles::hold(database_->db());
-    if (!live.ok()) return live.status();
-    std::uint64_t done = 0, total = (*live)->bytes();
-    for (const JournalLog::KeptFile& file : *journal) total += file.bytes;
-    const auto copied = [&](std::uint64_t bytes) { return progress(done += bytes, total); };
-    if (Status status = (*live)->copy_to((*folder)->path() + "/map", copied); !status.ok()) return status;
-    const auto disk = posix_file_system();
-    const std::string journal_folder = (*folder)->path() + "/journal/";
-    if (Status made = disk->create_directory(journal_folder); !made.ok()) return made;
-    for (const JournalLog::KeptFile& file : *journal) {
-      const Status status = copy_file(*file.file, file.bytes, *disk, journal_folder + file.name, copied);
-      if (!status.ok()) return status;
-    }
-    if (Status hashed = record_hash((*folder)->path(), [&] { return progress(total, total); }); !hashed.ok())
-      return hashed;
+    if (Status copied = copy_to((*folder)->path(), progress); !copied.ok()) return (*folder)->named(copied);
     return (*folder)->complete();
   }
 
@@ -254,6 +243,27 @@ class RocksDbEngine final : public Engine {
   // The root for holders of write_mutex_, who need not lock mutex_ too: nobody else changes it. Clang cannot be told of
   // a field that two mutexes guard so.
   const Root& writers_root() const RELMAP_REQUIRES(write_mutex_) RELMAP_NO_THREAD_SAFETY_ANALYSIS { return root_; }
+
+  // The journal's files are opened first: what is applied and trimmed before the map is looked at is then in the map.
+  Status copy_to(const std::string& folder, const EngineProgress& progress) {
+    const auto journal = journal_->keep();
+    if (!journal.ok()) return journal.status();
+    if (Status format = check_format(folder, false); !format.ok()) return format;
+    const auto live = LiveFiles::hold(database_->db());
+    if (!live.ok()) return live.status();
+    std::uint64_t done = 0, total = (*live)->bytes();
+    for (const JournalLog::KeptFile& file : *journal) total += file.bytes;
+    const auto copied = [&](std::uint64_t bytes) { return progress(done += bytes, total); };
+    if (Status status = (*live)->copy_to(folder + "/map", copied); !status.ok()) return status;
+    const auto disk = posix_file_system();
+    const std::string journal_folder = folder + "/journal/";
+    if (Status made = disk->create_directory(journal_folder); !made.ok()) return made;
+    for (const JournalLog::KeptFile& file : *journal) {
+      const Status status = copy_file(*file.file, file.bytes, *disk, journal_folder + file.name, copied);
+      if (!status.ok()) return status;
+    }
+    return record_hash(folder, [&] { return progress(total, total); });
+  }
 
   Status check_owner(std::uint64_t epoch, const Root& root) const {
     if (!read_only_.ok()) return read_only_;
@@ -413,8 +423,8 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
 }
 
 bool may_be_readable(Reason reason) {
-  return reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::DISK_FULL ||
-         reason == Reason::READ_ONLY;
+  return reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::TOO_MANY_FILES ||
+         reason == Reason::DISK_FULL || reason == Reason::READ_ONLY;
 }
 
 }  // namespace

@@ -8,7 +8,9 @@
 //   DIR/HASH      in a backup: the hash of its map
 #pragma once
 
+#include <chrono>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -35,6 +37,8 @@ struct RocksDbOptions {
   int format = 0;  // of the folder; 0: that of this build. An older one is opened only to be read and migrated
   // False only in the test which shows that durability is tested: then syncs of journal and commits do nothing.
   bool sync = true;
+  // By which what was deleted is off the disk in time (reclaimer.h); tests have their own.
+  std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
   // Direct I/O for reads and compactions, where the file system has it.
   bool direct_io = true;
   // The file systems under the journal and RocksDB, and that in which DIR and DIR/map are created; null: the machine's

@@ -2,12 +2,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <map>
+#include <random>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "storage/journal/journal_record.h"
 #include "storage/maintenance/verify.h"
@@ -206,6 +212,8 @@ TEST(RocksDbEngine, WhatIsRestoredIsTheMapWithAHigherEpoch) {
     EXPECT_EQ(map->state().keyframes, 3u);
     EXPECT_EQ(hash_map(*map), hash);
     EXPECT_EQ(agrees_with_recorded_hash(folder / name, *engine->snapshot(), patient).value(), true);
+    EXPECT_GT(engine->allocate_session(engine->acquire().value()).value(), 1u << 20)
+        << "the map that was backed up may have given out others since";
   }
   EXPECT_FALSE(fs::exists(folder / "early.partial"));
 }
@@ -267,9 +275,204 @@ TEST(RocksDbEngine, AnUnfinishedCheckpointIsNeverTakenForAWholeOne) {
   std::ofstream(folder / "copy.partial/map/000001.sst") << "half a table";
   EXPECT_EQ(engine->checkpoint(folder / "copy", patient).reason(), Reason::INVALID_ARGUMENT);
   std::ofstream(folder / "copy.partial/LOCK");
+  EXPECT_EQ(engine->checkpoint(folder / "copy", patient).reason(), Reason::INVALID_ARGUMENT)
+      << "any file may be called so";
+  EXPECT_TRUE(fs::exists(folder / "copy.partial/map/000001.sst"));
+  std::ofstream(folder / "copy.partial/PARTIAL") << "relmap partial folder 1\n";
   EXPECT_TRUE(engine->checkpoint(folder / "copy/", patient).ok());
   EXPECT_FALSE(fs::exists(folder / "copy/map/000001.sst"));
   EXPECT_EQ(open_rocksdb(folder / "copy").value()->snapshot()->get("k").value(), Bytes(50000, 5));
+}
+
+// Files and folders below `folder`, links as such, with what they hold.
+std::map<std::string, std::string> tree(const std::string& folder) {
+  std::map<std::string, std::string> all;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    std::string text = entry.is_symlink()     ? "link to " + fs::read_symlink(entry.path()).string()
+                       : entry.is_directory() ? "folder"
+                                              : "";
+    if (text.empty()) {
+      std::ifstream file(entry.path(), std::ios::binary);
+      text.assign(std::istreambuf_iterator<char>(file), {});
+    }
+    all[entry.path().string()] = std::move(text);
+  }
+  return all;
+}
+
+// Whoever may ask for backups chooses a path, and other users of the machine may put links where it leads.
+TEST(RocksDbEngine, ACheckpointIsMadeOnlyBelowItsRootsAndThroughNoLink) {
+  const TemporaryFolder folder;
+  const std::string root = folder / "backups";
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto epoch = engine->acquire().value();
+  const std::vector<Put> puts{{"k", Bytes(50000, 5)}};
+  ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+  fs::create_directories(folder / "victim/map");
+  std::ofstream(folder / "victim/map/precious.sst") << "of another user";
+  std::ofstream(folder / "victim/LOCK") << "1";
+  fs::create_directories(root + "/open");
+  fs::create_directories(root + "/theirs");
+  fs::permissions(root, fs::perms::owner_all);
+  fs::permissions(root + "/open", fs::perms::all);
+  const bool is_root = ::geteuid() == 0;
+  if (is_root) {
+    ASSERT_EQ(::chown((root + "/theirs").c_str(), 65534, 65534), 0);
+  }
+  fs::create_directory_symlink(folder / "victim", root + "/link");
+  fs::create_directory_symlink(folder / "data", root + "/live");
+  fs::create_directory_symlink(folder / "victim", root + "/copy.partial");
+  fs::create_directory_symlink(folder / "victim", root + "/other");
+  // All but the files of the engine, which works meanwhile.
+  const auto names = [&] {
+    auto all = tree(folder / "");
+    std::erase_if(all, [&](const auto& entry) { return entry.first.starts_with(folder / "data/map/"); });
+    return all;
+  };
+  const auto before = names();
+  std::vector<std::string> bad{folder / "elsewhere",
+                               root,
+                               root + "/../elsewhere",
+                               root + "/link/a",
+                               root + "/link",
+                               root + "/live",
+                               root + "/live/backup",
+                               root + "/live/map",
+                               root + "/open/a",
+                               root + "/copy",
+                               root + "/other",
+                               folder / "data/backup",
+                               folder / "data",
+                               "/",
+                               root + "/link/../../victim/map"};
+  if (is_root) bad.push_back(root + "/theirs/a");
+  for (const std::string& to : bad) {
+    const Status refused = engine->checkpoint({to, {root}}, patient);
+    EXPECT_TRUE(refused.reason() == Reason::NOT_ALLOWED || refused.reason() == Reason::INVALID_ARGUMENT)
+        << to << ": " << refused.to_string();
+    EXPECT_TRUE(names() == before) << to;
+  }
+  fs::permissions(root, fs::perms::all);
+  EXPECT_EQ(engine->checkpoint({root + "/a", {root}}, patient).reason(), Reason::NOT_ALLOWED) << "everyone's folder";
+  fs::permissions(root, fs::perms::owner_all);
+  EXPECT_TRUE(names() == before);
+
+  const Status made = engine->checkpoint({root + "/monday/morning", {folder / "nowhere", root}}, patient);
+  ASSERT_TRUE(made.ok()) << made.to_string();
+  EXPECT_EQ(open_rocksdb(root + "/monday/morning").value()->snapshot()->get("k").value(), Bytes(50000, 5));
+  EXPECT_FALSE(fs::exists(root + "/monday/morning/PARTIAL"));
+  EXPECT_EQ(fs::status(root + "/monday").permissions(), fs::perms::owner_all);
+  EXPECT_EQ(fs::status(root + "/monday/morning").permissions(), fs::perms::owner_all);
+}
+
+// While the copy is made, its folder is moved away and a link to another folder put in its place.
+TEST(RocksDbEngine, ACheckpointWhoseFolderIsSwappedWritesNowhereElse) {
+  const TemporaryFolder folder;
+  const std::string root = folder / "backups";
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto epoch = engine->acquire().value();
+  const std::vector<Put> puts{{"k", Bytes(50000, 5)}};
+  ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+  fs::create_directories(folder / "victim/map");
+  std::ofstream(folder / "victim/map/precious.sst") << "of another user";
+  fs::create_directories(root);
+  fs::permissions(root, fs::perms::owner_all);
+  const auto victim = tree(folder / "victim");
+  const auto names = [&] {
+    std::set<std::string> all;
+    for (const auto& entry : fs::directory_iterator(folder / "data")) all.insert(entry.path().filename().string());
+    return all;
+  };
+  const auto live = names();
+  for (const std::string& target : {folder / "victim", folder / "data"}) {
+    bool swapped = false;
+    const Status refused = engine->checkpoint({root + "/copy", {root}}, [&](std::uint64_t, std::uint64_t) {
+      if (!std::exchange(swapped, true)) {
+        fs::rename(root + "/copy.partial", folder / "moved");
+        fs::create_directory_symlink(target, root + "/copy.partial");
+      }
+      return Status();
+    });
+    EXPECT_TRUE(swapped);
+    EXPECT_EQ(refused.reason(), Reason::IO_ERROR) << refused.to_string();
+    EXPECT_THAT(refused.message(), testing::HasSubstr("replaced by something else"));
+    EXPECT_EQ(tree(folder / "victim"), victim);
+    EXPECT_EQ(names(), live);
+    EXPECT_EQ(engine->snapshot()->get("k").value(), Bytes(50000, 5));
+    EXPECT_FALSE(fs::exists(root + "/copy"));
+    EXPECT_TRUE(fs::is_symlink(root + "/copy.partial")) << "what is not ours is not removed";
+    EXPECT_TRUE(fs::is_empty(folder / "moved")) << "what was written is removed, wherever it is";
+    fs::remove(root + "/copy.partial");
+    fs::remove_all(folder / "moved");
+  }
+}
+
+// Whether a file of the folder holds these bytes.
+bool on_disk(const std::string& folder, const Bytes& bytes) {
+  const std::string wanted(bytes.begin(), bytes.end());
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string text(std::istreambuf_iterator<char>(file), {});
+    if (text.find(wanted) != std::string::npos) return true;
+  }
+  return false;
+}
+
+// A day is one of the engine's clock. What remains of the session's neighbours is untouched.
+TEST(RocksDbEngine, DeletedPicturesAreOffTheDiskWithinADay) {
+  const TemporaryFolder folder;
+  std::atomic<std::chrono::steady_clock::time_point> time = std::chrono::steady_clock::time_point{};
+  std::mt19937 random(1);
+  const auto picture = [&] {
+    Bytes bytes(40000);
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+    return bytes;
+  };
+  RocksDbOptions options;
+  options.now = [&] { return time.load(); };
+  // "c": cold parts, as storage/format/keys.h names them.
+  const Bytes deleted = picture(), kept = picture(), later = picture();
+  const auto gone = [&](const Bytes& bytes) {
+    for (int i = 0; i < 1000 && on_disk(folder / "data", bytes); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return !on_disk(folder / "data", bytes);
+  };
+  std::uint64_t epoch = 0;
+  {
+    const auto engine = open_rocksdb(folder / "data", options).value();
+    epoch = engine->acquire().value();
+    const std::vector<Bytes> records{deleted, kept};
+    ASSERT_TRUE(engine->append(epoch, records).ok());
+    const std::vector<Put> puts{{"c1", deleted}, {"c2", kept}, {"c3", later}, {"k", Bytes(10, 1)}};
+    ASSERT_TRUE(engine->commit(epoch, 2, puts, {}).ok());
+    ASSERT_TRUE(engine->trim(2).ok());
+    const std::vector<std::string> deletes{"c1"};
+    ASSERT_TRUE(engine->commit(epoch, 2, {}, deletes).ok());
+    EXPECT_TRUE(on_disk(folder / "data", deleted)) << "so far, only its key is gone";
+    time = time.load() + std::chrono::hours(11);
+    ASSERT_TRUE(engine->commit(epoch, 2, {}, {}).ok());
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_TRUE(on_disk(folder / "data", deleted));
+    time = time.load() + std::chrono::hours(1);
+    ASSERT_TRUE(engine->commit(epoch, 2, {}, {}).ok());
+    EXPECT_TRUE(gone(deleted));
+    EXPECT_EQ(engine->snapshot()->get("c2").value(), kept);
+    EXPECT_EQ(engine->snapshot()->get("c1").value(), std::nullopt);
+    EXPECT_EQ(engine->snapshot()->get("k").value(), Bytes(10, 1));
+    ASSERT_TRUE(engine->append(epoch, std::vector<Bytes>{Bytes(5)}).ok());
+    EXPECT_EQ(engine->last_journal_sequence(), 3u);
+    const std::vector<std::string> more{"c3"};
+    ASSERT_TRUE(engine->commit(epoch, 3, {}, more).ok());
+  }
+  // A restart forgets when something was deleted, and not that it was.
+  const auto engine = open_rocksdb(folder / "data", options).value();
+  epoch = engine->acquire().value();
+  EXPECT_TRUE(on_disk(folder / "data", later));
+  time = time.load() + std::chrono::hours(1);
+  ASSERT_TRUE(engine->commit(epoch, 3, {}, {}).ok());
+  EXPECT_TRUE(gone(later));
+  EXPECT_EQ(engine->snapshot()->get("c2").value(), kept);
 }
 
 TEST(RocksDbEngine, CompactionGivesBackWhatWasReplaced) {

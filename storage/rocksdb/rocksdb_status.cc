@@ -17,6 +17,7 @@ Reason reason_of(const rocksdb::Status& status) {
   if (status.IsCorruption()) return Reason::DATA_LOSS;
   if (status.IsNoSpace() || says(status, ENOSPC) || says(status, EDQUOT)) return Reason::DISK_FULL;
   if (says(status, EROFS)) return Reason::READ_ONLY;
+  if (says(status, EMFILE) || says(status, ENFILE)) return Reason::TOO_MANY_FILES;
   return Reason::IO_ERROR;
 }
 

@@ -227,6 +227,10 @@ TEST_P(EngineConformance, SessionNumbersAreNeverGivenTwice) {
   if (!store.reopens) return;
   reopen();
   EXPECT_EQ(engine->allocate_session(epoch).value(), 3u);
+  EXPECT_EQ(engine->allocate_session(epoch, 10).value(), 14u);
+  EXPECT_EQ(engine->allocate_session(epoch, ~SessionNumber{0}).reason(), Reason::BUDGET_EXCEEDED);
+  EXPECT_EQ(engine->allocate_session(epoch, ~SessionNumber{0} - 15).value(), ~SessionNumber{0});
+  EXPECT_EQ(engine->allocate_session(epoch).reason(), Reason::BUDGET_EXCEEDED);
 }
 
 TEST_P(EngineConformance, EverythingIsThereAfterReopening) {

@@ -141,16 +141,18 @@ class FaultEngine final : public Engine {
     return std::make_shared<FaultSnapshot>(TableSnapshot(root_.table, root_.commits), faults_);
   }
 
-  Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
+  Result<SessionNumber> allocate_session(std::uint64_t epoch, SessionNumber skipped) override {
     const std::lock_guard lock(mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    const auto number = next_session(root_.session, skipped);
+    if (!number.ok()) return number;
     Root next = root_;
-    ++next.session;
+    next.session = *number;
     if (Status status = write(std::move(next), {}, {}); !status.ok()) return status;
     return root_.session;
   }
 
-  Status checkpoint(const std::string&, const EngineProgress&) override {
+  Status checkpoint(const NewFolder&, const EngineProgress&) override {
     return Status(Reason::UNSUPPORTED, "the fault-injecting engine keeps nothing that could be copied to a folder");
   }
   Status compact(const EngineProgress&) override { return {}; }  // a table holds no replaced values

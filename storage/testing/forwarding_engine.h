@@ -28,9 +28,11 @@ class ForwardingEngine : public Engine {
   }
   std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
   std::shared_ptr<const EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
-  Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
-  Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
-    return engine_->checkpoint(directory, progress);
+  Result<SessionNumber> allocate_session(std::uint64_t epoch, SessionNumber skipped) override {
+    return engine_->allocate_session(epoch, skipped);
+  }
+  Status checkpoint(const NewFolder& to, const EngineProgress& progress) override {
+    return engine_->checkpoint(to, progress);
   }
   Status compact(const EngineProgress& progress) override { return engine_->compact(progress); }
   Result<EngineStats> stats() const override { return engine_->stats(); }

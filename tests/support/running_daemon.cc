@@ -36,6 +36,8 @@ std::vector<std::string> daemon_arguments(const DaemonOptions& options) {
   else
     arguments.insert(arguments.end(), {"--credentials", options.credentials});
   if (!options.lcm.empty()) arguments.insert(arguments.end(), {"--lcm", options.lcm});
+  if (!options.lcm.empty() && options.credentials.empty())
+    arguments.insert(arguments.end(), {"--lcm-authentication", "none"});
   arguments.insert(arguments.end(), options.more.begin(), options.more.end());
   return arguments;
 }

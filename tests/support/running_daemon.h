@@ -22,7 +22,7 @@ struct DaemonOptions {
   std::vector<std::string> more;              // arguments
   std::string program = {};                   // relmapd of another build; empty: of this one
   std::optional<Multicast> own_network = {};  // see ProcessOptions
-  std::string credentials = {};               // folder, to serve TLS with; empty: no TLS
+  std::string credentials = {};               // folder, to serve TLS and authenticate LCM with; empty: neither
 };
 
 // Throws with the daemon's log if it does not serve within `patience`; 0: does not wait.

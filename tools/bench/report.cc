@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <numeric>
 #include <ostream>
+#include <stdexcept>
 
 #include "proto/base/json.h"
 
@@ -28,6 +29,12 @@ void Report::add(std::string key, double value, std::string meaning) {
 void Report::add(std::string key, std::vector<double> values, std::string meaning) {
   const double median = quantile(values, 0.5);
   rows_.push_back({std::move(key), median, std::move(values), std::move(meaning)});
+}
+
+double Report::value(const std::string& key) const {
+  for (const Row& row : rows_)
+    if (row.key == key) return row.value;
+  throw std::out_of_range("no figure " + key);
 }
 
 void Report::print_json(std::ostream& out) const {

@@ -17,6 +17,9 @@ class Report {
   // One value for each step of something: an array in JSON, its median in the table.
   void add(std::string key, std::vector<double> values, std::string meaning);
 
+  // The value of a key, or the median of its values. Throws if there is none.
+  double value(const std::string& key) const;
+
   // Values that are not finite are printed as null.
   void print_json(std::ostream& out) const;
   void print_table(std::ostream& out) const;

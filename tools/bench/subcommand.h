@@ -29,6 +29,7 @@ Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);
 Run declare_rides(CLI::App& app);
 Run declare_routes(CLI::App& app);
+Run declare_security(CLI::App& app);
 Run declare_storage(CLI::App& app);
 Run declare_unpack(CLI::App& app);
 Run declare_vast(CLI::App& app);

@@ -1,11 +1,12 @@
-// credentials ca, new, list and revoke: a folder with the authority of a fleet, the daemon's certificate, and the list
-// of what was issued.
+// credentials ca, new, list and revoke: a folder with the authority of a fleet, the daemon's certificate, the secret of
+// the robots' keys, and the list of what was issued.
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <utility>
 #include <vector>
@@ -13,9 +14,11 @@
 #include "proto/access/access_list.h"
 #include "proto/access/certificate.h"
 #include "proto/access/credentials.h"
+#include "proto/access/datagram_seal.h"
 #include "proto/access/file.h"
 #include "proto/access/token.h"
 #include "proto/base/clock.h"
+#include "proto/base/hex.h"
 #include "proto/base/names.h"
 #include "tools/relmap-admin/commands.h"
 
@@ -36,10 +39,12 @@ struct Files {
       : authority(folder + "/ca.crt"),
         authority_key(folder + "/ca.key"),
         server(folder + "/server.pem"),
-        access(folder + "/access") {}
+        access(folder + "/access"),
+        secret(folder + "/lcm.key") {}
   const std::string authority, authority_key;
   const std::string server;  // the daemon's key and certificate, in one file, so that both change at a time
   const std::string access;
+  const std::string secret;  // of the robots' keys for LCM
 };
 
 Result<access::KeyPair> read_authority(const Files& files) {
@@ -100,6 +105,9 @@ Answer make_authority(const CaOptions& options, Context& context) {
   }
   if (!fs::exists(files.access))
     if (Status written = write_all({{files.access, access::AccessList().text()}}); !written.ok())
+      return {written, false, {}};
+  if (!fs::exists(files.secret))
+    if (Status written = write_all({{files.secret, hex(access::random_key()) + "\n"}}); !written.ok())
       return {written, false, {}};
   const auto authority = read_authority(files);
   if (!authority.ok()) return {authority.status(), false, {}};
@@ -167,19 +175,33 @@ Answer make_credentials(const NewOptions& options, Context& context) {
     grant.kind = access::Grant::Kind::kCertificate;
     grant.hash = access::read_certificate(issued->certificate).or_throw().hash;
   }
+  std::optional<access::Grant> key;
+  if (grant.principal.role == access::Role::kRobot && fs::exists(files.secret)) {
+    const auto secret = access::read_secret(files.secret);
+    if (!secret.ok()) return {secret.status(), false, {}};
+    const access::SealKey drawn = access::random_key();
+    credentials.robot_key = access::robot_key(*secret, drawn);
+    key = grant;
+    key->kind = access::Grant::Kind::kKey;
+    key->hash = hex(drawn);
+  }
   const std::string out = options.out.empty() ? options.name + ".pem" : options.out;
   if (fs::exists(out))
     return {Status(Reason::INVALID_ARGUMENT, out + " exists already; --out names another file"), false, {}};
   // The list first, so that nothing is in use that cannot be revoked.
   list->add(grant);
+  if (key) list->add(*key);
   if (Status written = write_all({{files.access, list->text()}, {out, access::text_of(credentials)}}); !written.ok())
     return {written, false, {}};
   context.say(options.role + " " + options.name + " may call until " + access::time_text(grant.expires_s) + " with " +
               out);
+  if (grant.principal.role == access::Role::kRobot && !key)
+    context.say("it has no key for LCM: credentials ca makes the secret that keys need");
   context.say("bring it there by a safe way, and use it with --credentials " + out);
   Answer answer;
   answer.json.add("file", out)
       .add("kind", access::kind_name(grant.kind))
+      .add("lcm_key", key.has_value())
       .add("role", options.role)
       .add("name", options.name)
       .add("expires", access::time_text(grant.expires_s));

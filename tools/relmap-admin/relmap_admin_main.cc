@@ -1,3 +1,5 @@
+#include <sys/stat.h>
+
 #include <iostream>
 
 #include "tools/relmap-admin/cli.h"
@@ -5,6 +7,7 @@
 #include "tools/terminal/progress_bar.h"
 
 int main(int argc, char** argv) {
+  umask(S_IRWXG | S_IRWXO);  // maps, backups and credentials are nobody else's
   relmap::terminal::watch_interrupts();
   return relmap::admin::run(argc, argv, std::cout, std::cerr, relmap::terminal::is_terminal());
 }

@@ -1,25 +1,45 @@
 #include "frontend/workflow/wire/wire_outside.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "frontend/publishing/grpc/grpc_transport.h"
+#include "frontend/publishing/lcm/lcm_transport.h"
 #include "frontend/publishing/publisher.h"
 #include "frontend/recording/event_log.h"
 #include "frontend/recording/keyframe_log.h"
 #include "frontend/recording/recorded_sessions.h"
 #include "frontend/sink.h"
+#include "proto/access/credentials.h"
 
 namespace relmap::workflow {
 
 namespace {
 
+// The key for LCM in a file of credentials; none without credentials.
+Result<std::optional<access::RobotKey>> robot_key(const std::string& file) {
+  if (file.empty()) return std::optional<access::RobotKey>();
+  const auto credentials = access::read_credentials(file);
+  if (!credentials.ok()) return credentials.status();
+  if (!credentials->robot_key)
+    return Status(Reason::BAD_CONFIG,
+                  file + " has no key for LCM; relmap-admin credentials new makes one for --role robot");
+  return credentials->robot_key;
+}
+
 Result<std::unique_ptr<frontend::KeyframeSink>> open_daemon_sink(const RunOptions& options,
                                                                  const publishing::PublisherOptions& publisher,
                                                                  const SessionHeader& session) {
-  if (options.to != "grpc") return frontend::sink_of(publishing::Publisher::start(publisher, session));
+  if (options.to != "grpc") {
+    const auto key = robot_key(options.credentials);
+    if (!key.ok()) return key.status();
+    auto lcm = publishing::LcmTransport::open(publisher.lcm_url, {*key});
+    if (!lcm.ok()) return lcm.status();
+    return frontend::sink_of(publishing::Publisher::start(publisher, session, std::move(*lcm)));
+  }
   auto transport = publishing::GrpcTransport::open(options.server, session.robot, {.credentials = options.credentials});
   if (!transport.ok()) return transport.status();
   return frontend::sink_of(publishing::Publisher::start(publisher, session, std::move(*transport)));

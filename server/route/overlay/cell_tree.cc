@@ -43,7 +43,6 @@ std::uint32_t CellTree::add_chunk(storage::ChunkId chunk) {
 void CellTree::note_chunk(std::uint32_t number) {
   const storage::ChunkId chunk = nodes_[number].chunk;
   ++chunks_;
-  if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
   auto& [chunks, numbers] = sessions_[chunk.session];
   const auto at = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk) - chunks.begin();
   chunks.insert(chunks.begin() + at, chunk.chunk);
@@ -64,7 +63,6 @@ void CellTree::put(ByteWriter& w) const {
 }
 
 std::optional<CellTree> CellTree::get(ByteReader& r) {
-  constexpr std::uint32_t kMaxSessions = 1u << 28;
   CellTree tree;
   tree.fanout_ = r.get<double>();
   tree.root_ = r.get<std::uint32_t>();
@@ -78,8 +76,7 @@ std::optional<CellTree> CellTree::get(ByteReader& r) {
     node.chunk.session = r.get<SessionNumber>();
     node.chunk.chunk = r.get<std::uint32_t>();
     const auto children = r.get<std::uint32_t>();
-    if (!r.fits(children, 4) || node.chunk.session > kMaxSessions || (node.level == 0) != (children == 0))
-      return std::nullopt;
+    if (!r.fits(children, 4) || (node.level == 0) != (children == 0)) return std::nullopt;
     node.children.resize(children);
     r.get_array(node.children.data(), children);
     if (node.level == 0) tree.note_chunk(number);
@@ -99,8 +96,9 @@ std::optional<CellTree> CellTree::get(ByteReader& r) {
 }
 
 std::uint32_t CellTree::find(storage::ChunkId chunk) const {
-  if (chunk.session >= sessions_.size() || sessions_[chunk.session].chunks.empty()) return kNone;
-  const auto& [chunks, numbers] = sessions_[chunk.session];
+  const auto session = sessions_.find(chunk.session);
+  if (session == sessions_.end()) return kNone;
+  const auto& [chunks, numbers] = session->second;
   // As a rule a session's chunks are consecutive.
   const std::uint32_t place = chunk.chunk - chunks.front();
   if (place < chunks.size() && chunks[place] == chunk.chunk) return numbers[place];
@@ -110,8 +108,16 @@ std::uint32_t CellTree::find(storage::ChunkId chunk) const {
 }
 
 std::span<const std::uint32_t> CellTree::chunks_of(SessionNumber session) const {
-  return session < sessions_.size() ? std::span<const std::uint32_t>(sessions_[session].numbers)
-                                    : std::span<const std::uint32_t>();
+  const auto found = sessions_.find(session);
+  return found == sessions_.end() ? std::span<const std::uint32_t>() : found->second.numbers;
+}
+
+std::vector<SessionNumber> CellTree::sessions() const {
+  std::vector<SessionNumber> numbers;
+  numbers.reserve(sessions_.size());
+  for (const auto& [number, chunks] : sessions_) numbers.push_back(number);
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
 }
 
 std::size_t CellTree::memory_bytes() const {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "proto/base/bytes.h"
@@ -40,7 +41,7 @@ class CellTree {
   // The numbers of a session's chunks, ascending by chunk.
   std::span<const std::uint32_t> chunks_of(SessionNumber session) const;
   std::uint32_t chunks() const { return chunks_; }
-  SessionNumber sessions() const { return static_cast<SessionNumber>(sessions_.size()); }  // above all their numbers
+  std::vector<SessionNumber> sessions() const;  // those with a chunk, ascending
   std::size_t memory_bytes() const;
   void put(ByteWriter& w) const;
   // Reads what put() wrote; nullopt if the bytes are invalid.
@@ -77,7 +78,7 @@ class CellTree {
     std::vector<std::uint32_t> chunks;  // ascending
     std::vector<std::uint32_t> numbers;
   };
-  std::vector<SessionChunks> sessions_;  // by session number
+  std::unordered_map<SessionNumber, SessionChunks> sessions_;  // numbers have large gaps, such as after a restore
 };
 
 }  // namespace relmap::route

@@ -367,8 +367,8 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
   const std::size_t max_cells = std::max<std::size_t>(10, tree.chunks() / 10);
   std::vector<std::uint32_t> cells;
   if (!filter.sessions.empty())
-    for (SessionNumber session = 0; session < tree.sessions() && cells.size() <= max_cells; ++session)
-      if (!filter.sessions.contains(session)) {
+    for (const SessionNumber session : tree.sessions())
+      if (!filter.sessions.contains(session) && cells.size() <= max_cells) {
         const auto refused = tree.chunks_of(session);
         cells.insert(cells.end(), refused.begin(), refused.end());
       }

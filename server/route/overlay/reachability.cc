@@ -44,7 +44,7 @@ class Pieces {
     for (const Piece& piece : pieces_)
       for (std::uint32_t i = 0; i < piece.nodes.size(); ++i)
         if (reached.contains(sets_.find(piece.first + i))) sessions.insert(piece.nodes[i].session);
-    for (SessionNumber session = 0; session < tree_.sessions(); ++session)
+    for (const SessionNumber session : tree_.sessions())
       for (const std::uint32_t chunk : tree_.chunks_of(session)) {
         if (sessions.contains(session)) break;
         const std::uint32_t piece = piece_around(chunk);

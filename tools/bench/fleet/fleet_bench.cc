@@ -1,6 +1,8 @@
 // A fleet of robots over a bad network into a daemon that is a process of its own: nothing lost, nothing twice, how
 // soon acknowledged, at what cost. Robots are the front-end's publisher with its spool; LCM is LCM; between robots and
 // daemon stands a relay that loses, holds back and doubles packets.
+#include "tools/bench/fleet/fleet_bench.h"
+
 #include <signal.h>
 #include <sys/resource.h>
 
@@ -14,6 +16,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "proto/access/file.h"
 #include "proto/base/clock.h"
 #include "proto/keyframe/ingest_messages.h"
 #include "storage/testing/temporary_folder.h"
@@ -21,6 +24,7 @@
 #include "tests/support/running_daemon.h"
 #include "tools/bench/fleet/batch.h"
 #include "tools/bench/fleet/evaluation.h"
+#include "tools/bench/fleet/keys.h"
 #include "tools/bench/fleet/killed_daemon.h"
 #include "tools/bench/fleet/relay.h"
 #include "tools/bench/fleet/trouble.h"
@@ -36,21 +40,6 @@ using std::chrono::seconds;
 using testing::Process;
 using testing::RunningDaemon;
 
-struct FleetOptions {
-  std::uint32_t robots = 20;
-  double rate = 5, seconds = 300;
-  RelayFaults faults{0.05, 0.05, 0.01};
-  std::size_t keyframe_bytes = 45'000;
-  std::uint32_t part_bytes = kNetworkPartBytes;
-  std::size_t memory_budget_mb = 1024;
-  std::uint32_t kill_daemon = 0, kill_robots = 0, kills_each = 1;
-  double flood = 0, garbage_hz = 0;
-  bool closures = true;
-  std::uint32_t batch = 20'000;
-  std::uint64_t seed = 1;
-  std::string folder;
-};
-
 double own_cpu_seconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
@@ -62,7 +51,11 @@ double own_cpu_seconds() {
 class FleetProcesses {
  public:
   FleetProcesses(const FleetOptions& options, std::string folder, std::string lcm)
-      : options_(options), folder_(std::move(folder)), lcm_(std::move(lcm)), start_us_(now_us()) {
+      : options_(options),
+        folder_(std::move(folder)),
+        lcm_(std::move(lcm)),
+        secret_(options.sealed ? read_secret(folder_) : ""),
+        start_us_(now_us()) {
     for (std::uint32_t k = 0; k < options.kill_robots; ++k) processes_.push_back(start(k, 1));
     if (options.robots > options.kill_robots)
       processes_.push_back(start(options.kill_robots, options.robots - options.kill_robots));
@@ -101,22 +94,27 @@ class FleetProcesses {
  private:
   std::unique_ptr<Process> start(std::uint32_t first, std::uint32_t count) const {
     const auto text = [](auto number) { return std::to_string(number); };
+    std::vector<std::string> command{"/proc/self/exe", "fleet-robots",
+                                     "--folder",       folder_,
+                                     "--lcm",          lcm_,
+                                     "--first",        text(first),
+                                     "--count",        text(count),
+                                     "--robots",       text(options_.robots),
+                                     "--rate",         text(options_.rate),
+                                     "--start-us",     text(start_us_),
+                                     "--seed",         text(options_.seed),
+                                     "--part-bytes",   text(options_.part_bytes)};
+    if (!secret_.empty()) command.insert(command.end(), {"--secret", secret_});
     return std::make_unique<Process>(
-        std::vector<std::string>{"/proc/self/exe", "fleet-robots",
-                                 "--folder",       folder_,
-                                 "--lcm",          lcm_,
-                                 "--first",        text(first),
-                                 "--count",        text(count),
-                                 "--robots",       text(options_.robots),
-                                 "--rate",         text(options_.rate),
-                                 "--start-us",     text(start_us_),
-                                 "--seed",         text(options_.seed),
-                                 "--part-bytes",   text(options_.part_bytes)},
-        testing::ProcessOptions{.standard_output = "", .standard_error = folder_ + "/robots.log"});
+        command, testing::ProcessOptions{.standard_output = "", .standard_error = folder_ + "/robots.log"});
   }
 
   const FleetOptions& options_;
-  const std::string folder_, lcm_;
+  static std::string read_secret(const std::string& folder) {
+    return hex(access::read_secret(folder + "/credentials/lcm.key").or_throw());
+  }
+
+  const std::string folder_, lcm_, secret_;
   const std::int64_t start_us_;
   std::vector<std::unique_ptr<Process>> processes_;
   double cpu_before_ = 0;
@@ -182,6 +180,7 @@ class FleetRun {
         groups_(two_groups()),
         relay_(groups_.first, groups_.second, options.seed),
         lap_(make_lap(folder_, options)),
+        credentials_(options.sealed ? make_credentials(folder_, options) : ""),
         daemon_(daemon_options()),
         processes_(options, folder_, groups_.first) {
     wait_until_all_are_heard(processes_, options, folder_ + "/deeds");
@@ -219,7 +218,7 @@ class FleetRun {
     applied_s_ = wait_until_applied(*daemon_.running().client());
     client::ClientOptions patient;
     patient.deadline = std::chrono::minutes(10);
-    const Status idle = client::Client::connect(daemon_.running().address(), patient).or_throw()->wait_idle();
+    const Status idle = client::Client::connect(folder_ + "/map", patient).or_throw()->wait_idle();
     if (!idle.ok()) throw StatusError(idle);
     daemon_cpu_s_ = daemon_.cpu() - daemon_cpu_at_begin_;
   }
@@ -244,10 +243,24 @@ class FleetRun {
     return FleetLap(folder + "/lap.bin");
   }
 
+  // Issues keys to all robots, and returns the folder.
+  static std::string make_credentials(const std::string& folder, const FleetOptions& options) {
+    const std::string made = folder + "/credentials";
+    const testing::Finished ca =
+        testing::run_program({testing::built_program("relmap-admin"), "credentials", "ca", made});
+    if (ca.exit_code != 0) throw std::runtime_error("relmap-admin credentials: " + ca.standard_error);
+    access::AccessList list = access::read_access_list(made + "/access").or_throw();
+    for (std::uint32_t robot = 0; robot < options.robots; ++robot) list.add(grant_of({.number = robot}));
+    if (const Status written = access::write_private_file(made + "/access", list.text()); !written.ok())
+      throw StatusError(written);
+    return made;
+  }
+
   testing::DaemonOptions daemon_options() const {
     testing::DaemonOptions daemon{
         .data = folder_ + "/map", .lcm = groups_.second, .memory_budget_mb = options_.memory_budget_mb, .more = {}};
     if (!options_.closures) daemon.more.push_back("--no-closures");
+    daemon.credentials = credentials_;
     return daemon;
   }
 
@@ -334,6 +347,7 @@ class FleetRun {
   const std::pair<std::string, std::string> groups_;  // LCM URLs: of the robots, of the daemon
   Relay relay_;
   const FleetLap lap_;
+  const std::string credentials_;  // folder; empty: nothing is sealed
   KilledDaemon daemon_;
   FleetProcesses processes_;
   std::unique_ptr<Flooder> flooder_;
@@ -370,14 +384,18 @@ void run(const FleetOptions& options, Report& report) {
   if (options.kill_robots > options.robots) throw std::runtime_error("more robots to be killed than there are");
   if (!testing::enter_private_network(testing::Multicast::kOnLoopback))
     std::cerr << "no network namespace may be made here: random multicast groups of this machine instead\n";
-  FleetRun fleet(options);
-  fleet.drive();
-  fleet.settle();
-  fleet.report(report);
+  run_fleet(options, report);
   report_batch(options, report);
 }
 
 }  // namespace
+
+void run_fleet(const FleetOptions& options, Report& report) {
+  FleetRun fleet(options);
+  fleet.drive();
+  fleet.settle();
+  fleet.report(report);
+}
 
 Run declare_fleet(CLI::App& app) {
   auto options = std::make_shared<FleetOptions>();
@@ -418,6 +436,7 @@ Run declare_fleet(CLI::App& app) {
   app.add_option("--garbage", options->garbage_hz, "send so many meaningless or harmful messages a second")
       ->capture_default_str();
   app.add_option("--budget-mb", options->memory_budget_mb, "memory budget of relmapd")->capture_default_str();
+  app.add_flag("--sealed", options->sealed, "robots prove who they are, and nothing else is believed");
   app.add_flag("!--no-closures", options->closures, "relmapd recognises no places");
   app.add_option("--batch", options->batch,
                  "afterwards, send so many ready-made keyframes as fast as they are taken; 0: none")

@@ -1,11 +1,13 @@
 // Some robots of a fleet as a process of their own, which may be killed: each pushes keyframes into its spool at its
 // rate until SIGTERM, then waits until all are settled. Started by `relmap-bench fleet`.
+#include <optional>
 #include <thread>
 
 #include "frontend/publishing/publisher.h"
 #include "proto/base/mutex.h"
 #include "server/ops/signals.h"
 #include "tools/bench/fleet/keyframes.h"
+#include "tools/bench/fleet/keys.h"
 #include "tools/bench/fleet/robot_transport.h"
 #include "tools/bench/stopwatch.h"
 #include "tools/bench/subcommand.h"
@@ -15,7 +17,7 @@ namespace relmap::bench {
 namespace {
 
 struct RobotsOptions {
-  std::string folder, lcm;
+  std::string folder, lcm, secret;
   std::uint32_t first = 0, count = 1, robots = 1;
   double rate = 5;
   std::int64_t start_us = 0;
@@ -51,7 +53,9 @@ class DrivingRobot {
       : options_(options), lap_(lap), log_(log), stop_(stop) {
     robot_ = {number, options.seed, start_of(number, options.robots), options.start_us,
               static_cast<std::int64_t>(1e6 / options.rate)};
-    auto transport = std::make_unique<RobotTransport>(std::move(lcm), robot_.uuid(), number, log);
+    std::optional<access::RobotKey> key;
+    if (!options.secret.empty()) key = key_of(access::key_of_hex(options.secret).value(), number);
+    auto transport = std::make_unique<RobotTransport>(std::move(lcm), number, key, log);
     sent_bytes_ = transport->sent_bytes();
     publishing::PublisherOptions publishing;
     publishing.spool = options.folder + "/spool-" + std::to_string(number);
@@ -109,7 +113,7 @@ void run(const RobotsOptions& options) {
   std::vector<std::unique_ptr<DrivingRobot>> robots;
   for (std::uint32_t k = 0; k < options.count; ++k)
     robots.push_back(std::make_unique<DrivingRobot>(options, options.first + k, lap, lcm, log, stop));
-  while (!ops::wait_for_stop_signal(std::chrono::seconds(1))) {
+  while (!ops::wait_for_signal(std::chrono::seconds(1))) {
   }
   stop.set();
 }
@@ -120,6 +124,7 @@ Run declare_fleet_robots(CLI::App& app) {
   auto options = std::make_shared<RobotsOptions>();
   app.add_option("--folder", options->folder, "folder of the fleet: lap.bin, deeds, spools")->required();
   app.add_option("--lcm", options->lcm, "LCM URL")->required();
+  app.add_option("--secret", options->secret, "of the fleet's keys, in hexadecimal; none: nothing is sealed");
   app.add_option("--first", options->first, "number of the first of these robots");
   app.add_option("--count", options->count, "number of these robots");
   app.add_option("--robots", options->robots, "number of robots of the whole fleet");

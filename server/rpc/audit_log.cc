@@ -1,0 +1,114 @@
+#include "server/rpc/audit_log.h"
+
+#include <fcntl.h>
+#include <google/protobuf/text_format.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <utility>
+
+#include "proto/base/clock.h"
+#include "proto/base/json.h"
+
+namespace relmap::rpc {
+
+namespace {
+
+constexpr std::size_t kMaxPrinted = 64 * 1024;  // an imported graph has megabytes
+
+std::string time_of_day(std::int64_t us) {
+  const std::time_t seconds = us / 1'000'000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[40];
+  const std::size_t size = std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+  std::snprintf(text + size, sizeof text - size, ".%03dZ", static_cast<int>(us / 1000 % 1000));
+  return text;
+}
+
+bool write_all(int file, const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t size = ::write(file, text.data() + done, text.size() - done);
+    if (size < 0 && errno == EINTR) continue;
+    if (size <= 0) return false;
+    done += static_cast<std::size_t>(size);
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<AuditLog>> AuditLog::open(const std::string& file, std::uint64_t file_bytes) {
+  std::unique_ptr<AuditLog> log(new AuditLog(file, file_bytes));
+  const MutexLock lock(log->mutex_);
+  if (Status opened = log->reopen(); !opened.ok()) return opened;
+  return log;
+}
+
+AuditLog::~AuditLog() {
+  const MutexLock lock(mutex_);
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+Status AuditLog::reopen() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
+  struct stat facts {};
+  if (descriptor_ < 0 || ::fstat(descriptor_, &facts) != 0)
+    return {Reason::IO_ERROR, "cannot write " + file_ + ": " + std::strerror(errno)};
+  written_ = static_cast<std::uint64_t>(facts.st_size);
+  return {};
+}
+
+// Moves the files on by one number.
+void AuditLog::rotate() {
+  for (int number = kOldFiles - 1; number > 0; --number)
+    (void)std::rename((file_ + "." + std::to_string(number)).c_str(),
+                      (file_ + "." + std::to_string(number + 1)).c_str());
+  (void)std::rename(file_.c_str(), (file_ + ".1").c_str());
+}
+
+void AuditLog::write(const Entry& entry) {
+  const std::string line = Json()
+                               .add("time", time_of_day(now_us()))
+                               .add("who", entry.who)
+                               .add("role", entry.who.empty() ? std::string() : entry.role)
+                               .add("from", entry.from)
+                               .add("method", entry.method)
+                               .add("request", entry.request)
+                               .add("request_id", entry.request_id)
+                               .add("outcome", reason_name(entry.outcome.reason()))
+                               .add("message", entry.outcome.message())
+                               .add("seconds", 1e-6 * static_cast<double>(entry.took.count()))
+                               .text() +
+                           "\n";
+  const MutexLock lock(mutex_);
+  Status status;
+  if (descriptor_ < 0 || written_ >= file_bytes_) {
+    if (written_ >= file_bytes_) rotate();
+    status = reopen();
+  }
+  if (status.ok() && !write_all(descriptor_, line))
+    status = {Reason::IO_ERROR, "cannot write " + file_ + ": " + std::strerror(errno)};
+  if (status.ok()) written_ += line.size();
+  if (!status.ok() && !failing_) spdlog::error("the audit log is incomplete: {}", status.to_string());
+  failing_ = !status.ok();
+}
+
+std::string AuditLog::text_of(const google::protobuf::Message& request) {
+  if (request.ByteSizeLong() > kMaxPrinted) return std::to_string(request.ByteSizeLong()) + " bytes";
+  google::protobuf::TextFormat::Printer printer;
+  printer.SetSingleLineMode(true);
+  printer.SetTruncateStringFieldLongerThan(256);
+  std::string text;
+  if (!printer.PrintToString(request, &text)) return {};
+  if (text.size() > kMaxRequest) text = text.substr(0, kMaxRequest) + "...";
+  return text;
+}
+
+}  // namespace relmap::rpc

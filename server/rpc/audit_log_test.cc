@@ -1,0 +1,99 @@
+#include "server/rpc/audit_log.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "relmap/v1/map.pb.h"
+#include "storage/testing/temporary_folder.h"
+
+namespace relmap::rpc {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::vector<nlohmann::json> lines_of(const std::string& file) {
+  std::vector<nlohmann::json> lines;
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);) lines.push_back(nlohmann::json::parse(line));
+  return lines;
+}
+
+TEST(AuditLog, HasOneObjectALineForItsOwnerOnly) {
+  const storage::TemporaryFolder folder;
+  const std::string file = folder / "audit.jsonl";
+  {
+    const auto log = AuditLog::open(file).or_throw();
+    v1::SetLabelRequest request;
+    request.mutable_frame()->set_session(3);
+    request.set_label("a \"quoted\"\nlabel");
+    log->write({"anna", "operator", "ipv4:10.0.0.1:5", "Map.SetLabel", AuditLog::text_of(request), "id-1",
+                Status(Reason::NO_SUCH_FRAME, "no frame 3:0"), std::chrono::microseconds(1500)});
+    log->write({"", "reader", "ipv4:10.0.0.2:5", "Admin.Backup", "", "id-2", Status(Reason::UNAUTHENTICATED, "who?")});
+  }
+  struct stat facts {};
+  ASSERT_EQ(stat(file.c_str(), &facts), 0);
+  EXPECT_EQ(facts.st_mode & 0077, 0u);
+  const auto log = AuditLog::open(file).or_throw();  // goes on behind what is there
+  log->write({"anna", "operator", "", "Admin.Commit", "", "id-3", Status()});
+  const auto lines = lines_of(file);
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0]["who"], "anna");
+  EXPECT_EQ(lines[0]["role"], "operator");
+  EXPECT_EQ(lines[0]["from"], "ipv4:10.0.0.1:5");
+  EXPECT_EQ(lines[0]["method"], "Map.SetLabel");
+  EXPECT_THAT(lines[0]["request"].get<std::string>(), HasSubstr("session: 3"));
+  EXPECT_EQ(lines[0]["request_id"], "id-1");
+  EXPECT_EQ(lines[0]["outcome"], "NO_SUCH_FRAME");
+  EXPECT_EQ(lines[0]["message"], "no frame 3:0");
+  EXPECT_DOUBLE_EQ(lines[0]["seconds"].get<double>(), 0.0015);
+  EXPECT_THAT(lines[0]["time"].get<std::string>(), ::testing::MatchesRegex("20..-..-..T..:..:..\\....Z"));
+  EXPECT_EQ(lines[1]["who"], "");
+  EXPECT_EQ(lines[1]["role"], "");
+  EXPECT_EQ(lines[2]["outcome"], "OK");
+}
+
+TEST(AuditLog, IsRotatedAndBounded) {
+  const storage::TemporaryFolder folder;
+  const std::string file = folder / "audit.jsonl";
+  const auto log = AuditLog::open(file, 1000).or_throw();
+  for (int i = 0; i < 200; ++i) log->write({"anna", "operator", "", "Admin.Commit", std::to_string(i), "", Status()});
+  EXPECT_TRUE(std::filesystem::exists(file + ".8"));
+  EXPECT_FALSE(std::filesystem::exists(file + ".9"));
+  std::vector<std::string> names{file};
+  for (int i = 1; i <= AuditLog::kOldFiles; ++i) names.push_back(file + "." + std::to_string(i));
+  int last = 200;
+  for (const std::string& name : names) {
+    EXPECT_LT(std::filesystem::file_size(name), 1300u);
+    const auto lines = lines_of(name);
+    for (auto line = lines.rbegin(); line != lines.rend(); ++line)
+      EXPECT_EQ((*line)["request"], std::to_string(--last)) << name;
+  }
+}
+
+TEST(AuditLog, LargeRequestsAreCutOff) {
+  v1::ImportGraphRequest graph;
+  for (int i = 0; i < 40000; ++i) graph.add_loops();
+  EXPECT_THAT(AuditLog::text_of(graph), ::testing::MatchesRegex("[0-9]+ bytes"));
+  v1::SetLabelRequest label;
+  label.set_label(std::string(10000, 'x'));
+  EXPECT_LE(AuditLog::text_of(label).size(), AuditLog::kMaxRequest + 3);
+}
+
+// Neither a link nor a folder is written to, and where nothing can be written calls go on.
+TEST(AuditLog, WhatCannotBeWrittenIsRefusedAtTheStart) {
+  const storage::TemporaryFolder folder;
+  EXPECT_EQ(AuditLog::open(folder / "nowhere/audit.jsonl").reason(), Reason::IO_ERROR);
+  std::filesystem::create_symlink(folder / "other", folder / "audit.jsonl");
+  EXPECT_EQ(AuditLog::open(folder / "audit.jsonl").reason(), Reason::IO_ERROR);
+  EXPECT_FALSE(std::filesystem::exists(folder / "other"));
+}
+
+}  // namespace
+}  // namespace relmap::rpc
