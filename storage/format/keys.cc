@@ -56,6 +56,10 @@ std::string session(SessionNumber number) {
   return key;
 }
 std::string_view all_sessions() { return "s"; }
+std::optional<SessionNumber> session_of(std::string_view key) {
+  if (key.size() != kSessionKey || !key.starts_with(all_sessions())) return std::nullopt;
+  return get_u32(key.substr(all_sessions().size()));
+}
 
 std::string skipped_in(SessionNumber session) {
   std::string key(all_skipped());

@@ -22,6 +22,7 @@ std::string map_state();
 
 std::string session(SessionNumber number);
 std::string_view all_sessions();
+std::optional<SessionNumber> session_of(std::string_view key);  // nullopt: not a session's key
 
 // Skipped sequences of a session, by the last one of the range.
 std::string skipped(SessionNumber session, std::uint32_t to);

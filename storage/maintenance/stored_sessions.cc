@@ -1,6 +1,7 @@
 #include "storage/maintenance/stored_sessions.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
 #include "storage/format/keys.h"
@@ -13,10 +14,21 @@ namespace {
 
 constexpr SessionNumber kBehind = 16;  // numbers that are tried behind the highest known one
 
-SessionNumber number_in(std::string_view key) {
-  SessionNumber number = 0;
-  for (std::size_t i = 1; i < keys::kSessionKey; ++i) number = (number << 8) | static_cast<std::uint8_t>(key[i]);
-  return number;
+// The first session from `number` on that has a record or a frame, as far as the records can be read.
+std::optional<SessionNumber> next_known(const EngineSnapshot& snapshot, SessionNumber number) {
+  std::optional<SessionNumber> next;
+  const auto consider = [&](std::optional<SessionNumber> found) {
+    if (found && *found >= number) next = std::min(next.value_or(*found), *found);
+    return false;
+  };
+  (void)snapshot.scan_from(keys::all_sessions(), keys::session(number),
+                           [&](std::string_view key, ByteSpan) { return consider(keys::session_of(key)); });
+  const std::string hot = keys::part(Part::kHot, {number, 0});
+  (void)snapshot.scan_from(std::string_view(hot).substr(0, 1), hot, [&](std::string_view key, ByteSpan) {
+    const auto part = keys::part_of(key);
+    return consider(part ? std::optional(part->chunk.session) : std::nullopt);
+  });
+  return next;
 }
 
 }  // namespace
@@ -24,7 +36,7 @@ SessionNumber number_in(std::string_view key) {
 StoredSessions load_sessions(const EngineSnapshot& snapshot) {
   StoredSessions all;
   const auto take = [&](std::string_view key, ByteSpan value, const Status& status) {
-    const SessionNumber number = key.size() == keys::kSessionKey ? number_in(key) : 0;
+    const SessionNumber number = keys::session_of(key).value_or(0);
     auto session = status.ok() ? decode_session(value) : Result<Session>(status);
     if (session.ok() && session->number == number && number != 0)
       all.sessions.push_back(std::move(*session));
@@ -35,14 +47,24 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
   };
   std::set<SessionNumber> seen;
   const Status scanned = snapshot.scan(keys::all_sessions(), [&](std::string_view key, ByteSpan value) {
-    if (key.size() == keys::kSessionKey) seen.insert(number_in(key));
+    if (const auto number = keys::session_of(key)) seen.insert(*number);
     take(key, value, Status());
     return true;
   });
-  // Numbers are given in order, so a record that is missing has a place among the others, or just behind them.
+  // Numbers are given in order, so a record that is missing has a place just behind another session. Deleted sessions
+  // leave gaps, and each restore leaves one of a million numbers, so gaps are passed over.
   SessionNumber max_number = seen.empty() ? 0 : *seen.rbegin();
-  for (SessionNumber number = 1; number <= max_number + kBehind; ++number) {
-    if (seen.contains(number)) continue;
+  SessionNumber last_known = 0;
+  for (SessionNumber number = 1; number != 0; ++number) {
+    if (number - last_known > kBehind) {
+      const auto next = next_known(snapshot, number);
+      if (!next) break;
+      number = *next;
+    }
+    if (seen.contains(number)) {
+      last_known = number;
+      continue;
+    }
     const std::string key = keys::session(number);
     const auto value = snapshot.get(key);
     const bool has_frames = has_parts(snapshot, Part::kHot, number);
@@ -54,6 +76,7 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
       take(key, {}, value.status());
     else
       continue;
+    last_known = number;
     max_number = std::max(max_number, number);
   }
   std::sort(all.sessions.begin(), all.sessions.end(),
