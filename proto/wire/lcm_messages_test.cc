@@ -15,6 +15,7 @@
 #include "proto/wire/convert.h"
 #include "relmap_lcm/acknowledgement_t.hpp"
 #include "relmap_lcm/gap_t.hpp"
+#include "relmap_lcm/hello_t.hpp"
 #include "relmap_lcm/keyframe_part_t.hpp"
 #include "relmap_lcm/map_identity_t.hpp"
 #include "relmap_lcm/missing_parts_t.hpp"
@@ -242,6 +243,7 @@ TEST(LcmMessages, TypesNeverChange) {
   const std::map<std::string, Type> types{
       {"acknowledgement_t", {relmap_lcm::acknowledgement_t::getHash(), 0xdf7109cd21f7794b}},
       {"gap_t", {relmap_lcm::gap_t::getHash(), 0x79c545a17bfa3a57}},
+      {"hello_t", {relmap_lcm::hello_t::getHash(), 0x6ae6ac896d758cb9}},
       {"keyframe_part_t", {relmap_lcm::keyframe_part_t::getHash(), 0xa8530df339b83381}},
       {"map_identity_t", {relmap_lcm::map_identity_t::getHash(), 0xa177169b81556559}},
       {"missing_parts_t", {relmap_lcm::missing_parts_t::getHash(), 0xdf14aa697be59a38}},
