@@ -112,7 +112,8 @@ void cost_of_forgeries(const SecurityOptions& options, Report& report) {
 }
 
 void price_of_tls(const SecurityOptions& options, const std::string& folder, Report& report) {
-  const std::string drive = testing::record_simulation(folder + "/drive", {"--seed", "1", "--pairs", "60"});
+  const std::string drive =
+      testing::record_simulation(folder + "/drive", {"--seed", "1", "--pairs", "60", "--laps", "0.5"});
   DaemonOptions served{.data = folder + "/tls", .lcm = "", .more = {}};
   served.credentials = make_credentials(folder + "/tls-credentials", {});
   RunningDaemon daemon(served);
