@@ -12,7 +12,7 @@
 namespace relmap::storage {
 namespace {
 
-constexpr SessionNumber kBehind = 16;  // numbers that are tried behind the highest known one
+constexpr SessionNumber kBehind = 16;  // numbers that are tried behind each known one
 
 // The first session from `number` on that has a record or a frame, as far as the records can be read.
 std::optional<SessionNumber> next_known(const EngineSnapshot& snapshot, SessionNumber number) {

@@ -369,6 +369,21 @@ class Salvage {
     }
   }
 
+  // The first number behind a damaged block that begins at `bad` or before it; `last` + 1 if the block goes on to the
+  // end.
+  template <typename Readable>
+  static std::uint64_t behind_damage(std::uint64_t bad, std::uint64_t last, Readable readable_from) {
+    std::uint64_t step = 1;
+    while (bad + step <= last && !readable_from(bad + step)) step *= 2;
+    std::uint64_t good = std::min(bad + step, last + 1);
+    bad += step / 2;
+    while (good - bad > 1) {
+      const std::uint64_t middle = bad + (good - bad) / 2;
+      (readable_from(middle) ? good : bad) = middle;
+    }
+    return good;
+  }
+
   // Adds the numbers of all sessions that left a record in any table, in time that grows with the records: the numbers
   // themselves have gaps of a million after each restore.
   void add_older_numbers() {
@@ -384,16 +399,7 @@ class Salvage {
       std::uint64_t next = 1;
       while (next <= kLast) {
         if (!readable_from(next)) {
-          // A damaged block: the first number after it is between one that cannot be read and one that can.
-          std::uint64_t step = 1;
-          while (next + step <= kLast && !readable_from(next + step)) step *= 2;
-          std::uint64_t bad = next + step / 2;
-          std::uint64_t good = std::min<std::uint64_t>(next + step, kLast + 1);
-          while (good - bad > 1) {
-            const std::uint64_t middle = bad + (good - bad) / 2;
-            (readable_from(middle) ? good : bad) = middle;
-          }
-          next = good;
+          next = behind_damage(next, kLast, readable_from);
           continue;
         }
         for (; it->Valid(); it->Next()) {

@@ -1,6 +1,5 @@
 #include "frontend/publishing/lcm/lcm_transport.h"
 
-#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -28,7 +27,7 @@ std::uint64_t random_run() {
 }  // namespace
 
 LcmTransport::LcmTransport(Publish publish, bool local, LcmTransportOptions options)
-    : publish_(std::move(publish)), local_(local), sealed_(options.key.has_value()) {
+    : publish_(std::move(publish)), local_(local) {
   const MutexLock lock(mutex_);
   if (options.key) daemon_.emplace(*options.key, random_run());
 }
@@ -66,6 +65,12 @@ std::optional<LcmTransport::Opened> LcmTransport::open(std::string_view channel,
   return std::nullopt;
 }
 
+template <typename Message>
+void LcmTransport::tell(std::function<void(const Message&)> Listener::*heard, const Message& message) {
+  const MutexLock lock(listener_mutex_);
+  if (listener_.*heard) (listener_.*heard)(message);
+}
+
 void LcmTransport::hear(std::string_view channel, ByteSpan datagram) {
   MutexLock lock(mutex_);
   const auto opened = open(channel, datagram);
@@ -75,14 +80,12 @@ void LcmTransport::hear(std::string_view channel, ByteSpan datagram) {
     if (!ack.ok() || !counts(ack->boot, *opened)) return;
     acknowledged_ |= ack->session == session_;
     lock.unlock();
-    const MutexLock listening(listener_mutex_);
-    if (listener_.acknowledged) listener_.acknowledged(*ack);
+    tell(&Listener::acknowledged, *ack);
   } else if (channel == kPoseChannel) {
     const auto news = decode_lcm_pose(opened->message);
     if (!news.ok() || !counts(news->boot, *opened)) return;
     lock.unlock();
-    const MutexLock listening(listener_mutex_);
-    if (listener_.news) listener_.news(*news);
+    tell(&Listener::news, *news);
   } else if (channel == kMapChannel) {
     const auto daemon = decode_lcm_map(opened->message);
     if (!daemon.ok() || !counts(daemon->boot, *opened)) return;
@@ -90,8 +93,7 @@ void LcmTransport::hear(std::string_view channel, ByteSpan datagram) {
     // Where the addressed daemon answers, another one that knows the key is nobody's business.
     if (daemon_ && !daemon_->welcome(*daemon, Clock::now()) && daemon_->ready(Clock::now())) return;
     lock.unlock();
-    const MutexLock listening(listener_mutex_);
-    if (listener_.introduced) listener_.introduced(*daemon);
+    tell(&Listener::introduced, *daemon);
   }
 }
 
@@ -126,7 +128,11 @@ void LcmTransport::transmit(const char* channel, Bytes message) {
     }
     if (daemon_) daemon_->seal(channel, message);
   }
-  link_ ? link_->publish(channel, message) : publish_(channel, message);
+  put_out(channel, message);
+}
+
+void LcmTransport::put_out(const char* channel, const Bytes& datagram) {
+  link_ ? link_->publish(channel, datagram) : publish_(channel, datagram);
 }
 
 // Says hello while the daemon is silent.
@@ -142,7 +148,7 @@ void LcmTransport::keep_in_touch() {
       Bytes hello = encode_lcm(Hello{session_});
       daemon_->seal_hello(hello);
       const MutexUnlock unlocked(mutex_);
-      link_ ? link_->publish(kHelloChannel, hello) : publish_(kHelloChannel, hello);
+      put_out(kHelloChannel, hello);
     }
     changed_.wait_for(mutex_, kHelloSpacing);
   }
@@ -160,7 +166,7 @@ void LcmTransport::listen(Listener listener) {
     listener_ = std::move(listener);
   }
   const MutexLock lock(mutex_);
-  if (sealed_ && !stopping_ && !thread_.joinable()) thread_ = std::thread([this] { keep_in_touch(); });
+  if (daemon_ && !stopping_ && !thread_.joinable()) thread_ = std::thread([this] { keep_in_touch(); });
 }
 
 void LcmTransport::stop() {

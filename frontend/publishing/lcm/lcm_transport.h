@@ -55,14 +55,17 @@ class LcmTransport final : public PublishTransport {
   };
   std::optional<Opened> open(std::string_view channel, ByteSpan datagram) RELMAP_REQUIRES(mutex_);
   bool counts(const BootId& boot, const Opened& opened) RELMAP_REQUIRES(mutex_);
+  // Passes a message to a function of the listener.
+  template <typename Message>
+  void tell(std::function<void(const Message&)> Listener::*heard, const Message& message);
   void transmit(const char* channel, Bytes message);
+  void put_out(const char* channel, const Bytes& datagram);
   void keep_in_touch();
 
   using Time = std::chrono::steady_clock::time_point;
 
   const Publish publish_;
   const bool local_;
-  const bool sealed_;
   Mutex listener_mutex_;  // the listener is called under it, and may hold locks of which others call this object
   Listener listener_ RELMAP_GUARDED_BY(listener_mutex_);
   mutable Mutex mutex_;

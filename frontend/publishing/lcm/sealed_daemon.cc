@@ -33,11 +33,11 @@ void SealedDaemon::seal(std::string_view channel, Bytes& message) {
   sealer_.seal(access::SealedBy::kRobot, channel, *addressed_, {key_.id, run_, addressed()->time_us, ++sent_}, message);
 }
 
-std::optional<SealedDaemon::Opened> SealedDaemon::open(std::string_view channel, ByteSpan datagram) {
+std::optional<access::SealedMessage> SealedDaemon::open(std::string_view channel, ByteSpan datagram) {
   const auto sealed = access::split_sealed(datagram);
   if (!sealed || sealed->seal.key != key_.id || sealed->seal.run != run_) return std::nullopt;
   if (!sealer_.verify(access::SealedBy::kDaemon, channel, {}, *sealed)) return std::nullopt;
-  return Opened{sealed->message, sealed->seal};
+  return sealed;
 }
 
 bool SealedDaemon::heard(const BootId& boot, const access::Seal& seal, Time now) {

@@ -32,13 +32,9 @@ class SealedDaemon {
   // Seals a message for the addressed daemon. Requires ready().
   void seal(std::string_view channel, Bytes& message);
 
-  struct Opened {
-    ByteSpan message;
-    access::Seal seal;
-  };
   // What a daemon has sealed for this run; nullopt for anything else. The message says of which daemon it is, and
   // counts only if heard() then says so.
-  std::optional<Opened> open(std::string_view channel, ByteSpan datagram);
+  std::optional<access::SealedMessage> open(std::string_view channel, ByteSpan datagram);
   // Whether a message that open() has opened is newer than all before from the daemon of this boot.
   bool heard(const BootId& boot, const access::Seal& seal, Time now);
   // A message that counts was a welcome. Returns whether the daemon is the addressed one now. Another one takes its
