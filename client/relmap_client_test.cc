@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "client/server_address.h"
 #include "proto/wire/convert.h"
@@ -24,7 +25,11 @@ grpc::Status refusal(Reason reason, const std::string& message) {
 
 class FakeMap final : public v1::Map::Service {
  public:
-  grpc::Status GetStatus(grpc::ServerContext*, const v1::GetStatusRequest*, v1::GetStatusReply* reply) override {
+  std::set<std::string> peers;  // that asked for the status
+
+  grpc::Status GetStatus(grpc::ServerContext* context, const v1::GetStatusRequest*,
+                         v1::GetStatusReply* reply) override {
+    peers.insert(context->peer());
     reply->set_boot_id("boot-1");
     reply->set_frames(7);
     auto* refused = reply->add_refused_by_reason();
@@ -220,6 +225,14 @@ TEST_F(ClientTest, ReadsStatus) {
   EXPECT_EQ(status->frames, 7u);
   EXPECT_EQ(status->refused_by_reason, (ReasonCounts{{Reason::TIME_BACKWARDS, 3}}));
   EXPECT_EQ(status->storage.to_string(), "READ_ONLY: disk full");
+}
+
+TEST_F(ClientTest, HasAConnectionOfItsOwn) {
+  const auto first = client();
+  const auto second = client();
+  EXPECT_TRUE(first->status().ok());
+  EXPECT_TRUE(second->status().ok());
+  EXPECT_EQ(map_.peers.size(), 2u) << "what another client was connected to may be a daemon that is gone";
 }
 
 TEST_F(ClientTest, ReturnsTheDaemonsReason) {
