@@ -36,7 +36,7 @@ class RecordedGraph final : public storage::PartialGraph {
   std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
     return id.session == 1 && id.index < size() ? frames_[id.index] : nullptr;
   }
-  std::vector<storage::Session> sessions() const override { return {*session(1)}; }
+  std::vector<storage::Session> all_sessions() const override { return {*session(1)}; }
   std::optional<storage::Session> session(SessionNumber) const override {
     storage::Session session;
     session.number = 1;

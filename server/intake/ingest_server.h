@@ -27,7 +27,7 @@ class IngestServer {
 
   // For transports without flow control: checks the part, queues it for its sender (part_queue.h) and returns at once.
   void take_part(KeyframePart part, Sender sender = {});
-  // As Intake's. They may block while a session begins.
+  // As Intake's.
   Status take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
                       const Sender& sender = {});
   Status take_gap(const Gap& gap, const Sender& sender = {});

@@ -82,13 +82,20 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
         if (outcomes->wake) outcomes->wake();
       });
     };
+    auto begin = [this, session, outcomes = outcomes_](const SessionHeader& header) {
+      sink_.begin_session(header, [outcomes, session](const Result<SessionNumber>& number) {
+        const MutexLock lock(outcomes->mutex);
+        outcomes->begun.emplace_back(session, number);
+        if (outcomes->wake) outcomes->wake();
+      });
+    };
     it = sessions_
-             .emplace(session,
-                      Entry{SessionIntake(session, sink_, std::move(submit), stats_, options_.robots, options_.proving),
-                            AcknowledgementSchedule(options_.times)})
+             .emplace(session, Entry{SessionIntake(session, sink_, std::move(submit), std::move(begin), stats_,
+                                                   options_.robots, options_.proving),
+                                     AcknowledgementSchedule(options_.times)})
              .first;
     it->second.schedule.news();  // tells the robot what the daemon has
-    it->second.begun = it->second.intake.begun();
+    it->second.begun = it->second.intake.has_begun();
     it->second.heard_first = now;
   }
   Entry& entry = it->second;
@@ -116,7 +123,7 @@ bool Intake::make_room(SteadyTime now) {
   auto oldest = sessions_.end();
   for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
     if (oldest != sessions_.end() && it->second.schedule.last_heard() >= oldest->second.schedule.last_heard()) continue;
-    if (!it->second.intake.begun() || it->second.intake.idle()) oldest = it;
+    if (!(it->second.intake.has_begun() || it->second.intake.begins()) || it->second.intake.idle()) oldest = it;
   }
   if (oldest == sessions_.end()) return false;
   remember(oldest->first, oldest->second, now);
@@ -343,8 +350,19 @@ void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(r
 const Status& Intake::blocked(const Entry& entry) const { return entry.in_line ? no_room_ : entry.intake.blocked(); }
 
 void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
-  if (entry.intake.has_next()) join_line(session, entry);
+  if (!entry.begun)
+    try_to_begin(session, entry, now);
+  else if (entry.intake.has_next())
+    join_line(session, entry);
   serve_line(now);
+}
+
+// What a session has before it begins needs no room in the sink: refusals are settled until then without a record.
+void Intake::try_to_begin(const SessionUuid& session, Entry& entry, SteadyTime now) {
+  if (now < entry.begin_again) return;
+  while (entry.intake.submit_next()) {
+  }
+  reassembly_.forget(session, entry.intake.turn());
 }
 
 void Intake::join_line(const SessionUuid& session, Entry& entry) {
@@ -353,20 +371,15 @@ void Intake::join_line(const SessionUuid& session, Entry& entry) {
 
 void Intake::leave_line(const SessionUuid& session) { std::erase(line_, session); }
 
-// Submits what the sessions in line have, one record of each in turn, until the sink has no more room. A session that
-// cannot begin, since the map has as many as its memory allows, keeps nobody waiting; poll() lets it try again.
+// Submits what the sessions in line have, one record of each in turn, until the sink has no more room.
 void Intake::serve_line(SteadyTime now) {
   take_outcomes(now);  // records that failed must be submitted again before later ones
   while (!line_.empty()) {
     const SessionUuid session = line_.front();
     Entry& entry = sessions_.find(session)->second;
     const bool more = entry.intake.submit_next();
-    if (!entry.begun && entry.intake.begun()) {
-      entry.begun = true;
-      ++begun_version_;
-    }
     reassembly_.forget(session, entry.intake.turn());
-    if (entry.intake.begun() && entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED) {
+    if (entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED) {
       no_room_ = entry.intake.blocked();
       return;
     }
@@ -378,9 +391,26 @@ void Intake::serve_line(SteadyTime now) {
 
 void Intake::take_outcomes(SteadyTime now) {
   std::vector<Outcomes::Outcome> outcomes;
+  std::vector<std::pair<SessionUuid, Result<SessionNumber>>> begun;
   {
     const MutexLock lock(outcomes_->mutex);
     outcomes.swap(outcomes_->list);
+    begun.swap(outcomes_->begun);
+  }
+  for (const auto& [session, number] : begun) {
+    const auto it = sessions_.find(session);
+    if (it == sessions_.end() || !it->second.intake.begins()) continue;  // it was forgotten meanwhile
+    Entry& entry = it->second;
+    entry.intake.begun(number);
+    entry.schedule.news();
+    if (!number.ok()) {
+      entry.begin_again = now + (number.reason() == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails);
+      continue;
+    }
+    entry.begun = true;
+    ++begun_version_;
+    if (!std::exchange(entry.announced, true)) note(RobotEvent::Kind::kHeard, session, entry, now);
+    join_line(session, entry);
   }
   for (const Outcomes::Outcome& outcome : outcomes) {
     const auto it = sessions_.find(outcome.session);
@@ -453,8 +483,13 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   take_outcomes(now);
   forget_silent(now);
   tell_of_namesakes(now);
-  for (auto& [session, entry] : sessions_)
-    if (!entry.intake.blocked().ok()) join_line(session, entry);
+  for (auto& [session, entry] : sessions_) {
+    if (entry.intake.blocked().ok()) continue;
+    if (entry.begun)
+      join_line(session, entry);
+    else
+      try_to_begin(session, entry, now);  // it cannot, for example since the map has as many as its memory allows
+  }
   serve_line(now);
   std::vector<Acknowledgement> due;
   for (auto& [session, entry] : sessions_) {
@@ -531,12 +566,10 @@ Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const E
 
 Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try {
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
-  for (const storage::Session& known : sink_.view()->sessions()) {
-    if (known.header.uuid != session) continue;
-    const auto entry = open(session, SteadyTime{}, {});
-    return entry.ok() ? make_acknowledgement(session, **entry) : Result<Acknowledgement>(entry.status());
-  }
-  return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
+  if (const auto number = sink_.find_session(session); !number || !sink_.view()->session(*number))
+    return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
+  const auto entry = open(session, SteadyTime{}, {});
+  return entry.ok() ? make_acknowledgement(session, **entry) : Result<Acknowledgement>(entry.status());
 } catch (const StatusError& error) {
   return error.status();
 }

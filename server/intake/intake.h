@@ -8,6 +8,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "proto/base/mutex.h"
@@ -91,6 +92,7 @@ class Intake {
     SteadyTime held_back_since{};  // since when it sends more than is taken; epoch: it does not
     SteadyTime slowed_at{};        // when it was last told to slow down; epoch: never, or told to resume
     SteadyTime heard_first{};
+    SteadyTime begin_again{};  // when it may try to begin again, after it was refused that
     bool in_line = false;
     bool may_begin = false;  // counted among the new sessions of its sender
     bool begun = false;
@@ -108,7 +110,7 @@ class Intake {
     SteadyTime at{};
   };
   using Namesakes = std::map<SessionUuid, std::vector<SessionUuid>>;
-  // Outcomes of submitted records, from the sink's threads until poll().
+  // Outcomes of submitted records and of beginnings, from the sink's threads until poll().
   struct Outcomes {
     struct Outcome {
       SessionUuid session;
@@ -117,6 +119,7 @@ class Intake {
     };
     Mutex mutex;
     std::vector<Outcome> list RELMAP_GUARDED_BY(mutex);
+    std::vector<std::pair<SessionUuid, Result<SessionNumber>>> begun RELMAP_GUARDED_BY(mutex);
     std::function<void()> wake RELMAP_GUARDED_BY(mutex);
   };
 
@@ -142,6 +145,7 @@ class Intake {
                   SteadyTime now, const Sender& sender);
   void take_outcomes(SteadyTime now);
   void advance(const SessionUuid& session, Entry& entry, SteadyTime now);
+  void try_to_begin(const SessionUuid& session, Entry& entry, SteadyTime now);
   void join_line(const SessionUuid& session, Entry& entry);
   void leave_line(const SessionUuid& session);
   void serve_line(SteadyTime now);

@@ -289,6 +289,49 @@ TEST_F(IntakeTest, SequencesBeyondTheWindowWait) {
   EXPECT_EQ(acknowledge().missing, (std::vector<SequenceRange>{{0, kIntakeWindow - 2}}));
 }
 
+// A session begins when its number is durable. Nobody waits for that.
+TEST_F(IntakeTest, OthersGoOnWhileASessionBegins) {
+  const SessionUuid slow = uuid_;
+  sink_.begin_slowly = true;
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  EXPECT_EQ(acknowledge().next_sequence, 0u);
+  EXPECT_EQ(acknowledge().held, (std::vector<SequenceRange>{{0, 2}})) << "they need not be sent again";
+  EXPECT_TRUE(intake_->begun().empty());
+  EXPECT_TRUE(intake_->take_events().empty());
+
+  sink_.begin_slowly = false;
+  uuid_.bytes[0] ^= 0x40;
+  send(0);
+  EXPECT_EQ(settle().next_sequence, 1u);
+  uuid_ = slow;
+  EXPECT_EQ(acknowledge().next_sequence, 0u);
+  (void)intake_->take_events();
+
+  sink_.let_begin();
+  (void)acknowledge();
+  EXPECT_TRUE(intake_->begun().contains(slow));
+  const auto events = intake_->take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, RobotEvent::Kind::kHeard);
+  EXPECT_EQ(events[0].uuid, slow);
+  EXPECT_EQ(settle().next_sequence, 3u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, ASessionThatIsRefusedItsBeginningIsTriedAgain) {
+  sink_.begin_slowly = true;
+  sink_.refuse_begin = Status(Reason::DISK_FULL, "no room");
+  for (std::uint32_t s = 0; s < 2; ++s) send(s);
+  sink_.let_begin();
+  EXPECT_EQ(acknowledge().credits, 0u) << "the disk takes nothing";
+  sink_.refuse_begin = Status();
+  EXPECT_EQ(acknowledge().credits, 0u) << "it is tried again, and has not succeeded yet";
+  sink_.let_begin();
+  EXPECT_EQ(settle().next_sequence, 0u);
+  EXPECT_EQ(settle().next_sequence, 2u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
 TEST_F(IntakeTest, RefusalsBeforeASessionBeginsAreCountedSeparately) {
   const auto waiting = [&] {
     return intake_->stats(now_).refused_before_begin[index_of(Reason::IMPLAUSIBLE_CALIBRATION)];

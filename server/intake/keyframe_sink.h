@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "proto/keyframe/keyframe.h"
 #include "storage/graph/graph.h"
@@ -17,9 +18,12 @@ class KeyframeSink {
  public:
   virtual ~KeyframeSink() = default;
 
-  // Returns the number of the session with this uuid once it is durable. CALIBRATION_CHANGED if the session began with
-  // another camera or flags.
-  virtual Result<SessionNumber> begin_session(const SessionHeader& header) = 0;
+  // Calls `begun` once, within this call or from any thread, with the number of the session with this uuid once it is
+  // durable. CALIBRATION_CHANGED if the session began with another camera or flags.
+  using Begun = std::function<void(const Result<SessionNumber>&)>;
+  virtual void begin_session(const SessionHeader& header, Begun begun) = 0;
+  // The number of the session with this uuid; nullopt if it has not begun.
+  virtual std::optional<SessionNumber> find_session(const SessionUuid& uuid) const = 0;
 
   // Queues a record. If the result is OK, `done` is called once, from any thread, when the record is durable or will
   // never be. Otherwise `done` is not called; after BUDGET_EXCEEDED try again later. Records become durable in the

@@ -39,24 +39,39 @@ Status check_clock(std::int64_t time_us) {
 
 }  // namespace
 
-SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
-                             const std::set<std::string>& robots, const std::set<std::string>& proving)
-    : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats), robots_(robots), proving_(proving) {
+SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, Begin begin,
+                             IngestStats& stats, const std::set<std::string>& robots,
+                             const std::set<std::string>& proving)
+    : uuid_(uuid),
+      sink_(sink),
+      submit_(std::move(submit)),
+      begin_(std::move(begin)),
+      stats_(stats),
+      robots_(robots),
+      proving_(proving) {
+  const auto number = sink_.find_session(uuid);
   const auto view = sink_.view();
-  for (const storage::Session& session : view->sessions()) {
-    if (session.header.uuid != uuid) continue;
-    number_ = session.number;
-    header_ = session.header;
-    ended_ = session.state == storage::SessionState::kEnded;
-    durable_ = turn_ = seen_ = session.next_sequence;
-    if (session.frames > 0) durable_time_us_ = turn_time_us_ = session.last_time_us;
-    const std::uint32_t newest = session.next_sequence - std::min(session.next_sequence, kNewest);
-    view->visit_skipped(session.number, newest, [&](const storage::Skipped& settled) {
-      if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
-      return true;
-    });
-    return;
-  }
+  const auto session = number ? view->session(*number) : std::nullopt;
+  if (!session) return;
+  number_ = session->number;
+  header_ = session->header;
+  ended_ = session->state == storage::SessionState::kEnded;
+  durable_ = turn_ = seen_ = session->next_sequence;
+  if (session->frames > 0) durable_time_us_ = turn_time_us_ = session->last_time_us;
+  const std::uint32_t newest = session->next_sequence - std::min(session->next_sequence, kNewest);
+  view->visit_skipped(session->number, newest, [&](const storage::Skipped& settled) {
+    if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
+    return true;
+  });
+}
+
+// What the map knows of the session; where it cannot be read, as it was read last.
+std::optional<storage::Session> SessionIntake::session() const try {
+  if (number_)
+    if (auto now = sink_.view()->session(*number_)) last_read_ = std::move(now);
+  return last_read_;
+} catch (const StatusError&) {
+  return last_read_;
 }
 
 std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequence) {
@@ -148,7 +163,13 @@ bool SessionIntake::has_next() const {
 
 bool SessionIntake::submit_next() {
   if (broken_) return false;
-  blocked_ = {};
+  const Status before = std::exchange(blocked_, {});
+  const bool submitted = submit_in_turn();
+  if (beginning_) blocked_ = before;  // whether it is over, the outcome will tell
+  return submitted;
+}
+
+bool SessionIntake::submit_in_turn() {
   if (const auto it = held_.find(static_cast<std::uint32_t>(turn_)); turn_ <= UINT32_MAX && it != held_.end()) {
     if (!judge_keyframe(it->first, it->second)) return false;
     waiting_bytes_ -= it->second.payload.size();
@@ -166,11 +187,10 @@ bool SessionIntake::submit_next() {
 
 // Not OK if an operator has frozen or deleted the session.
 Status SessionIntake::judge_session() const {
-  const auto session = number_ ? sink_.view()->session(*number_) : std::nullopt;
-  if (!session) return {};
-  if (storage::is_frozen(*session)) return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
-  if (storage::is_going(*session))
-    return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
+  const auto now = session();
+  if (!now) return {};
+  if (storage::is_frozen(*now)) return {Reason::SESSION_FROZEN, "session " + now->display_name + " is frozen"};
+  if (storage::is_going(*now)) return {Reason::SESSION_DELETED, "session " + now->display_name + " was deleted"};
   return {};
 }
 
@@ -191,7 +211,11 @@ Status SessionIntake::judge_in_turn(const Held& held) const {
 bool SessionIntake::judge_keyframe(std::uint32_t sequence, Held& held) {
   const Status verdict = judge_in_turn(held);
   if (verdict.ok()) {
-    if (!number_ && !begin(held.header)) return false;
+    if (!number_) {
+      // Until it has begun, what was settled may be forgotten, because the robot can send it again.
+      if (!beginning_) begin_(*(beginning_ = held.header));
+      return false;
+    }
     // Submits a copy, because it is submitted again if the sink has no room.
     if (!submit(storage::KeyframeRecord{*number_, held.crc, held.payload}, sequence + std::uint64_t{1}, held.time_us,
                 true))
@@ -230,17 +254,13 @@ void SessionIntake::end(std::uint64_t next_sequence) {
   submitted_.push_back(std::move(end));
 }
 
-// A session begins with its first acceptable keyframe. What was settled before is journalled then. Until then it may be
-// forgotten, because the robot can send it again.
-bool SessionIntake::begin(const SessionHeader& header) {
-  const Result<SessionNumber> number = sink_.begin_session(header);
-  if (!number.ok()) {
-    blocked_ = number.status();
-    return false;
-  }
+// A session begins with its first acceptable keyframe. What was settled before is journalled then.
+void SessionIntake::begun(const Result<SessionNumber>& number) {
+  const SessionHeader header = *std::exchange(beginning_, std::nullopt);
+  blocked_ = number.status();
+  if (!number.ok()) return;
   number_ = *number;
   header_ = header;
-  return true;
 }
 
 bool SessionIntake::journal_before_begin() {
@@ -328,9 +348,9 @@ void SessionIntake::roll_back() {
 
 void SessionIntake::prune_judged() {
   if (judged_.size() <= kKeepJudged || !number_) return;
-  const auto session = sink_.view()->session(*number_);
-  if (!session) return;
-  const auto end = judged_.lower_bound(session->next_sequence);
+  const auto now = session();
+  if (!now) return;
+  const auto end = judged_.lower_bound(now->next_sequence);
   for (auto it = judged_.begin(); it != end && judged_.size() > kKeepJudged / 2;) it = judged_.erase(it);
 }
 
@@ -355,10 +375,10 @@ void SessionIntake::let_go() {
 }
 
 bool SessionIntake::idle() {
-  if (!submitted_.empty() || !held_.empty() || !given_up_.empty()) return false;
+  if (beginning_ || !submitted_.empty() || !held_.empty() || !given_up_.empty()) return false;
   if (!number_) return before_begin_.empty();
-  const auto session = sink_.view()->session(*number_);
-  return session && session->next_sequence == durable_;
+  const auto now = session();
+  return now && now->next_sequence == durable_;
 }
 
 Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) const {

@@ -34,9 +34,12 @@ class SessionIntake {
   // Journals a record as KeyframeSink::submit() does; the caller passes the outcome to settle() with this ticket.
   using Submit = std::function<Status(storage::JournalRecord record, std::uint64_t ticket)>;
 
+  // Begins a session as KeyframeSink::begin_session() does; the caller passes the outcome to begun().
+  using Begin = std::function<void(const SessionHeader& header)>;
+
   // Resumes from what the map knows of the session. `robots` names the robots whose keyframes are taken; empty: all.
   // `proving` names those whose keyframes nobody may send who proves nothing.
-  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
+  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, Begin begin, IngestStats& stats,
                 const std::set<std::string>& robots, const std::set<std::string>& proving);
 
   // What a keyframe with this sequence and checksum would be now.
@@ -61,6 +64,10 @@ class SessionIntake {
   bool submit_next();
   // Whether the next sequence has come, or has been given up, so that submit_next() has something to do.
   bool has_next() const;
+  // Whether it is beginning.
+  bool begins() const { return beginning_.has_value(); }
+  // Handles the outcome of that.
+  void begun(const Result<SessionNumber>& number);
   // Handles the outcome of a submitted record.
   void settle(std::uint64_t ticket, const Status& outcome);
 
@@ -81,7 +88,7 @@ class SessionIntake {
   // Drops the last of these; its robot is asked for it again.
   void drop_last_waiting();
   // Whether the session is in the journal.
-  bool begun() const { return number_.has_value(); }
+  bool has_begun() const { return number_.has_value(); }
   // 0 if the session has not begun.
   SessionNumber number() const { return number_.value_or(0); }
   // Until the session begins, the header of its newest sound keyframe; nil uuid if none came.
@@ -129,10 +136,11 @@ class SessionIntake {
     Reason reason = Reason::DROPPED_BY_ROBOT;
   };
 
+  bool submit_in_turn();
   std::optional<Judged> judged(std::uint32_t sequence);
   Status judge_in_turn(const Held& held) const;
   Status judge_session() const;
-  bool begin(const SessionHeader& header);
+  std::optional<storage::Session> session() const;
   bool journal_before_begin();
   bool judge_keyframe(std::uint32_t sequence, Held& held);
   bool judge_gap(std::uint32_t to, Reason reason);
@@ -145,13 +153,16 @@ class SessionIntake {
   const SessionUuid uuid_;
   KeyframeSink& sink_;
   const Submit submit_;
+  const Begin begin_;
   IngestStats& stats_;
   const std::set<std::string>& robots_;
   const std::set<std::string>& proving_;
 
-  std::optional<SessionNumber> number_;  // nullopt: nothing is durable yet
+  std::optional<SessionNumber> number_;     // nullopt: nothing is durable yet
+  std::optional<SessionHeader> beginning_;  // what begin_() was called with, until begun()
   SessionHeader header_;
-  std::deque<BeforeBegin> before_begin_;  // journalled first once there is a number
+  mutable std::optional<storage::Session> last_read_;  // of session()
+  std::deque<BeforeBegin> before_begin_;               // journalled first once there is a number
 
   std::uint64_t durable_ = 0;  // every sequence below is settled
   std::uint64_t turn_ = 0;     // every sequence below is judged; those from durable_ on are not durable yet

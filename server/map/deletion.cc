@@ -22,7 +22,8 @@ namespace relmap::map {
 
 namespace {
 
-constexpr double kMinDepth = 0.1;  // metres in front of a camera: nearer points are not re-based
+constexpr std::size_t kSkippedAtOnce = 4096;  // records of skipped sequences that are removed by one record
+constexpr double kMinDepth = 0.1;             // metres in front of a camera: nearer points are not re-based
 
 // What a remaining frame knows of a landmark through a closure: an observation of it, or the claim of another landmark
 // that it observes.
@@ -568,7 +569,8 @@ storage::Edge Deletion::add_compounded(storage::Edge edge) {
 }  // namespace
 
 std::optional<storage::RemoveChunkRecord> next_deletion(const storage::Session& session) {
-  if (!storage::is_going(session) || session.frames == 0) return std::nullopt;
+  if (!storage::is_going(session) || (session.frames == 0 && session.refused == 0 && session.given_up == 0))
+    return std::nullopt;
   return storage::RemoveChunkRecord{session.number, storage::chunk_of({session.number, session.last})};
 }
 
@@ -577,6 +579,10 @@ ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const st
   const auto session = map.session(record.session);
   const auto next = session ? next_deletion(*session) : std::nullopt;
   if (!next || next->chunk != record.chunk) return {};
+  if (session->frames == 0) {
+    map.forget_skipped(record.session, kSkippedAtOnce);
+    return {};
+  }
   return Deletion(map, sequence, record.session, loop_edge_spacing).run();
 }
 

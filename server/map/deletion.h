@@ -22,11 +22,12 @@
 
 namespace relmap::map {
 
-// The next chunk to remove; nullopt if no frame is left or the session is not being deleted.
+// The next chunk to remove, 0 while only records of skipped sequences are left; nullopt if nothing is left but the
+// session's own record, or the session is not being deleted.
 std::optional<storage::RemoveChunkRecord> next_deletion(const storage::Session& session);
 
-// Removes a chunk. Changes nothing if the session is not being deleted, or if the chunk is not its last. `sequence` is
-// the record's in the journal.
+// Removes a chunk or, if no frame is left, some of the records of skipped sequences. Changes nothing if the session is
+// not being deleted, or if the chunk is not its last. `sequence` is the record's in the journal.
 ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const storage::RemoveChunkRecord& record,
                              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 

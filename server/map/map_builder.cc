@@ -50,15 +50,22 @@ storage::Observation observe(LandmarkId landmark, const TrackMeasurement& z) {
 MapBuilder::MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaOptions rba,
                        std::uint32_t loop_edge_spacing, ConsistencyRules rules)
     : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing), rules_(rules) {
-  freeze_sessions();
+  map_.visit_sessions(0, [&](const storage::Session& session) {
+    if (stands_still(session)) frozen_.insert(session.number);
+    return true;
+  });
+  relaxer_.freeze({frozen_.begin(), frozen_.end()});
 }
 
-void MapBuilder::freeze_sessions() {
-  std::vector<SessionNumber> frozen;
-  for (const storage::Session& session : map_.sessions())
-    if (storage::is_frozen(session) || (storage::is_going(session) && session.frames > 0))
-      frozen.push_back(session.number);
-  relaxer_.freeze(std::move(frozen));
+// Whether the frames that the session has do not move.
+bool MapBuilder::stands_still(const storage::Session& session) {
+  return storage::is_frozen(session) || (storage::is_going(session) && session.frames > 0);
+}
+
+void MapBuilder::freeze(const storage::Session& session) {
+  const bool changed =
+      stands_still(session) ? frozen_.insert(session.number).second : frozen_.erase(session.number) > 0;
+  if (changed) relaxer_.freeze({frozen_.begin(), frozen_.end()});
 }
 
 Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& record,
@@ -71,6 +78,8 @@ Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& 
           return apply_record(sequence, r);
       },
       record);
+  if (const storage::EditKey* edit = storage::edit_key(record); edit && !edit->key.empty())
+    map_.remember_edit(sequence, *edit);
   storage::MapState& state = map_.state();
   if (std::holds_alternative<storage::IdleWorkRecord>(record))
     ++state.idle_records;
@@ -174,7 +183,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::GapRecord& record
   const auto session = map_.session(record.session);
   if (!session || record.to < record.from || record.from < session->next_sequence) return {};
   map_.skip(record.session, {record.from, record.to, 0, false, record.reason});
-  map_.state().gaps += record.to - record.from + 1;
+  if (!storage::is_going(*session)) map_.state().gaps += record.to - record.from + 1;
   return {};
 }
 
@@ -246,13 +255,14 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::SetSessionStateRe
   const bool thaws = storage::is_frozen(*session) && record.state == storage::SessionState::kOpen;
   edited.state = thaws ? session->before_frozen : record.state;
   edited.before_frozen = record.state == storage::SessionState::kFrozen ? session->state : storage::SessionState::kOpen;
-  freeze_sessions();
+  if (storage::is_deleted(edited)) storage::shrink_deleted(edited);
+  freeze(edited);
   return {};
 }
 
 Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::RemoveChunkRecord& record) {
   const Applied applied = relax_from(apply_deletion(map_, sequence, record, loop_edge_spacing_));
-  freeze_sessions();
+  if (const auto session = map_.session(record.session)) freeze(*session);
   return applied;
 }
 

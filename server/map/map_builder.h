@@ -56,7 +56,8 @@ class MapBuilder {
   Applied relax_from(ClosureChange change);
   template <typename Edit>
   Applied recorded(Edit edit);
-  void freeze_sessions();
+  static bool stands_still(const storage::Session& session);
+  void freeze(const storage::Session& session);
   template <typename Work>
   void timed(Applied& applied, Work work);
 
@@ -65,6 +66,7 @@ class MapBuilder {
   rba::Relaxer relaxer_;
   std::uint32_t loop_edge_spacing_;
   ConsistencyRules rules_;
+  std::set<SessionNumber> frozen_;  // sessions whose frames do not move
 };
 
 }  // namespace relmap::map

@@ -113,6 +113,7 @@ struct Mapper::Impl {
   Status read_only;  // not ok: why the engine takes no owner
   std::uint64_t epoch = 0;
   MapIdentity identity;
+  std::map<std::uint64_t, storage::EditKey> remembered_edits;
 
   // The state that threads wait for; `changed` is notified of each change. Declared before the parts below, which call
   // tell_waiting() until they are destroyed.
@@ -143,7 +144,9 @@ struct Mapper::Impl {
   BackgroundWork background{options.idle_slice, background_hooks()};
   DeterministicDriver in_step{options.idle_slice, lookups, driver_hooks()};
   SessionRegistry sessions{engine, budget, [this] { return map->view(); },
-                           [this](storage::SessionRecord record) { return submit_and_wait(std::move(record)); },
+                           [this](storage::SessionRecord record, SessionRegistry::Durable done) {
+                             return submit(std::move(record), std::move(done));
+                           },
                            [this] { return failed ? health() : Status(); }};
   std::unique_ptr<JournalWriter> writer;  // declared after everything that its thread calls
 
@@ -259,8 +262,12 @@ void Mapper::Impl::recover() {
     spdlog::info("recovered: journal records {} to {} were applied again, {} keyframes among them, in {:.1f} s",
                  committed + 1, through, replayed.frames.size(),
                  std::chrono::duration<double>(Clock::now() - begun).count());
-  sessions.load(epoch, view->sessions());
-  for (const storage::Session& session : view->sessions()) begin_deletion(session);
+  remembered_edits = map->edits();
+  sessions.load(epoch, *view);
+  view->visit_sessions(0, [this](const storage::Session& session) {
+    begin_deletion(session);
+    return true;
+  });
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
   } else if (!replayed.trouble.ok()) {
@@ -431,7 +438,7 @@ void Mapper::Impl::begin_deletion(const storage::Session& session) {
   if (!storage::is_going(session)) return;
   if (recognition) recognition->forget(session.number);
   lookups.forget_failed(session.number);
-  if (session.frames > 0) background.delete_session(session.number);
+  if (next_deletion(session)) background.delete_session(session.number);
 }
 
 // The queue may be full of robots' keyframes, or the disk may take nothing for a while. False if the daemon stops or
@@ -502,6 +509,7 @@ Status Mapper::Impl::stop() {
     changed.notify_all();
   }
   lookups.stop();
+  sessions.stop();
   writer->stop();
   {
     const MutexLock lock(mutex);
@@ -535,6 +543,10 @@ Result<std::unique_ptr<Mapper>> Mapper::open(std::shared_ptr<storage::Engine> en
 }
 
 Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) { return impl_->sessions.begin(header); }
+void Mapper::begin_session(const SessionHeader& header, Begun begun) {
+  impl_->sessions.begin(header, std::move(begun));
+}
+std::optional<SessionNumber> Mapper::find_session(const SessionUuid& uuid) const { return impl_->sessions.find(uuid); }
 
 Status Mapper::submit(storage::JournalRecord record, Done done) {
   return impl_->submit(std::move(record), std::move(done));
@@ -543,6 +555,8 @@ Status Mapper::submit(storage::JournalRecord record, Done done) {
 Result<std::uint64_t> Mapper::submit_and_wait(storage::JournalRecord record) {
   return impl_->submit_and_wait(std::move(record));
 }
+
+const std::map<std::uint64_t, storage::EditKey>& Mapper::remembered_edits() const { return impl_->remembered_edits; }
 
 Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) const {
   MutexLock lock(impl_->mutex);

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -75,6 +76,11 @@ class Mapper {
   // Returns the number of the session with this uuid; a new session gets a number and is journalled. Fails as
   // SessionRegistry::begin() does.
   Result<SessionNumber> begin_session(const SessionHeader& header);
+  // The same without waiting for the disk; `begun` must neither block nor call back.
+  using Begun = std::function<void(const Result<SessionNumber>&)>;
+  void begin_session(const SessionHeader& header, Begun begun);
+  // The number of the session with this uuid; nullopt if it has not begun. view() may not show it yet.
+  std::optional<SessionNumber> find_session(const SessionUuid& uuid) const;
 
   // Queues the record for the journal. If the result is OK, `done` is called once, from the journal thread, with the
   // record's sequence when it is durable, or with the reason why it is not. Otherwise `done` is not called:
@@ -114,6 +120,9 @@ class Mapper {
   // Lookups seek ways around stops in this map from now on, unless they are deterministic: then the answer must not
   // depend on which cells exist. What `newest` uses must exist until stop() returns.
   void use_route_map(RouteMap newest);
+
+  // The last edits that had a key when the map was opened, by their sequences in the journal.
+  const std::map<std::uint64_t, storage::EditKey>& remembered_edits() const;
 
   std::shared_ptr<const storage::MapView> view() const;
   // The map's identity. It is not known() while it could not be made durable, because the map cannot be written.

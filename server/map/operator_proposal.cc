@@ -16,6 +16,7 @@ Result<std::uint64_t> write_proposal(Mapper& mapper, const OperatorProposal& pro
   auto found = propose_closure(*mapper.view(), mapper.places(), pictures, proposal.a, proposal.b);
   if (!found.ok()) return found.status();
   const FrameId query = found->query, match = found->match;
+  if (!proposal.accept) found->edit = proposal.edit;
   const auto written = mapper.submit_and_wait(std::move(found).value());
   if (!written.ok()) return written.status();
   if (Status applied = mapper.wait_applied(*written, deadline); !applied.ok()) return applied;
@@ -23,10 +24,11 @@ Result<std::uint64_t> write_proposal(Mapper& mapper, const OperatorProposal& pro
   const auto edge = closure_between(*view, query, match);
   if (!edge || edge->history.front().journal_sequence != *written) return overtaken();
   if (!proposal.accept) return *written;
-  const storage::SetEdgeStateRecord accept = edit_record(edge->id, EdgeAction::kAccept, proposal.note);
+  storage::SetEdgeStateRecord accept = edit_record(edge->id, EdgeAction::kAccept, proposal.note);
   if (Status possible = check_edge_edit(*view, accept); !possible.ok())
     return {possible.reason(), "proposed as " + edge->id.to_string() + ", but: " + possible.message()};
-  return mapper.submit_and_wait(accept);
+  accept.edit = proposal.edit;
+  return mapper.submit_and_wait(std::move(accept));
 }
 
 std::optional<storage::Edge> closure_of_record(const storage::Graph& graph, FrameId a, FrameId b,

@@ -17,6 +17,7 @@ struct OperatorProposal {
   FrameId a, b;
   bool accept = false;  // the closure is put into force at once
   std::string note;     // of the acceptance
+  storage::EditKey edit = {};
 };
 
 // Journals the closure that propose_closure() finds between the two frames and, if it is to be put into force, that

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "storage/engine/memory_engine.h"
@@ -16,6 +20,7 @@ namespace {
 class SessionsOnly final : public storage::PartialGraph {
  public:
   std::shared_ptr<const storage::FrameHot> hot(FrameId) const override { return nullptr; }
+  std::vector<storage::Session> all_sessions() const override { return known; }
   std::optional<storage::Session> session(SessionNumber number) const override {
     for (const storage::Session& session : known)
       if (session.number == number) return session;
@@ -38,26 +43,44 @@ class SessionRegistryTest : public ::testing::Test {
     return header;
   }
 
+  // Makes records durable at once, or keeps them until the test lets them be.
+  Status journal(storage::SessionRecord record, SessionRegistry::Durable done) {
+    if (!journal_takes_.ok()) return journal_takes_;
+    journalled_.push_back(std::move(record));
+    const std::uint64_t sequence = journalled_.size();
+    if (!journal_waits_) done(sequence);
+    if (journal_waits_) {
+      const std::lock_guard lock(waiting_mutex_);
+      waiting_.emplace_back(sequence, std::move(done));
+    }
+    return {};
+  }
+  std::size_t waiting() {
+    const std::lock_guard lock(waiting_mutex_);
+    return waiting_.size();
+  }
+
   const std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
   const std::uint64_t epoch_ = engine_->acquire().or_throw();
   const std::shared_ptr<storage::Budget> budget_;
   const std::shared_ptr<SessionsOnly> view_ = std::make_shared<SessionsOnly>();
   Status health_, journal_takes_;
   std::vector<storage::SessionRecord> journalled_;
+  std::atomic<bool> journal_waits_ = false;
+  std::mutex waiting_mutex_;
+  std::vector<std::pair<std::uint64_t, SessionRegistry::Durable>> waiting_;
   std::optional<SessionRegistry> sessions_{std::in_place,
                                            engine_,
                                            budget_,
                                            [this] { return view_; },
-                                           [this](storage::SessionRecord record) -> Result<std::uint64_t> {
-                                             if (!journal_takes_.ok()) return journal_takes_;
-                                             journalled_.push_back(std::move(record));
-                                             return std::uint64_t{journalled_.size()};
+                                           [this](storage::SessionRecord record, SessionRegistry::Durable done) {
+                                             return journal(std::move(record), std::move(done));
                                            },
                                            [this] { return health_; }};
 };
 
 TEST_F(SessionRegistryTest, ASessionKeepsItsNumberAndIsJournalledOnce) {
-  sessions_->load(epoch_, {});
+  sessions_->load(epoch_, *view_);
   const SessionHeader morning = header("morning"), evening = header("evening");
   const SessionNumber first = sessions_->begin(morning).or_throw();
   const SessionNumber second = sessions_->begin(evening).or_throw();
@@ -69,7 +92,7 @@ TEST_F(SessionRegistryTest, ASessionKeepsItsNumberAndIsJournalledOnce) {
 }
 
 TEST_F(SessionRegistryTest, SessionsOfOneNameAreNumbered) {
-  sessions_->load(epoch_, {});
+  sessions_->load(epoch_, *view_);
   sessions_->begin(header("tour")).or_throw();
   sessions_->begin(header("tour")).or_throw();
   sessions_->begin(header("tour", "another robot")).or_throw();
@@ -79,7 +102,7 @@ TEST_F(SessionRegistryTest, SessionsOfOneNameAreNumbered) {
 }
 
 TEST_F(SessionRegistryTest, TheCameraOfAKnownSessionIsCompared) {
-  sessions_->load(epoch_, {});
+  sessions_->load(epoch_, *view_);
   SessionHeader tour = header("tour");
   sessions_->begin(tour).or_throw();
   tour.camera.f = 510;
@@ -92,7 +115,7 @@ TEST_F(SessionRegistryTest, ASessionThatIsBeingDeletedIsRefused) {
   gone.header = header("gone");
   gone.state = storage::SessionState::kDeleting;
   view_->known = {gone};
-  sessions_->load(epoch_, view_->known);
+  sessions_->load(epoch_, *view_);
   EXPECT_EQ(Reason::SESSION_DELETED, sessions_->begin(gone.header).reason());
   health_ = Status(Reason::READ_ONLY, "the disk");
   EXPECT_EQ(Reason::SESSION_DELETED, sessions_->begin(gone.header).reason()) << "the more special reason";
@@ -100,17 +123,17 @@ TEST_F(SessionRegistryTest, ASessionThatIsBeingDeletedIsRefused) {
 
 // A damaged engine may count from the beginning again.
 TEST_F(SessionRegistryTest, ANumberInUseIsNotGivenAgain) {
-  std::vector<storage::Session> known(3);
+  view_->known.resize(3);
   for (SessionNumber i = 0; i < 3; ++i) {
-    known[i].number = i + 1;
-    known[i].header = header("known");
+    view_->known[i].number = i + 1;
+    view_->known[i].header = header("known");
   }
-  sessions_->load(epoch_, known);
+  sessions_->load(epoch_, *view_);
   EXPECT_EQ(4u, sessions_->begin(header("new")).or_throw());
 }
 
 TEST_F(SessionRegistryTest, SessionsThatAreNotJournalledAreNeitherKnownNorCharged) {
-  sessions_->load(epoch_, {});
+  sessions_->load(epoch_, *view_);
   const std::size_t before = budget_->used(storage::Share::kSessions);
   journal_takes_ = Status(Reason::DISK_FULL, "no room");
   const SessionHeader tour = header("tour");
@@ -124,13 +147,50 @@ TEST_F(SessionRegistryTest, SessionsThatAreNotJournalledAreNeitherKnownNorCharge
   EXPECT_EQ(Reason::READ_ONLY, sessions_->begin(header("later")).reason());
 }
 
+// Whoever asks does not wait for the disk, not even for that of another session.
+TEST_F(SessionRegistryTest, NobodyWaitsWhileSessionsAreMadeDurable) {
+  sessions_->load(epoch_, *view_);
+  const SessionHeader known = header("known"), slow = header("tour"), other = header("tour");
+  const SessionNumber number = sessions_->begin(known).or_throw();
+  journal_waits_ = true;
+  std::atomic<int> answers = 0;
+  std::set<SessionNumber> numbers;
+  const auto answered = [&](const Result<SessionNumber>& begun) {
+    EXPECT_TRUE(begun.ok()) << begun.status().to_string();
+    if (begun.ok()) numbers.insert(*begun);
+    ++answers;
+  };
+  for (const SessionHeader& session : {slow, other, slow}) sessions_->begin(session, answered);
+  while (waiting() < 2) std::this_thread::yield();
+  EXPECT_EQ(sessions_->begin(known).or_throw(), number);
+  EXPECT_EQ(sessions_->find(known.uuid), number);
+  EXPECT_EQ(sessions_->find(slow.uuid), std::nullopt) << "it is not durable yet";
+  SessionHeader changed = slow;
+  changed.camera.f = 510;
+  EXPECT_EQ(sessions_->begin(changed).reason(), Reason::CALIBRATION_CHANGED);
+  EXPECT_EQ(answers, 0);
+
+  for (auto& [sequence, done] : waiting_) done(sequence);
+  EXPECT_EQ(answers, 3);
+  EXPECT_EQ(numbers.size(), 2u) << "one session was begun twice";
+  EXPECT_EQ(sessions_->begin(changed).reason(), Reason::CALIBRATION_CHANGED) << "although the map does not show it yet";
+  ASSERT_EQ(journalled_.size(), 3u);
+  EXPECT_EQ(journalled_[2].display_name, "tour#2") << "it counts those that are beginning";
+}
+
+TEST_F(SessionRegistryTest, ThoseThatWaitAreRefusedAtTheEnd) {
+  sessions_->load(epoch_, *view_);
+  sessions_->stop();
+  EXPECT_EQ(sessions_->begin(header("late")).reason(), Reason::SHUTTING_DOWN);
+}
+
 class CrowdedRegistryTest : public SessionRegistryTest {
  protected:
   CrowdedRegistryTest() : SessionRegistryTest(std::size_t{1} << 20) {}
 };
 
 TEST_F(CrowdedRegistryTest, ThereAreAsManySessionsAsTheBudgetAllows) {
-  sessions_->load(epoch_, {});
+  sessions_->load(epoch_, *view_);
   Status refused;
   for (int i = 0; i < 10'000 && refused.ok(); ++i) refused = sessions_->begin(header("s" + std::to_string(i))).status();
   EXPECT_EQ(Reason::BUDGET_EXCEEDED, refused.reason());

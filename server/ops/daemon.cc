@@ -262,7 +262,7 @@ DaemonStatus Daemon::Impl::lcm_status() const {
   const map::MapperStats stats = mapper->stats();
   DaemonStatus status;
   status.version = RELMAP_VERSION;
-  status.sessions = storage::count_sessions(*view);
+  status.sessions = view->session_counts().all;
   status.keyframes = view->state().keyframes;
   status.refused = std::accumulate(view->state().refused.begin(), view->state().refused.end(), std::uint64_t{0});
   status.closures_accepted = view->state().closures_accepted;

@@ -301,14 +301,12 @@ PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexO
 PlaceIndex::~PlaceIndex() = default;
 
 Status PlaceIndex::restore(const storage::Graph& map) {
-  std::unordered_map<SessionNumber, storage::Session> sessions;
-  for (const storage::Session& session : map.sessions()) sessions.emplace(session.number, session);
   return impl_->places.restore([&](const FrameRun& run) {
-    const auto session = sessions.find(run.first.session);
-    if (session == sessions.end()) return false;
-    if (storage::is_going(session->second)) return true;
-    return session->second.frames >= run.count && session->second.first <= run.first.index &&
-           run.first.index + (run.count - 1) <= session->second.last;
+    const auto session = map.session(run.first.session);
+    if (!session) return false;
+    if (storage::is_going(*session)) return true;
+    return session->frames >= run.count && session->first <= run.first.index &&
+           run.first.index + (run.count - 1) <= session->last;
   });
 }
 
@@ -375,9 +373,11 @@ PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::spa
   });
   if (!mono) return answer;
   std::vector<storage::FrameRange> left_out(masked.begin(), masked.end());
-  for (const storage::Session& session : graph.sessions())
+  graph.visit_sessions(0, [&](const storage::Session& session) {
     if (!session.header.camera.is_stereo())
       left_out.push_back({session.number, 0, std::numeric_limits<std::uint32_t>::max()});
+    return true;
+  });
   return places.query(words, graph, left_out, {}, features);
 }
 

@@ -225,11 +225,13 @@ RbaSummary Relaxer::relax_fully() {
   RbaSummary summary;
   impl_->begin();
   impl_->seeds.clear();
-  for (const storage::Session& session : impl_->map.sessions())
+  impl_->map.visit_sessions(0, [this](const storage::Session& session) {
     for (std::uint64_t index = session.first; session.frames > 0 && index <= session.last; ++index) {
       const std::int32_t frame = impl_->local.frame({session.number, static_cast<std::uint32_t>(index)});
       if (frame >= 0) impl_->seeds.push_back(frame);
     }
+    return true;
+  });
   impl_->run(impl_->seeds, {0, std::numeric_limits<std::uint64_t>::max(), true}, &summary);
   impl_->begin();
   return summary;

@@ -25,8 +25,10 @@ class Walk {
     if (filter_.frame) return run_spans(around(*filter_.frame));
     if (filter_.session) return run_session(*filter_.session);
     std::vector<Span> all;
-    for (const storage::Session& session : graph_.sessions())
+    graph_.visit_sessions(0, [&](const storage::Session& session) {
       if (has_edges(session)) all.push_back({session.number, session.first, session.last});
+      return true;
+    });
     return run_spans(all);
   }
 

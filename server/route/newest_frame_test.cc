@@ -24,7 +24,7 @@ class SessionsOnly final : public storage::PartialGraph {
     return sessions_.emplace_back(session);
   }
   std::shared_ptr<const storage::FrameHot> hot(FrameId) const override { return nullptr; }
-  std::vector<storage::Session> sessions() const override { return sessions_; }
+  std::vector<storage::Session> all_sessions() const override { return sessions_; }
   std::optional<storage::Session> session(SessionNumber number) const override { return sessions_.at(number - 1); }
 
  private:

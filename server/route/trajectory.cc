@@ -12,9 +12,9 @@ Result<std::vector<storage::Session>> sessions_with_trajectory(const storage::Gr
                                                                std::vector<SessionNumber> numbers) {
   std::vector<storage::Session> sessions;
   if (numbers.empty()) {
-    sessions = graph.sessions();
-    std::erase_if(sessions, [](const storage::Session& session) {
-      return !session.header.camera.is_stereo() || storage::is_deleted(session);
+    graph.visit_sessions(0, [&](const storage::Session& session) {
+      if (session.header.camera.is_stereo() && !storage::is_deleted(session)) sessions.push_back(session);
+      return true;
     });
     return sessions;
   }

@@ -96,9 +96,10 @@ Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request,
   if (Status status = check_note(request.note()); !status.ok()) return status;
   if (request.dry_run()) return propose_dry(mapper, limits, *a, *b, request, deadline);
 
-  const auto written = edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&] {
-    return map::write_proposal(mapper, {*a, *b, request.accept(), request.note()}, deadline.at);
-  });
+  const auto written =
+      edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&](const storage::EditKey& named) {
+        return map::write_proposal(mapper, {*a, *b, request.accept(), request.note(), named}, deadline.at);
+      });
   if (!written.ok()) return written.status();
   if (Status applied = mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;
   const auto view = mapper.view();

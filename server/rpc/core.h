@@ -92,7 +92,12 @@ struct ImportTurn {
 // and call() passes them.
 struct Core {
   Core(map::Mapper& m, DaemonFacts f, RpcLimits l = {})
-      : mapper(m), facts(std::move(f)), limits(l), routes(facts.boot_id), views(facts.boot_id) {}
+      : mapper(m),
+        facts(std::move(f)),
+        limits(l),
+        routes(facts.boot_id),
+        views(facts.boot_id),
+        edits(m.remembered_edits()) {}
 
   auto parts() {
     return std::tie(mapper, facts, limits, intake, process, routes, metrics, views, edits, imports, maintenance);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <string>
 #include <unordered_map>
 
@@ -14,23 +15,25 @@
 
 namespace relmap::rpc {
 
-// Thread-safe. Remembers the last kKept edits of this run of the daemon.
+// Thread-safe. Remembers the last storage::kRememberedEdits edits with a key.
 class EditLog {
  public:
-  static constexpr std::size_t kKept = 4096;
-  static constexpr std::size_t kMaxKeyBytes = 128;
+  // `before`: those that the map remembers from before this run of the daemon, by sequence.
+  explicit EditLog(const std::map<std::uint64_t, storage::EditKey>& before = {});
 
   // Runs `edit`, which returns its journal sequence, unless an edit with this key was done already; then returns that
-  // one's sequence. Edits run one at a time. INVALID_ARGUMENT if the key is too long or was used for another `content`;
-  // DEADLINE.
+  // one's sequence. `edit` writes the key with its record, so that the map remembers it too. Edits run one at a time.
+  // INVALID_ARGUMENT if the key is too long or was used for another `content`; DEADLINE.
   Result<std::uint64_t> once(const std::string& key, const std::string& content, const Deadline& deadline,
-                             const std::function<Result<std::uint64_t>()>& edit);
+                             const std::function<Result<std::uint64_t>(const storage::EditKey& named)>& edit);
 
  private:
   struct Done {
-    std::size_t content = 0;  // hash
+    std::uint64_t content = 0;  // hash
     std::uint64_t sequence = 0;
   };
+  void remember(const storage::EditKey& edit, std::uint64_t sequence) RELMAP_REQUIRES(mutex_);
+
   Mutex mutex_;
   ConditionVariable ended_;
   bool running_ RELMAP_GUARDED_BY(mutex_) = false;  // an edit, without the mutex

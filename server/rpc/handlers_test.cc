@@ -861,6 +861,30 @@ std::vector<double> estimates_of(const storage::Graph& map, SessionNumber sessio
   return estimates;
 }
 
+TEST_F(Handlers, AnEditThatIsSentAgainAfterARestartIsDoneOnce) {
+  v1::FreezeSessionRequest freeze;
+  freeze.set_session(1);
+  freeze.set_frozen(true);
+  freeze.set_idempotency_key("freeze");
+  v1::SetLabelRequest label;
+  *label.mutable_frame() = to_wire(ServedMap::kFirst);
+  label.set_label("dock");
+  label.set_idempotency_key("label");
+  ASSERT_TRUE(ask(freeze_session, freeze).ok());
+  const auto labelled = ask(set_label, label);
+  ASSERT_TRUE(labelled.ok());
+  map_.restart();
+
+  const std::uint64_t last = map_.engine->last_journal_sequence();
+  EXPECT_TRUE(ask(freeze_session, freeze).ok()) << "once more it would be WRONG_STATE";
+  EXPECT_EQ(ask(set_label, label)->journal_sequence(), labelled->journal_sequence());
+  EXPECT_EQ(map_.engine->last_journal_sequence(), last);
+  label.set_label("door");
+  EXPECT_EQ(ask(set_label, label).reason(), Reason::INVALID_ARGUMENT) << "the key names another edit";
+  label.set_idempotency_key("door");
+  EXPECT_TRUE(ask(set_label, label).ok());
+}
+
 TEST_F(Handlers, AFrozenSessionDoesNotMoveWhenOthersCloseLoopsToIt) {
   v1::FreezeSessionRequest request;
   request.set_session(1);

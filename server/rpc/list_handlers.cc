@@ -38,15 +38,16 @@ Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& reque
   const std::uint32_t max_sessions = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
   v1::ListSessionsReply reply;
   reply.set_map_version(opened->kept->version());
-  for (const storage::Session& session : opened->kept->sessions()) {
-    if (session.number <= after || storage::is_deleted(session)) continue;
-    if (static_cast<std::uint32_t>(reply.sessions_size()) == max_sessions) {
-      reply.set_next_page_token(
-          views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
-      break;
-    }
-    *reply.add_sessions() = session_message(session);
-  }
+  bool more = false;
+  opened->kept->visit_sessions(after + 1, [&](const storage::Session& session) {
+    if (storage::is_deleted(session)) return true;
+    more = static_cast<std::uint32_t>(reply.sessions_size()) == max_sessions;
+    if (!more) *reply.add_sessions() = session_message(session);
+    return !more;
+  });
+  if (more)
+    reply.set_next_page_token(
+        views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
   return reply;
 }
 

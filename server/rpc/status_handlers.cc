@@ -33,7 +33,7 @@ void put_map(const MapIdentity& identity, const storage::MapView& view, v1::GetS
   reply.set_map_epoch(identity.epoch);
   const storage::MapFacts& state = view.state();
   reply.set_map_version(view.version());
-  reply.set_sessions(static_cast<std::uint32_t>(storage::count_sessions(view)));
+  reply.set_sessions(static_cast<std::uint32_t>(view.session_counts().all));
   reply.set_frames(state.keyframes);
   reply.set_gaps(state.gaps);
   std::uint64_t refused = 0;

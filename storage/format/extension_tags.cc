@@ -157,4 +157,22 @@ bool take_shown(Extensions& extensions, std::uint64_t& shown) {
   return r.at_end() && shown != 0;
 }
 
+void add_edit_key(Extensions& extensions, const EditKey& edit) {
+  if (edit.key.empty()) return;
+  ByteWriter w;
+  w.put(edit.content);
+  w.put_bytes(as_bytes(edit.key));
+  add_extension(extensions, kEditKey, w.take());
+}
+
+bool take_edit_key(Extensions& extensions, EditKey& edit) {
+  const auto bytes = take_extension(extensions, kEditKey);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  edit.content = r.get<std::uint64_t>();
+  if (!r.ok() || r.at_end() || bytes->size() > sizeof(edit.content) + kMaxEditKeyBytes) return false;
+  edit.key.assign(bytes->begin() + sizeof(edit.content), bytes->end());
+  return true;
+}
+
 }  // namespace relmap::storage::tags

@@ -10,6 +10,7 @@
 #include "proto/base/map_identity.h"
 #include "proto/keyframe/extensions.h"
 #include "storage/graph/frame.h"
+#include "storage/graph/map_state.h"
 
 namespace relmap::storage::tags {
 
@@ -22,6 +23,7 @@ inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a 
 inline constexpr std::uint32_t kWayAround = 28;     // of a closure, or a proposal
 inline constexpr std::uint32_t kUnseen = 29;        // of a closure: frames that saw nothing of where it leads
 inline constexpr std::uint32_t kUnseenPlace = 30;   // of a proposal: the closure of whose place the query saw nothing
+inline constexpr std::uint32_t kEditKey = 31;       // of an edit in the journal: by what its caller names it
 
 // These tags say how the map came about, so map hashes leave them out. The last three are reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
@@ -37,6 +39,7 @@ void add_unseen_place(Extensions& extensions, ClosureId closure);  // invalid: t
 void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
+void add_edit_key(Extensions& extensions, const EditKey& edit);
 // They return false if the extension is malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
@@ -46,5 +49,6 @@ bool take_unseen_place(Extensions& extensions, ClosureId& closure);
 bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
 bool take_shown(Extensions& extensions, std::uint64_t& shown);
+bool take_edit_key(Extensions& extensions, EditKey& edit);
 
 }  // namespace relmap::storage::tags

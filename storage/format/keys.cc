@@ -46,7 +46,7 @@ std::string escaped(std::string_view label) {
 
 }  // namespace
 
-bool is_known(char first) { return std::string_view("\0msgqhwcvl", 10).find(first) != std::string_view::npos; }
+bool is_known(char first) { return std::string_view("\0msgqhwcvli", 11).find(first) != std::string_view::npos; }
 
 std::string map_state() { return "m"; }
 
@@ -72,6 +72,18 @@ std::string skipped(SessionNumber session, std::uint32_t to) {
   return key;
 }
 std::string_view all_skipped() { return "g"; }
+
+std::string edit(std::uint64_t sequence) {
+  std::string key(all_edits());
+  put_u32(key, static_cast<std::uint32_t>(sequence >> 32));
+  put_u32(key, static_cast<std::uint32_t>(sequence));
+  return key;
+}
+std::string_view all_edits() { return "i"; }
+std::optional<std::uint64_t> edit_of(std::string_view key) {
+  if (key.size() != 9 || !key.starts_with(all_edits())) return std::nullopt;
+  return (std::uint64_t{get_u32(key.substr(1))} << 32) | get_u32(key.substr(5));
+}
 
 std::string pending(ChunkId id) { return chunk_key(all_pending(), id); }
 std::string_view all_pending() { return "q"; }

@@ -33,6 +33,11 @@ std::string pending(ChunkId id);
 std::string_view all_pending();
 std::optional<ChunkId> pending_of(std::string_view key);
 
+// The name of an edit, by the edit's sequence in the journal.
+std::string edit(std::uint64_t sequence);
+std::string_view all_edits();
+std::optional<std::uint64_t> edit_of(std::string_view key);
+
 // A closed chunk's part; while the chunk is open, the prefix of its frames' records.
 std::string part(Part part, ChunkId id);
 // A frame's record: while its chunk is open (hot, warm), or for good (cold, words).

@@ -13,7 +13,7 @@ constexpr std::uint16_t kStateVersion = 4;  // of a session, and of the map's st
 // wrote version 3, with the session's state, or the number of records of idle work, behind all else. Skipped sequences
 // and pending frames still have this version.
 constexpr std::uint16_t kFormat2 = 2;
-constexpr std::uint8_t kSessionKind = 1, kStateKind = 2, kSkippedKind = 3, kPendingKind = 4;
+constexpr std::uint8_t kSessionKind = 1, kStateKind = 2, kSkippedKind = 3, kPendingKind = 4, kEditKind = 5;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
 
@@ -152,6 +152,25 @@ Result<std::uint64_t> decode_pending(ByteSpan bytes) {
   const auto frames = r.get<std::uint64_t>();
   if (sealed->kind != kPendingKind || !r.at_end() || frames == 0) return malformed("record of frames that wait");
   return frames;
+}
+
+Bytes encode_edit(const EditKey& edit) {
+  ByteWriter w;
+  w.put(edit.content);
+  w.put_string(edit.key);
+  return seal(kEditKind, kStateVersion, w.bytes());
+}
+
+Result<EditKey> decode_edit(ByteSpan bytes) {
+  const auto sealed = unseal(bytes, kStateVersion, kStateVersion);
+  if (!sealed.ok()) return sealed.status();
+  ByteReader r(sealed->body);
+  EditKey edit;
+  edit.content = r.get<std::uint64_t>();
+  edit.key = r.get_string();
+  if (sealed->kind != kEditKind || !r.at_end() || edit.key.empty() || edit.key.size() > kMaxEditKeyBytes)
+    return malformed("record of an edit");
+  return edit;
 }
 
 Bytes encode_state(const MapState& s) {

@@ -11,12 +11,14 @@ namespace relmap::storage {
 Bytes encode_session(const Session& session);
 Bytes encode_skipped(const Skipped& skipped);
 Bytes encode_pending(std::uint64_t frames);  // of one chunk, a bit by slot
-Bytes encode_state(const MapState& state);   // without `pending`
+Bytes encode_edit(const EditKey& edit);
+Bytes encode_state(const MapState& state);  // without `pending`
 
 // CORRUPT, TRUNCATED or UNKNOWN_FORMAT_VERSION.
 Result<Session> decode_session(ByteSpan bytes);
 Result<Skipped> decode_skipped(ByteSpan bytes);
 Result<std::uint64_t> decode_pending(ByteSpan bytes);
+Result<EditKey> decode_edit(ByteSpan bytes);
 Result<MapState> decode_state(ByteSpan bytes);
 
 // The header as session records and journal records contain it.

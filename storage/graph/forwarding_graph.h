@@ -13,7 +13,10 @@ class ForwardingGraph : public Interface {
   std::shared_ptr<const FrameHot> hot(FrameId id) const override { return to_.hot(id); }
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override { return to_.warm(id); }
   std::shared_ptr<const FrameCold> cold(FrameId id) const override { return to_.cold(id); }
-  std::vector<Session> sessions() const override { return to_.sessions(); }
+  void visit_sessions(SessionNumber from, const Graph::SessionVisit& visit) const override {
+    to_.visit_sessions(from, visit);
+  }
+  SessionCounts session_counts() const override { return to_.session_counts(); }
   std::optional<Session> session(SessionNumber number) const override { return to_.session(number); }
   void visit_skipped(SessionNumber session, std::uint32_t sequence, const Graph::SkippedVisit& visit) const override {
     to_.visit_skipped(session, sequence, visit);

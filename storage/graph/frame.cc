@@ -44,4 +44,15 @@ std::size_t memory_bytes(const FrameCold& frame) {
   return shared(frame) + heap(frame.appearance) + heap(frame.words) + heap(frame.picture);
 }
 
+void shrink_deleted(Session& session) {
+  session.header.unknown = {};
+  session.unknown = {};
+}
+
+std::size_t memory_bytes(const Session& session) {
+  const auto heap_of = [](const std::string& text) { return text.size() < 16 ? 0 : text.size() + 16; };
+  return sizeof(Session) + 32 + heap_of(session.header.robot) + heap_of(session.header.name) +
+         heap_of(session.display_name) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown);
+}
+
 }  // namespace relmap::storage

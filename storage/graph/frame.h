@@ -302,6 +302,9 @@ struct Session {
   Extensions unknown;                                // from a later version, kept unchanged
 };
 
+// Approximate bytes in memory, for the budget.
+std::size_t memory_bytes(const Session& session);
+
 // Whether it is being deleted, or has been: it takes no keyframes.
 inline bool is_going(const Session& session) { return session.state == SessionState::kDeleting; }
 
@@ -310,6 +313,9 @@ inline bool is_frozen(const Session& session) { return session.state == SessionS
 
 // Whether nothing is left of it but its uuid, which is never used again.
 inline bool is_deleted(const Session& session) { return is_going(session) && session.frames == 0; }
+
+// Drops what a deleted session does not need, so that the record that keeps its uuid from being used again is small.
+void shrink_deleted(Session& session);
 
 // Whether a frame that the session once had has been removed with it; the newest frames are removed first.
 inline bool is_removed(const Session& session, FrameId id) {

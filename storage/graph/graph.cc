@@ -10,9 +10,22 @@ Slots<FrameHot> Graph::hot_frames(ChunkId chunk) const {
   return frames;
 }
 
-std::size_t count_sessions(const Graph& graph) {
-  const std::vector<Session> sessions = graph.sessions();
-  return sessions.size() - static_cast<std::size_t>(std::count_if(sessions.begin(), sessions.end(), is_deleted));
+std::vector<Session> Graph::sessions() const {
+  std::vector<Session> all;
+  visit_sessions(0, [&](const Session& session) {
+    all.push_back(session);
+    return true;
+  });
+  return all;
+}
+
+SessionCounts Graph::session_counts() const {
+  SessionCounts counts;
+  visit_sessions(0, [&](const Session& session) {
+    counts.add(session);
+    return true;
+  });
+  return counts;
 }
 
 Result<Session> existing_session(const Graph& graph, SessionNumber number) {

@@ -13,6 +13,23 @@
 
 namespace relmap::storage {
 
+// Numbers of sessions, without those that have been deleted.
+struct SessionCounts {
+  std::size_t all = 0;
+  std::size_t oneway = 0;
+
+  void add(const Session& session) {
+    if (is_deleted(session)) return;
+    ++all;
+    if (session.header.oneway) ++oneway;
+  }
+  void remove(const Session& session) {
+    if (is_deleted(session)) return;
+    --all;
+    if (session.header.oneway) --oneway;
+  }
+};
+
 // Reads throw StatusError (IO_ERROR, DATA_LOSS, VIEW_EXPIRED, BUDGET_EXCEEDED). A returned part stays valid and
 // unchanged for as long as it is held, whatever happens to the map.
 class Graph {
@@ -26,8 +43,13 @@ class Graph {
   virtual std::shared_ptr<const FrameWarm> warm(FrameId id) const = 0;
   virtual std::shared_ptr<const FrameCold> cold(FrameId id) const = 0;
 
-  // Sessions, ascending by number.
-  virtual std::vector<Session> sessions() const = 0;
+  // Visits the sessions from number `from` on in ascending order, deleted ones too, until `visit` returns false. They
+  // may be far more than memory holds.
+  using SessionVisit = std::function<bool(const Session&)>;
+  virtual void visit_sessions(SessionNumber from, const SessionVisit& visit) const = 0;
+  // All of these at once, for maps of which it is known that they have few.
+  std::vector<Session> sessions() const;
+  virtual SessionCounts session_counts() const;
   virtual std::optional<Session> session(SessionNumber number) const = 0;
   // Visits the skipped sequences of a session in ascending order until `visit` returns false. The first visited is the
   // range that contains `sequence` or, if none does, the next one.
@@ -39,9 +61,6 @@ class Graph {
   // Labels that begin with `prefix`, ascending.
   virtual std::vector<std::string> labels(const std::string& prefix) const = 0;
 };
-
-// The number of sessions, without those that have been deleted.
-std::size_t count_sessions(const Graph& graph);
 
 // The session that somebody names by its number; it may be deleted. NO_SUCH_SESSION.
 Result<Session> existing_session(const Graph& graph, SessionNumber number);

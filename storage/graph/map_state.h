@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <set>
+#include <string>
 
 #include "proto/base/ids.h"
 #include "proto/base/map_identity.h"
@@ -26,6 +27,17 @@ struct MapFacts {
   std::uint32_t vocabulary_crc = 0;      // of the vocabulary that made the words; 0: none yet
   MapIdentity identity;                  // unknown until a daemon that gives maps an identity serves the map
 };
+
+// By what a caller names an edit, so that it is done once however often it is sent.
+struct EditKey {
+  std::string key;            // empty: the edit has no name
+  std::uint64_t content = 0;  // hash of the edit: another one of the same name is refused
+
+  bool operator==(const EditKey&) const = default;
+};
+inline constexpr std::size_t kMaxEditKeyBytes = 128;
+// So many edits are remembered by their keys: the last ones.
+inline constexpr std::size_t kRememberedEdits = 4096;
 
 // All that must survive beside frames and sessions; it is written with every commit.
 struct MapState : MapFacts {

@@ -234,12 +234,13 @@ Extensions extensions_of(const ClosureProposalRecord& x) {
   tags::add_uniqueness(all, x.uniqueness);
   tags::add_way_around(all, x.around.get());
   tags::add_unseen_place(all, x.unseen);
+  tags::add_edit_key(all, x.edit);
   return all;
 }
 bool take_extensions(ClosureProposalRecord& x, Extensions all) {
   x.unknown = std::move(all);
   return tags::take_uniqueness(x.unknown, x.uniqueness) && tags::take_way_around(x.unknown, x.around) &&
-         tags::take_unseen_place(x.unknown, x.unseen);
+         tags::take_unseen_place(x.unknown, x.unseen) && tags::take_edit_key(x.unknown, x.edit);
 }
 
 Extensions extensions_of(const SetEdgeStateRecord& x) {
@@ -247,6 +248,7 @@ Extensions extensions_of(const SetEdgeStateRecord& x) {
   if (x.decided) add_extension(all, tags::kDecided, {});
   if (x.alone) add_extension(all, tags::kAlone, {});
   tags::add_shown(all, x.shown);
+  tags::add_edit_key(all, x.edit);
   return all;
 }
 bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
@@ -257,19 +259,27 @@ bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
     return !there || there->empty();
   };
   return take_flag(tags::kDecided, x.decided) && take_flag(tags::kAlone, x.alone) &&
-         tags::take_shown(x.unknown, x.shown);
+         tags::take_shown(x.unknown, x.shown) && tags::take_edit_key(x.unknown, x.edit);
 }
 
-Extensions extensions_of(const SetLabelRecord& x) { return x.unknown; }
+Extensions extensions_of(const SetLabelRecord& x) {
+  Extensions all = x.unknown;
+  tags::add_edit_key(all, x.edit);
+  return all;
+}
 bool take_extensions(SetLabelRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  return true;
+  return tags::take_edit_key(x.unknown, x.edit);
 }
 
-Extensions extensions_of(const SetSessionStateRecord& x) { return x.unknown; }
+Extensions extensions_of(const SetSessionStateRecord& x) {
+  Extensions all = x.unknown;
+  tags::add_edit_key(all, x.edit);
+  return all;
+}
 bool take_extensions(SetSessionStateRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  return true;
+  return tags::take_edit_key(x.unknown, x.edit);
 }
 
 template <typename Record>

@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "proto/base/bytes.h"
 #include "proto/keyframe/keyframe.h"
 #include "storage/graph/frame.h"
+#include "storage/graph/map_state.h"
 
 namespace relmap::storage {
 
@@ -67,6 +69,7 @@ struct ClosureProposalRecord {
   std::shared_ptr<const WayAround> around;  // null: see Edge::around
   ClosureId unseen = {};                    // valid: the query has seen nothing of this one's place, as in UnseenRecord
   Extensions unknown = {};                  // from a later version, kept unchanged
+  EditKey edit = {};                        // of an operator's proposal
 };
 
 // Landmarks that were seen again by projection along an accepted closure, without a new place (docs/method.md, 2).
@@ -98,12 +101,14 @@ struct SetEdgeStateRecord {
   // server/map/edge_edit.h). If the present mark differs, the edit removes nothing. 0: the mark is not checked.
   std::uint64_t shown = 0;
   Extensions unknown = {};  // from a later version, kept unchanged
+  EditKey edit = {};
 };
 struct SetLabelRecord {
   FrameId frame;
   std::string label;
   bool present = true;      // false: the label is removed
   Extensions unknown = {};  // from a later version, kept unchanged
+  EditKey edit = {};
 };
 
 // The robot ended its session, or an operator changed its state.
@@ -111,6 +116,7 @@ struct SetSessionStateRecord {
   SessionNumber session = 0;
   SessionState state = SessionState::kOpen;  // kOpen thaws a frozen session to what it was before (before_frozen)
   Extensions unknown = {};                   // from a later version, kept unchanged
+  EditKey edit = {};                         // of an operator's change
 };
 
 // Removes `chunk`, the last one of a session that is being deleted, from the map (server/map/deletion.h).
@@ -127,6 +133,20 @@ struct IdleWorkRecord {
 using JournalRecord = std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord,
                                    BindingRecord, SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord,
                                    SetSessionStateRecord, RemoveChunkRecord, UnseenRecord>;
+
+// The name of the edit that the record is, or null if it is none that a caller can name.
+template <typename Record>
+auto edit_key(Record& record) {
+  using Key = std::conditional_t<std::is_const_v<Record>, const EditKey, EditKey>;
+  return std::visit(
+      [](auto& r) -> Key* {
+        if constexpr (requires { r.edit; })
+          return &r.edit;
+        else
+          return nullptr;
+      },
+      record);
+}
 
 Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_through);
 

@@ -77,6 +77,25 @@ TEST(JournalRecord, KeepsTheExtensionsOfALaterVersion) {
   EXPECT_EQ(std::get<SessionRecord>(decode_record(encode_record(session, 0))->record).header.unknown, unknown);
 }
 
+TEST(JournalRecord, AnEditKeepsItsName) {
+  const EditKey named{"by robot-7, \0 and all", 0x0123'4567'89ab'cdef};
+  const auto kept = [&](JournalRecord record) {
+    *edit_key(record) = named;
+    auto decoded = decode_record(encode_record(record, 0)).or_throw();
+    return *edit_key(decoded.record) == named;
+  };
+  EXPECT_TRUE(kept(ClosureProposalRecord()));
+  EXPECT_TRUE(kept(SetEdgeStateRecord()));
+  EXPECT_TRUE(kept(SetLabelRecord()));
+  EXPECT_TRUE(kept(SetSessionStateRecord()));
+  JournalRecord other = GapRecord();
+  EXPECT_EQ(edit_key(other), nullptr);
+
+  SetLabelRecord long_name;
+  long_name.edit = {std::string(kMaxEditKeyBytes + 1, 'k'), 1};
+  EXPECT_EQ(decode_record(encode_record(long_name, 0)).reason(), Reason::CORRUPT);
+}
+
 TEST(JournalRecord, WithoutExtensionsIsWhatFormat2Wrote) {
   SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kRemoved, "", false, false, 0, {}};
   EXPECT_EQ(encode_record(edit, 0)[0], 1);

@@ -24,7 +24,10 @@ class StoredGraph final : public Graph {
   std::shared_ptr<const FrameHot> hot(FrameId id) const override;
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
-  std::vector<Session> sessions() const override { return sessions_; }
+  void visit_sessions(SessionNumber from, const SessionVisit& visit) const override {
+    for (const Session& session : sessions_)
+      if (session.number >= from && !visit(session)) return;
+  }
   std::optional<Session> session(SessionNumber number) const override;
   void visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const override {
     relmap::storage::visit_skipped(snapshot_, {}, session, sequence, visit);

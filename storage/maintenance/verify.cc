@@ -88,7 +88,7 @@ class Verifier {
       numbers_.push_back(session.number);
       frames_expected_ += session.frames;
       if (!chosen(session.number)) continue;
-      if (!is_deleted(session)) ++summary_.sessions;  // as count_sessions() does: a deleted session keeps its record
+      if (!is_deleted(session)) ++summary_.sessions;  // as SessionCounts does: a deleted session keeps its record
       check_session(session, [&](const std::string& what) {
         find(Reason::CORRUPT, {}, "session " + std::to_string(session.number) + ": " + what);
       });

@@ -4,6 +4,7 @@
 
 #include "proto/base/mutex.h"
 #include "storage/map/part_loader.h"
+#include "storage/map/session_records.h"
 
 namespace relmap::storage {
 ChunkCache::ChunkCache(std::shared_ptr<Budget> budget, std::uint64_t current)
@@ -51,6 +52,19 @@ template std::shared_ptr<const PackedPart<FrameWarm>> ChunkCache::part(const Eng
 template std::shared_ptr<const FrameHot> ChunkCache::frame(const PackedPart<FrameHot>&, std::uint32_t);
 template std::shared_ptr<const FrameWarm> ChunkCache::frame(const PackedPart<FrameWarm>&, std::uint32_t);
 
+std::shared_ptr<const Session> ChunkCache::session(const EngineSnapshot& snapshot, SessionNumber number) {
+  const Key key{std::nullopt, number, 0};
+  if (auto cached = find(key, snapshot.commit_number()))
+    return std::static_pointer_cast<const Session>(std::move(cached));
+  auto loaded = load_session(snapshot, number);
+  if (!loaded) return nullptr;
+  auto session = std::make_shared<const Session>(*std::move(loaded));
+  // Which commit wrote the record is not known; it holds at that of the snapshot.
+  const std::uint64_t commit = snapshot.commit_number();
+  insert({key, session, commit, 0, sizeof(Entry) + memory_bytes(*session)}, commit);
+  return session;
+}
+
 std::shared_ptr<const FrameCold> ChunkCache::cold(const EngineSnapshot& snapshot, FrameId id) {
   const Key key{Part::kCold, id.session, id.index};
   if (auto cached = find(key, snapshot.commit_number()))
@@ -84,9 +98,13 @@ void ChunkCache::update(const Written<Frame>& written, std::uint64_t number) {
 }
 
 void ChunkCache::committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
-                           std::span<const Written<FrameWarm>> warm) {
+                           std::span<const Written<FrameWarm>> warm,
+                           std::span<const std::shared_ptr<const Session>> sessions) {
   const MutexLock lock(mutex_);
   current_ = number;
+  for (const auto& session : sessions)
+    if (const auto before = version_locked({std::nullopt, session->number, 0}, number); before != index_.end())
+      before->second->through = number - 1;
   for (const auto& written : hot) update(written, number);
   for (const auto& written : warm) update(written, number);
   evict_locked();

@@ -11,6 +11,7 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <unordered_map>
@@ -46,6 +47,8 @@ class ChunkCache {
   }
   // The frames of a chunk whose bits are set in `slots`.
   Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id, std::uint64_t slots);
+  // Null if there is no such session.
+  std::shared_ptr<const Session> session(const EngineSnapshot& snapshot, SessionNumber number);
   // Cold parts are cached frame by frame.
   std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
 
@@ -59,8 +62,8 @@ class ChunkCache {
   };
   // Tells the cache that commit `number` is the newest from now on. To be called before any reader has a snapshot of
   // it.
-  void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
-                 std::span<const Written<FrameWarm>> warm);
+  void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot, std::span<const Written<FrameWarm>> warm,
+                 std::span<const std::shared_ptr<const Session>> sessions);
 
   // Drops the least recently used entries until the cache keeps to its allowance.
   void evict();
@@ -68,14 +71,15 @@ class ChunkCache {
 
  private:
   struct Key {
-    Part part;
+    std::optional<Part> part;  // nullopt: the session's record
     SessionNumber session;
-    std::uint32_t number;  // of the chunk, or the frame's index
+    std::uint32_t number;  // of the chunk, or the frame's index; 0 for the session's record
     bool operator==(const Key&) const = default;
   };
   struct KeyHash {
     std::size_t operator()(const Key& key) const noexcept {
-      return detail::mix(((std::uint64_t{key.session} << 32) | key.number) * 4 + static_cast<std::uint64_t>(key.part));
+      const std::uint64_t part = key.part ? 1 + static_cast<std::uint64_t>(*key.part) : 0;
+      return detail::mix(((std::uint64_t{key.session} << 32) | key.number) * 8 + part);
     }
   };
   static constexpr std::uint64_t kNewest = ~std::uint64_t{0};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,19 +31,11 @@ inline const DirtyChunk* find_dirty(const DirtyTable& table, ChunkId id) {
   return it != table.end() && it->first == id ? it->second.get() : nullptr;
 }
 
-// Sessions, ascending by number.
-using SessionTable = std::vector<std::shared_ptr<const Session>>;
-
-inline const Session* find_session(const SessionTable& table, SessionNumber number) {
-  const auto it = std::lower_bound(table.begin(), table.end(), number,
-                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
-  return it != table.end() && (*it)->number == number ? it->get() : nullptr;
-}
-
 // Labels set (true) and removed (false) since the last commit.
 using LabelChanges = std::map<std::pair<std::string, FrameId>, bool>;
 
-// Sequences that were skipped since the last commit, by session and last sequence.
-using SkippedTable = std::map<std::pair<SessionNumber, std::uint32_t>, Skipped>;
+// Sequences that were skipped since the last commit, by session and last sequence; nullopt: a committed record of them
+// that has been removed since.
+using SkippedTable = std::map<std::pair<SessionNumber, std::uint32_t>, std::optional<Skipped>>;
 
 }  // namespace relmap::storage

@@ -60,11 +60,13 @@ void visit_skipped(const EngineSnapshot& snapshot, const SkippedTable& since, Se
         if (!skipped.ok() || keys::skipped(session, skipped->to) != key)
           throw StatusError(Status(Reason::DATA_LOSS, "skipped sequences of session " + std::to_string(session) + ": " +
                                                           skipped.status().to_string()));
+        if (const auto changed = since.find({session, skipped->to}); changed != since.end() && !changed->second)
+          return true;  // removed
         return going = visit(*skipped);
       });
   throw_if(scanned);
   for (auto it = since.lower_bound({session, sequence}); going && it != since.end() && it->first.first == session; ++it)
-    going = visit(it->second);
+    if (it->second) going = visit(*it->second);
 }
 
 }  // namespace relmap::storage

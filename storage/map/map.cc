@@ -32,29 +32,19 @@ Map::~Map() {
     impl_->budget->release(Share::kCache, impl_->committing->cache_bytes);
   }
   impl_->budget->release(Share::kDirty, impl_->dirty_bytes + impl_->spare_bytes);
-  impl_->budget->release(Share::kSessions, impl_->pending_bytes);
+  impl_->budget->release(Share::kSessions, impl_->pending_bytes + impl_->session_bytes);
 }
 
 Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
-                                       std::shared_ptr<Budget> budget) {
+                                       std::shared_ptr<Budget> budget) try {
   auto impl = std::make_unique<Impl>();
   impl->snapshot = engine->snapshot();
   const EngineSnapshot& snapshot = *impl->snapshot;
 
-  Status failed;
-  const Status scanned = snapshot.scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
-    auto session = decode_session(value);
-    if (!session.ok()) {
-      failed = lost("a session's record", session.status());
-      return false;
-    }
-    impl->committed_sessions[session->number] = *session;
-    impl->sessions.push_back(std::make_shared<const Session>(std::move(*session)));
+  relmap::storage::visit_sessions(snapshot, {}, 0, [&](const Session& session) {
+    impl->session_counts.add(session);
     return true;
   });
-  if (!scanned.ok()) return scanned;
-  if (!failed.ok()) return failed;
-
   const auto state = snapshot.get(keys::map_state());
   if (!state.ok()) return state.status();
   if (*state) {
@@ -62,6 +52,14 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
     if (!decoded.ok()) return lost("the map's state", decoded.status());
     impl->state = std::move(*decoded);
   }
+  Status failed;
+  // An edit that cannot be read is forgotten: it is an answer to a question that will hardly be asked.
+  throw_if(snapshot.scan(keys::all_edits(), [&](std::string_view key, ByteSpan value) {
+    const auto sequence = keys::edit_of(key);
+    auto edit = decode_edit(value);
+    if (sequence && edit.ok()) impl->edits.emplace(*sequence, *std::move(edit));
+    return true;
+  }));
   const Status queued = load_pending(snapshot, impl->state.pending, [&](std::string_view, const std::string& what) {
     failed = Status(Reason::DATA_LOSS, what);
   });
@@ -76,36 +74,38 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
   impl->published_sessions = std::make_shared<const SessionTable>(impl->sessions);
   impl->show();
   return std::unique_ptr<Map>(new Map(std::move(impl)));
+} catch (const StatusError& error) {
+  return error.status();
 }
 
 std::shared_ptr<const FrameHot> Map::hot(FrameId id) const {
   if (auto frame = impl_->unwritten<FrameHot>(id)) return *std::move(frame);
-  if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->recent_hot.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameWarm> Map::warm(FrameId id) const {
   if (auto frame = impl_->unwritten<FrameWarm>(id)) return *std::move(frame);
-  if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->recent_warm.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameCold> Map::cold(FrameId id) const {
   if (auto frame = impl_->unwritten<FrameCold>(id)) return *std::move(frame);
-  const Session* session = find_session(impl_->sessions, id.session);
+  const auto session = impl_->session(id.session);
   return session && !is_removed(*session, id) ? impl_->cache->cold(*impl_->snapshot, id) : nullptr;
 }
 
-std::vector<Session> Map::sessions() const {
-  std::vector<Session> all;
-  all.reserve(impl_->sessions.size());
-  for (const auto& session : impl_->sessions) all.push_back(*session);
-  return all;
+void Map::visit_sessions(SessionNumber from, const SessionVisit& visit) const {
+  relmap::storage::visit_sessions(*impl_->snapshot, impl_->sessions, from, visit);
 }
 
 std::optional<Session> Map::session(SessionNumber number) const {
-  const Session* session = find_session(impl_->sessions, number);
+  const auto session = impl_->session(number);
   return session ? std::optional<Session>(*session) : std::nullopt;
+}
+
+std::shared_ptr<const Session> Map::Impl::session(SessionNumber number) const {
+  if (const auto at = place_of(sessions, number); at != sessions.end() && (*at)->number == number) return *at;
+  return cache->session(*snapshot, number);
 }
 
 void Map::visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const {
@@ -151,7 +151,7 @@ FrameWarm& Map::edit_warm(FrameId id) {
 }
 
 void Map::add_frame(FrameId id, FrameHot hot_part, FrameWarm warm_part, FrameCold cold_part) {
-  assert(find_session(impl_->sessions, id.session));
+  assert(impl_->session(id.session));
   WorkingChunk& chunk = impl_->touch(chunk_id(id));
   chunk.hot.set(slot_of(id), std::make_shared<FrameHot>(std::move(hot_part)));
   chunk.warm.set(slot_of(id), std::make_shared<FrameWarm>(std::move(warm_part)));
@@ -159,7 +159,7 @@ void Map::add_frame(FrameId id, FrameHot hot_part, FrameWarm warm_part, FrameCol
 }
 
 void Map::remove_last_chunk(SessionNumber number) {
-  const Session before = *find_session(impl_->sessions, number);
+  const Session before = *impl_->session(number);
   assert(is_going(before) && before.frames > 0);
   const ChunkId id = chunk_id({number, before.last});
   std::uint32_t frames = 0;
@@ -188,6 +188,7 @@ void Map::remove_last_chunk(SessionNumber number) {
   session.last = left ? left->index : 0;
   session.first = left ? session.first : 0;
   session.last_time_us = left ? hot(*left)->time_us : session.first_time_us;
+  if (!left) shrink_deleted(session);
   impl_->remove_chunk(id);
 }
 
@@ -210,34 +211,77 @@ void Map::Impl::remove_chunk(ChunkId id) {
 
 void Map::add_session(Session session) {
   const SessionNumber number = session.number;
-  assert(number != 0 && !find_session(impl_->sessions, number));
-  const auto at = std::lower_bound(impl_->sessions.begin(), impl_->sessions.end(), number,
-                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
-  impl_->sessions.insert(at, std::make_shared<Session>(std::move(session)));
+  assert(number != 0 && !impl_->session(number));
+  impl_->sessions.insert(place_of(impl_->sessions, number), std::make_shared<Session>(std::move(session)));
   impl_->fresh_sessions.insert(number);
   impl_->dirty_sessions.insert(number);
+  impl_->edited_at[number] = ++impl_->session_edits;
 }
 
 Session& Map::edit_session(SessionNumber number) { return impl_->edit_session(number); }
 
 Session& Map::Impl::edit_session(SessionNumber number) {
-  const auto at = std::lower_bound(sessions.begin(), sessions.end(), number,
-                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
-  if (at == sessions.end() || (*at)->number != number) throw StatusError(no_such_session(number));
-  if (fresh_sessions.insert(number).second) *at = std::make_shared<Session>(**at);
+  const auto before = session(number);
+  if (!before) throw StatusError(no_such_session(number));
+  auto at = sessions.begin() + (place_of(sessions, number) - sessions.begin());
+  if (fresh_sessions.insert(number).second) {
+    session_counts.remove(*before);
+    if (at == sessions.end() || (*at)->number != number) at = sessions.insert(at, nullptr);
+    *at = std::make_shared<Session>(*before);
+  }
   dirty_sessions.insert(number);
+  edited_at[number] = ++session_edits;
   return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
+}
+
+// Of the sessions that have been committed and not been edited since, keeps those that were edited last.
+void Map::Impl::forget_old_sessions() {
+  const auto clean = [this](const auto& session) { return !dirty_sessions.contains(session->number); };
+  std::vector<std::uint64_t> last_edits;
+  for (const auto& session : sessions)
+    if (clean(session)) last_edits.push_back(edited_at.at(session->number));
+  if (last_edits.size() <= kRecentSessions) return;
+  const auto oldest_kept = last_edits.end() - kRecentSessions;
+  std::nth_element(last_edits.begin(), oldest_kept, last_edits.end());
+  std::erase_if(sessions, [&](const auto& session) {
+    if (!clean(session) || edited_at.at(session->number) >= *oldest_kept) return false;
+    edited_at.erase(session->number);
+    return true;
+  });
 }
 
 void Map::skip(SessionNumber number, const Skipped& skipped) {
   Session& session = impl_->edit_session(number);
-  (skipped.refused ? session.refused : session.given_up) += std::uint64_t{skipped.to} - skipped.from + 1;
   session.next_sequence = std::max(session.next_sequence, skipped.to + 1);
-  if (!impl_->skipped.insert_or_assign({number, skipped.to}, skipped).second) return;
-  impl_->skipped_touched = true;
+  if (is_going(session)) return;  // what is left of it must not grow
+  (skipped.refused ? session.refused : session.given_up) += std::uint64_t{skipped.to} - skipped.from + 1;
+  impl_->set_skipped({number, skipped.to}, skipped);
+}
+
+void Map::forget_skipped(SessionNumber number, std::size_t most) {
+  Session& session = impl_->edit_session(number);
+  assert(is_going(session));
+  const std::uint64_t given_up = session.given_up;
+  std::vector<Skipped> gone;
+  visit_skipped(number, static_cast<std::uint32_t>(end_of(session)), [&](const Skipped& skipped) {
+    gone.push_back(skipped);
+    return gone.size() < most;
+  });
+  for (const Skipped& skipped : gone) {
+    std::uint64_t& count = skipped.refused ? session.refused : session.given_up;
+    count -= std::min(count, std::uint64_t{skipped.to} - skipped.from + 1);
+    impl_->set_skipped({number, skipped.to}, std::nullopt);
+  }
+  if (gone.size() < most) session.refused = session.given_up = 0;  // also where they were wrong
+  impl_->state.gaps -= std::min(impl_->state.gaps, given_up - session.given_up);
+}
+
+void Map::Impl::set_skipped(const SkippedTable::key_type& key, std::optional<Skipped> value) {
+  skipped_touched = true;
+  if (!skipped.insert_or_assign(key, std::move(value)).second) return;
   constexpr std::size_t kEntry = 2 * 64;  // a node of this tree, and one of the published tree
-  impl_->budget->charge(Share::kDirty, kEntry);
-  impl_->dirty_bytes += kEntry;
+  budget->charge(Share::kDirty, kEntry);
+  dirty_bytes += kEntry;
 }
 
 void Map::set_label(FrameId id, const std::string& label, bool present) {
@@ -253,6 +297,16 @@ void Map::set_label(FrameId id, const std::string& label, bool present) {
 }
 
 MapState& Map::state() { return impl_->state; }
+
+void Map::remember_edit(std::uint64_t sequence, EditKey edit) {
+  impl_->edits[sequence] = std::move(edit);
+  impl_->changed_edits.insert(sequence);
+  if (impl_->edits.size() <= kRememberedEdits) return;
+  impl_->changed_edits.insert(impl_->edits.begin()->first);
+  impl_->edits.erase(impl_->edits.begin());
+}
+
+const std::map<std::uint64_t, EditKey>& Map::edits() const { return impl_->edits; }
 
 std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
 void Map::watch_edits(EditWatcher watcher) { impl_->edit_watcher = std::move(watcher); }
@@ -273,7 +327,8 @@ bool Map::commit_is_due() const {
   const std::size_t allowance = impl_->budget->allowance(Share::kDirty);
   const bool writing =
       impl_->committing && impl_->committing->written.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
-  return writing ? impl_->dirty_bytes > allowance / 4 * 3 : dirty_bytes() > allowance / 4;
+  if (writing) return impl_->dirty_bytes > allowance / 4 * 3;
+  return dirty_bytes() > allowance / 4 || impl_->dirty_sessions.size() > 4 * kRecentSessions;
 }
 std::size_t Map::dirty_bytes() const { return impl_->dirty_bytes - (impl_->committing ? impl_->committing->bytes : 0); }
 

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -24,8 +25,8 @@ class MapView;
 
 class Map final : public EditableGraph {
  public:
-  // Loads sessions and state; frames stay on disk. The caller has to apply the journal again from applied_sequence + 1
-  // on.
+  // Loads the state, and reads all sessions once; they and the frames stay on disk. The caller has to apply the journal
+  // again from applied_sequence + 1 on.
   static Result<std::unique_ptr<Map>> open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
                                            std::shared_ptr<Budget> budget);
   ~Map() override;
@@ -34,7 +35,7 @@ class Map final : public EditableGraph {
   std::shared_ptr<const FrameHot> hot(FrameId id) const override;
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
-  std::vector<Session> sessions() const override;
+  void visit_sessions(SessionNumber from, const SessionVisit& visit) const override;
   std::optional<Session> session(SessionNumber number) const override;
   void visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;
@@ -53,11 +54,19 @@ class Map final : public EditableGraph {
   void add_session(Session session);
   Session& edit_session(SessionNumber number);
   // Records sequences as skipped, counts them, and moves the session's next sequence on. They must lie behind all that
-  // the session has skipped so far.
+  // the session has skipped so far. Of a session that is being deleted, nothing is recorded.
   void skip(SessionNumber number, const Skipped& skipped);
+  // Removes `most` records, or all that there are, of what a session that is being deleted has skipped, from the end of
+  // its frames on, and counts them no more.
+  void forget_skipped(SessionNumber number, std::size_t most);
   // Edits FrameHot::labels and the derived index together.
   void set_label(FrameId id, const std::string& label, bool present);
   MapState& state() override;
+  // Remembers the edit that was record `sequence` of the journal by its key, and forgets the oldest beyond
+  // kRememberedEdits.
+  void remember_edit(std::uint64_t sequence, EditKey edit);
+  // Those remembered, by sequence.
+  const std::map<std::uint64_t, EditKey>& edits() const;
 
   // Makes all edits visible to new readers, and returns the new view.
   std::shared_ptr<const MapView> publish();
@@ -98,7 +107,8 @@ class MapView final : public Graph {
   Slots<FrameHot> hot_frames(ChunkId chunk) const override;
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
-  std::vector<Session> sessions() const override;
+  void visit_sessions(SessionNumber from, const SessionVisit& visit) const override;
+  SessionCounts session_counts() const override;  // without reading any
   std::optional<Session> session(SessionNumber number) const override;
   void visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;

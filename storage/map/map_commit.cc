@@ -131,12 +131,11 @@ std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* com
 }  // namespace
 
 // The session as the engine has it once the commit under way is through.
-const Session* Map::Impl::last_committed(SessionNumber number) const {
+std::shared_ptr<const Session> Map::Impl::last_committed(SessionNumber number) const {
   if (committing)
-    for (const Session& session : committing->sessions)
-      if (session.number == number) return &session;
-  const auto found = committed_sessions.find(number);
-  return found == committed_sessions.end() ? nullptr : &found->second;
+    for (const auto& session : committing->sessions)
+      if (session->number == number) return session;
+  return cache->session(*snapshot, number);
 }
 
 void Map::Impl::write_removal(Batch& batch, ChunkId id) {
@@ -174,10 +173,10 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   const auto is_open = [&](const Session& session) {
     return !is_going(session) && id.chunk >= chunk_of({id.session, session.last});
   };
-  const Session* before = last_committed(id.session);
+  const auto before = last_committed(id.session);
   const bool existed = before && before->frames > 0 && id.chunk <= chunk_of({id.session, before->last});
   const bool was_open = existed && is_open(*before);
-  const bool open = is_open(*find_session(sessions, id.session));
+  const bool open = is_open(*session(id.session));
   if (open) {
     write_frames(batch, id, !existed, chunk.hot);
     write_frames(batch, id, !existed, chunk.warm);
@@ -211,8 +210,19 @@ void Map::Impl::write_rest(Batch& batch) {
     else
       batch.deletes.push_back(keys::label(entry.first, entry.second));
   }
-  for (const auto& [entry, item] : skipped)
-    batch.puts.push_back({keys::skipped(entry.first, entry.second), encode_skipped(item)});
+  for (const auto& [entry, item] : skipped) {
+    std::string key = keys::skipped(entry.first, entry.second);
+    if (item)
+      batch.puts.push_back({std::move(key), encode_skipped(*item)});
+    else
+      batch.deletes.push_back(std::move(key));
+  }
+  for (const std::uint64_t sequence : changed_edits) {
+    if (const auto edit = edits.find(sequence); edit != edits.end())
+      batch.puts.push_back({keys::edit(sequence), encode_edit(edit->second)});
+    else
+      batch.deletes.push_back(keys::edit(sequence));
+  }
   write_pending(state.pending, batch.puts, batch.deletes);
   batch.puts.push_back({keys::map_state(), encode_state(state)});
 }
@@ -221,7 +231,7 @@ void Map::Impl::write_all(Batch& batch) {
   std::set<ChunkId> touched_chunks;
   for (const auto& [id, chunk] : dirty) touched_chunks.insert(id);
   for (const SessionNumber number : dirty_sessions) {  // an open chunk may have closed without being touched
-    if (const Session* before = last_committed(number)) touched_chunks.insert(chunk_id({number, before->last}));
+    if (const auto before = last_committed(number)) touched_chunks.insert(chunk_id({number, before->last}));
   }
   // Encoding and compressing are most of the work of a large commit, so two threads share it.
   const std::vector<ChunkId> chunks(touched_chunks.begin(), touched_chunks.end());
@@ -248,10 +258,11 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   committing->chunks = std::exchange(dirty, {});
   committing->bytes = dirty_bytes;
   for (const SessionNumber number : std::exchange(dirty_sessions, {}))
-    committing->sessions.push_back(*find_session(sessions, number));
+    committing->sessions.push_back(*place_of(sessions, number));
   committing->labels = labels;
   committing->skipped = skipped;
   committing->pending = state.pending.take_changes();
+  committing->edits = std::exchange(changed_edits, {});
   committing->batch = batch;
   // The encoded bytes and the engine's copy of them take memory from the cache, but no more than the cache holds:
   // charging more would refuse others memory that is needed for a moment only.
@@ -322,10 +333,11 @@ void Map::Impl::restore(Commit& commit) {
     take_back(chunk.warm, at->second.warm, removed);
     take_back(chunk.cold, at->second.cold, removed);
   }
-  for (const Session& session : commit.sessions) dirty_sessions.insert(session.number);
+  for (const auto& session : commit.sessions) dirty_sessions.insert(session->number);
   state.pending.add_changes(commit.pending);
+  changed_edits.merge(commit.edits);
   spare_hot.clear();  // what could not be written needs the room
-  charge_pending_and_spares();
+  charge_rest();
 }
 
 namespace {
@@ -354,7 +366,7 @@ void Map::Impl::complete(Commit& commit) {
   recent_hot.clear();
   recent_warm.clear();
   cache->committed(snapshot->commit_number(), written<FrameHot>(*commit.batch, commit.batch->hot),
-                   written<FrameWarm>(*commit.batch, commit.batch->warm));
+                   written<FrameWarm>(*commit.batch, commit.batch->warm), commit.sessions);
 
   // Hot and warm parts live on in the cache, cold ones only in the views that still have them.
   for (const auto& [id, chunk] : commit.chunks)
@@ -362,13 +374,14 @@ void Map::Impl::complete(Commit& commit) {
       if (chunk.cold.frames[slot]) ledger->retire(chunk.cold.since[slot], version + 1, chunk.cold.bytes[slot]);
   budget->release(Share::kDirty, commit.bytes);
   dirty_bytes -= commit.bytes;
-  for (const Session& session : commit.sessions) committed_sessions[session.number] = session;
+  forget_old_sessions();
   for (const auto& [entry, present] : commit.labels)
     if (const auto at = labels.find(entry); at->second == present) labels.erase(at);
-  for (const auto& [entry, item] : commit.skipped) skipped.erase(entry);
+  for (const auto& [entry, item] : commit.skipped)
+    if (const auto at = skipped.find(entry); at->second == item) skipped.erase(at);
 
   spare_hot.clear();  // like what was dirty, they make room for what is read
-  charge_pending_and_spares();
+  charge_rest();
 
   // What was edited meanwhile stays dirty on top of the new snapshot.
   auto table = std::make_shared<DirtyTable>();
@@ -383,6 +396,7 @@ void Map::Impl::complete(Commit& commit) {
   published_dirty = std::move(table);
   published_labels = std::make_shared<const LabelChanges>(labels);
   published_skipped = std::make_shared<const SkippedTable>(skipped);
+  published_sessions = std::make_shared<const SessionTable>(sessions);
   show();
 }
 

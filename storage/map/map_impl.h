@@ -12,6 +12,7 @@
 
 #include "proto/base/mutex.h"
 #include "storage/map/map_view_impl.h"
+#include "storage/map/session_records.h"
 #include "storage/map/working_chunk.h"
 #include "storage/memory/spares.h"
 
@@ -36,6 +37,9 @@ class RecentChunks {
 // Bytes of a dirty chunk without frames: the worker's copy, and the published one.
 inline constexpr std::size_t kEmptyChunk = sizeof(WorkingChunk) + sizeof(DirtyChunk);
 
+// So many sessions stay in memory after they have been committed: those that robots are sending.
+inline constexpr std::size_t kRecentSessions = 1024;
+
 using WorkingChunks = std::map<ChunkId, WorkingChunk>;
 inline const WorkingChunk* find_chunk(const WorkingChunks& chunks, ChunkId id) {
   const auto at = chunks.find(id);
@@ -58,11 +62,16 @@ struct Map::Impl {
   SessionTable sessions;
   std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
   std::set<SessionNumber> dirty_sessions;  // since the last commit was begun
-  std::map<SessionNumber, Session> committed_sessions;
-  LabelChanges labels;  // changes to the snapshot, including those that a commit is writing
+  SessionCounts session_counts;            // of all that are not fresh, as they are; of those, without them
+  std::unordered_map<SessionNumber, std::uint64_t> edited_at;  // of each in `sessions`: number of its last edit
+  std::uint64_t session_edits = 0;
+  std::size_t session_bytes = 0;  // charged for `sessions`
+  LabelChanges labels;            // changes to the snapshot, including those that a commit is writing
   bool labels_touched = false;
   SkippedTable skipped;  // likewise
   bool skipped_touched = false;
+  std::map<std::uint64_t, EditKey> edits;
+  std::set<std::uint64_t> changed_edits;  // remembered or forgotten since the last commit was begun
   MapState state;
   std::size_t dirty_bytes = 0;    // charged, including what a commit is writing
   std::size_t pending_bytes = 0;  // charged for state.pending
@@ -75,10 +84,11 @@ struct Map::Impl {
   struct Commit {
     WorkingChunks chunks;
     std::size_t bytes = 0;  // part of dirty_bytes
-    std::vector<Session> sessions;
+    SessionTable sessions;
     LabelChanges labels;
     SkippedTable skipped;
     std::set<ChunkId> pending;
+    std::set<std::uint64_t> edits;
     std::shared_ptr<Batch> batch;
     std::size_t cache_bytes = 0;  // charged to the cache's share for the batch
     std::future<Status> written;
@@ -122,13 +132,17 @@ struct Map::Impl {
   }
   WorkingChunk& touch(ChunkId id);
   void remove_chunk(ChunkId id);
+  // As the worker sees it; null if there is none.
+  std::shared_ptr<const Session> session(SessionNumber number) const;
   Session& edit_session(SessionNumber number);
+  void forget_old_sessions();
+  void set_skipped(const SkippedTable::key_type& key, std::optional<Skipped> value);
   std::shared_ptr<const MapView> publish();
   std::shared_ptr<const MapView> show();  // a new version of what is published
-  void charge_pending_and_spares();
+  void charge_rest();
 
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
-  const Session* last_committed(SessionNumber number) const;
+  std::shared_ptr<const Session> last_committed(SessionNumber number) const;
   void write_chunk(Batch& batch, ChunkId id);
   void write_removal(Batch& batch, ChunkId id);
   void write_chunks(Batch& batch, std::span<const ChunkId> chunks);

@@ -92,6 +92,7 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     dirty_bytes = bytes;
   }
   if (!fresh_sessions.empty()) {
+    for (const SessionNumber number : fresh_sessions) session_counts.add(*find_session(sessions, number));
     published_sessions = std::make_shared<const SessionTable>(sessions);
     fresh_sessions.clear();
   }
@@ -99,7 +100,7 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     published_labels = std::make_shared<const LabelChanges>(labels);
     labels_touched = false;
   }
-  charge_pending_and_spares();
+  charge_rest();
   if (skipped_touched) {
     published_skipped = std::make_shared<const SkippedTable>(skipped);
     skipped_touched = false;
@@ -120,6 +121,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts.snapshot = snapshot;
   parts.dirty = published_dirty;
   parts.sessions = published_sessions;
+  parts.session_counts = session_counts;
   parts.labels = published_labels;
   parts.skipped = published_skipped;
   parts.state = state;
@@ -141,7 +143,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   return view;
 }
 
-void Map::Impl::charge_pending_and_spares() {
+void Map::Impl::charge_rest() {
   const auto charge = [this](Share share, std::size_t& charged, std::size_t bytes) {
     if (bytes == charged) return;
     budget->release(share, charged);
@@ -149,6 +151,7 @@ void Map::Impl::charge_pending_and_spares() {
     charged = bytes;
   };
   charge(Share::kSessions, pending_bytes, state.pending.memory_bytes());
+  charge(Share::kSessions, session_bytes, 2 * sessions.size() * (sizeof(Session) + 128));
   charge(Share::kDirty, spare_bytes, spare_hot.bytes());
 }
 

@@ -85,6 +85,109 @@ TEST_F(MapTest, SkippedSequencesAreFoundBySequence) {
   EXPECT_EQ(found(*open(), 0), all);
 }
 
+// Far more sessions than stay in memory: each view has all as they were when it was published.
+TEST_F(MapTest, SessionsArePaged) {
+  constexpr SessionNumber kSessions = 3 * 1024 + 100;
+  auto map = open();
+  for (SessionNumber number = 1; number <= kSessions; ++number) {
+    Session session = random.session(number);
+    session.state = number % 10 == 0 ? SessionState::kDeleting : SessionState::kOpen;
+    session.header.oneway = number % 3 == 0;
+    session.frames = 0;
+    session.next_sequence = 0;
+    map->add_session(session);
+    if (number % 700 == 0) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+  }
+  ASSERT_TRUE(map->commit().ok());
+  const std::size_t held = budget->used(Share::kSessions);
+  EXPECT_LT(held, kSessions * 2 * sizeof(Session) / 2) << "most are on disk only";
+
+  const auto before = map->view();
+  map->edit_session(5).next_sequence = 77;     // not in memory
+  map->edit_session(3000).next_sequence = 77;  // in memory
+  const auto edited = map->publish();
+  ASSERT_TRUE(map->commit().ok());
+  for (SessionNumber number = 100; number < 1300; ++number) map->edit_session(number).next_sequence = 1;
+  ASSERT_TRUE(map->commit().ok());  // the two have been forgotten again
+  const auto after = map->view();
+  for (const auto& [view, next] : {std::pair(before, 0u), std::pair(edited, 77u), std::pair(after, 77u)}) {
+    EXPECT_EQ(view->session(5)->next_sequence, next);
+    EXPECT_EQ(view->session(3000)->next_sequence, next);
+    EXPECT_EQ(view->session(99)->next_sequence, 0u);
+    EXPECT_EQ(view->session(100)->next_sequence, view == after ? 1u : 0u);
+    EXPECT_EQ(view->session(kSessions + 1), std::nullopt);
+    SessionNumber expected = 0;
+    for (const Session& session : view->sessions()) {
+      EXPECT_EQ(session.number, ++expected);
+      EXPECT_EQ(session.next_sequence, view->session(session.number)->next_sequence);
+    }
+    EXPECT_EQ(expected, kSessions);
+    EXPECT_EQ(view->session_counts().all, kSessions - kSessions / 10);
+    EXPECT_EQ(view->session_counts().oneway, kSessions / 3 - kSessions / 30);
+  }
+  std::vector<SessionNumber> some;
+  after->visit_sessions(1299, [&](const Session& session) {
+    some.push_back(session.number);
+    return some.size() < 3;
+  });
+  EXPECT_EQ(some, (std::vector<SessionNumber>{1299, 1300, 1301}));
+
+  map->edit_session(1).state = SessionState::kDeleting;
+  EXPECT_EQ(map->publish()->session_counts().all, kSessions - kSessions / 10 - 1);
+  ASSERT_TRUE(map->commit().ok());
+  const auto again = open();
+  EXPECT_EQ(again->view()->session_counts().all, map->view()->session_counts().all);
+  EXPECT_EQ(again->session(1300)->next_sequence, 0u);
+}
+
+TEST_F(MapTest, OfADeletedSessionAlmostNothingIsLeft) {
+  auto map = open();
+  begin(*map, 1);
+  map->edit_session(1).header.unknown = {{1000, Bytes(500)}};
+  map->edit_session(1).refused = map->edit_session(1).given_up = map->edit_session(1).next_sequence = 0;
+  add(*map, {1, 0});
+  for (std::uint32_t from = 1; from <= 199; from += 2) map->skip(1, {from, from, from, from % 4 == 1, Reason::CORRUPT});
+  map->state().gaps = 50;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(keys("g"), 100u);
+  remove_chunk(*map, 1);
+  EXPECT_TRUE(map->session(1)->header.unknown.empty());
+  map->skip(1, {300, 300, 0, true, Reason::SESSION_DELETED});
+  EXPECT_EQ(map->session(1)->refused, 50u) << "what is sent to a deleted session is not recorded";
+  EXPECT_EQ(map->session(1)->next_sequence, 301u);
+
+  map->forget_skipped(1, 60);
+  const auto some = map->publish();
+  std::size_t left = 0;
+  some->visit_skipped(1, 0, [&](const Skipped&) { return ++left > 0; });
+  EXPECT_EQ(left, 40u);
+  ASSERT_TRUE(map->begin_commit([] {}).ok());
+  map->forget_skipped(1, 60);
+  ASSERT_TRUE(map->finish_commit()->ok());
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(keys("g"), 0u);
+  EXPECT_EQ(map->session(1)->refused + map->session(1)->given_up, 0u);
+  EXPECT_EQ(map->state().gaps, 0u);
+}
+
+TEST_F(MapTest, TheLastEditsAreRememberedByTheirKeys) {
+  auto map = open();
+  for (std::uint64_t sequence = 1; sequence <= kRememberedEdits + 5; ++sequence) {
+    map->remember_edit(sequence, {"edit " + std::to_string(sequence), sequence});
+    if (sequence % 1000 == 0) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+  }
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(map->edits().size(), kRememberedEdits);
+  EXPECT_EQ(keys("i"), kRememberedEdits);
+  const auto again = open();
+  EXPECT_EQ(again->edits(), map->edits());
+  EXPECT_EQ(again->edits().begin()->second, (EditKey{"edit 6", 6}));
+}
+
 TEST_F(MapTest, PendingFramesAreWrittenChunkByChunkAsTheyChange) {
   auto map = open();
   begin(*map, 1);

@@ -22,7 +22,6 @@ std::shared_ptr<const EngineSnapshot> MapView::committed() const { return impl_-
 
 std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
   impl_->check_alive();
-  if (!find_session(*impl_->sessions, id.session)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->hot[slot_of(id)]) return dirty->hot[slot_of(id)];
   if (dirty && dirty->removed) return nullptr;
@@ -31,7 +30,6 @@ std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
 
 Slots<FrameHot> MapView::hot_frames(ChunkId chunk) const {
   impl_->check_alive();
-  if (!find_session(*impl_->sessions, chunk.session)) return {};
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk);
   if (dirty && dirty->removed) return {};
   std::uint64_t committed = ~std::uint64_t{0};
@@ -45,7 +43,6 @@ Slots<FrameHot> MapView::hot_frames(ChunkId chunk) const {
 
 std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
   impl_->check_alive();
-  if (!find_session(*impl_->sessions, id.session)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->warm[slot_of(id)]) return dirty->warm[slot_of(id)];
   if (dirty && dirty->removed) return nullptr;
@@ -54,22 +51,21 @@ std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
 
 std::shared_ptr<const FrameCold> MapView::cold(FrameId id) const {
   impl_->check_alive();
-  const Session* session = find_session(*impl_->sessions, id.session);
+  const auto session = impl_->session(id.session);
   if (!session || is_removed(*session, id)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->cold[slot_of(id)]) return dirty->cold[slot_of(id)];
   return impl_->cache->cold(*impl_->snapshot, id);
 }
 
-std::vector<Session> MapView::sessions() const {
-  std::vector<Session> all;
-  all.reserve(impl_->sessions->size());
-  for (const auto& session : *impl_->sessions) all.push_back(*session);
-  return all;
+void MapView::visit_sessions(SessionNumber from, const SessionVisit& visit) const {
+  relmap::storage::visit_sessions(*impl_->snapshot, *impl_->sessions, from, visit);
 }
 
+SessionCounts MapView::session_counts() const { return impl_->session_counts; }
+
 std::optional<Session> MapView::session(SessionNumber number) const {
-  const Session* session = find_session(*impl_->sessions, number);
+  const auto session = impl_->session(number);
   return session ? std::optional<Session>(*session) : std::nullopt;
 }
 
@@ -101,11 +97,11 @@ Status MapView::scan_words(const std::function<bool(FrameId)>& known,
   };
   try {
     impl_->check_alive();
-    for (const auto& session : *impl_->sessions) {
-      if (session->frames == 0) continue;
-      for (ChunkId chunk{session->number, chunk_of({session->number, session->first})};
-           chunk.chunk <= chunk_of({session->number, session->last}); ++chunk.chunk) {
-        if (all_known(*session, chunk)) continue;
+    visit_sessions(0, [&](const Session& session) {
+      if (session.frames == 0) return true;
+      for (ChunkId chunk{session.number, chunk_of({session.number, session.first})};
+           chunk.chunk <= chunk_of({session.number, session.last}); ++chunk.chunk) {
+        if (all_known(session, chunk)) continue;
         const Status status =
             impl_->snapshot->scan(keys::part(Part::kWords, chunk), [&](std::string_view key, ByteSpan value) {
               const auto id = keys::frame_of(key);
@@ -113,9 +109,10 @@ Status MapView::scan_words(const std::function<bool(FrameId)>& known,
               visit_unknown(*id, decode_words_record(value, *id));
               return true;
             });
-        if (!status.ok()) return status;
+        throw_if(status);
       }
-    }
+      return true;
+    });
     for (const auto& [chunk, dirty] : *impl_->dirty)
       for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
         if (dirty->cold[slot] && !dirty->cold[slot]->words.empty())

@@ -7,6 +7,7 @@
 #include "storage/map/chunk_cache.h"
 #include "storage/map/dirty_table.h"
 #include "storage/map/map.h"
+#include "storage/map/session_records.h"
 #include "storage/memory/view_ledger.h"
 
 namespace relmap::storage {
@@ -18,6 +19,7 @@ struct MapView::Impl {
   std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
   std::shared_ptr<const DirtyTable> dirty;         // on top of it
   std::shared_ptr<const SessionTable> sessions;
+  SessionCounts session_counts;
   std::shared_ptr<const LabelChanges> labels;
   std::shared_ptr<const SkippedTable> skipped;
   MapFacts state;
@@ -25,6 +27,11 @@ struct MapView::Impl {
 
   ~Impl() { let_go(); }
   void check_alive() const;
+  // Null if there is none.
+  std::shared_ptr<const Session> session(SessionNumber number) const {
+    if (const auto at = place_of(*sessions, number); at != sessions->end() && (*at)->number == number) return *at;
+    return cache->session(*snapshot, number);
+  }
   // Releases what the view holds, once nobody reads it any more.
   void let_go() {
     if (!ledger) return;

@@ -322,6 +322,7 @@ class Salvage {
       if (Status copied = copy_keys(keys::skipped_in(number)); !copied.ok())
         lose("skipped sequences of session " + std::to_string(number) + ": " + copied.to_string());
     (void)copy_keys(keys::all_pending());
+    (void)copy_keys(keys::all_edits());
     for (int first = 0; first < 256; ++first)
       if (const char byte = static_cast<char>(first); !keys::is_known(byte))
         if (Status copied = copy_keys({&byte, 1}); !copied.ok())

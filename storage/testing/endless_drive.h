@@ -24,7 +24,7 @@ class EndlessDrive final : public PartialGraph {
     if (id.index + 1 < frames_) hot->incoming.push_back({{1, id.index + 1}, 0});
     return hot;
   }
-  std::vector<Session> sessions() const override { return {*session(1)}; }
+  std::vector<Session> all_sessions() const override { return {*session(1)}; }
   std::optional<Session> session(SessionNumber) const override {
     Session session;
     session.number = 1;

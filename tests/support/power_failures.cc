@@ -99,7 +99,12 @@ class KeptJournal final : public storage::ForwardingEngine {
 class MapperSink final : public intake::KeyframeSink {
  public:
   explicit MapperSink(map::Mapper& mapper) : mapper_(mapper) {}
-  Result<SessionNumber> begin_session(const SessionHeader& header) override { return mapper_.begin_session(header); }
+  void begin_session(const SessionHeader& header, Begun begun) override {
+    mapper_.begin_session(header, std::move(begun));
+  }
+  std::optional<SessionNumber> find_session(const SessionUuid& uuid) const override {
+    return mapper_.find_session(uuid);
+  }
   Status submit(storage::JournalRecord record, Done done) override {
     return mapper_.submit(std::move(record), std::move(done));
   }

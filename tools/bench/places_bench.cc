@@ -113,7 +113,7 @@ class DescribedDrive final : public storage::PartialGraph {
   std::shared_ptr<const storage::FrameCold> cold(FrameId id) const override {
     return pictures_[id.index % pictures_.size()];
   }
-  std::vector<storage::Session> sessions() const override { return drive_.sessions(); }
+  std::vector<storage::Session> all_sessions() const override { return drive_.sessions(); }
   std::optional<storage::Session> session(SessionNumber number) const override { return drive_.session(number); }
 
  private:

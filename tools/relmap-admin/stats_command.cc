@@ -25,7 +25,7 @@ Result<client::StoreStats> stats_of(std::shared_ptr<storage::Engine> engine) {
   const auto map = storage::Map::open(std::move(engine), 0, std::make_shared<storage::Budget>(kMemory));
   if (!map.ok()) return map.status();
   const auto view = (*map)->view();
-  stats.status.sessions = static_cast<std::uint32_t>(storage::count_sessions(*view));
+  stats.status.sessions = static_cast<std::uint32_t>(view->session_counts().all);
   stats.status.frames = view->state().keyframes;
   stats.status.gaps = view->state().gaps;
   stats.status.map = view->state().identity;

@@ -23,7 +23,7 @@ class FakeGraph final : public storage::PartialGraph {
     const auto it = frames.find(id);
     return it == frames.end() ? nullptr : it->second;
   }
-  std::vector<storage::Session> sessions() const override {
+  std::vector<storage::Session> all_sessions() const override {
     std::vector<storage::Session> all;
     for (const auto& [number, session] : by_number) all.push_back(session);
     return all;
@@ -34,7 +34,7 @@ class FakeGraph final : public storage::PartialGraph {
   }
   void visit_skipped(SessionNumber number, std::uint32_t sequence, const SkippedVisit& visit) const override {
     for (auto it = settled.lower_bound({number, sequence}); it != settled.end() && it->first.first == number; ++it)
-      if (!visit(it->second)) return;
+      if (!visit(*it->second)) return;
   }
 
   std::map<FrameId, std::shared_ptr<const storage::FrameHot>> frames;
@@ -51,16 +51,25 @@ class FakeSink final : public KeyframeSink {
   Status refuse_begin;              // not ok: begin_session() returns this for new sessions
   std::vector<std::string> faults;  // contract violations by the intake
 
-  Result<SessionNumber> begin_session(const SessionHeader& header) override {
+  bool begin_slowly = false;  // begin_session() answers only when let_begin() is called
+
+  void begin_session(const SessionHeader& header, Begun begun) override {
+    if (!begin_slowly) return begun(begin_now(header));
     const std::lock_guard lock(mutex_);
-    for (const auto& [number, session] : graph_.by_number)
-      if (session.header.uuid == header.uuid) return number;
-    if (!refuse_begin.ok()) return refuse_begin;
-    storage::Session session;
-    session.number = static_cast<SessionNumber>(graph_.by_number.size() + 1);
-    session.header = header;
-    graph_.by_number[session.number] = session;
-    return session.number;
+    beginning_.emplace_back(header, std::move(begun));
+  }
+  std::optional<SessionNumber> find_session(const SessionUuid& uuid) const override {
+    const std::lock_guard lock(mutex_);
+    return number_of(uuid);
+  }
+  // Answers all sessions that are beginning.
+  void let_begin() {
+    std::vector<std::pair<SessionHeader, Begun>> beginning;
+    {
+      const std::lock_guard lock(mutex_);
+      beginning.swap(beginning_);
+    }
+    for (const auto& [header, begun] : beginning) begun(begin_now(header));
   }
 
   Status submit(storage::JournalRecord record, Done done) override {
@@ -139,6 +148,22 @@ class FakeSink final : public KeyframeSink {
   }
 
  private:
+  std::optional<SessionNumber> number_of(const SessionUuid& uuid) const {
+    for (const auto& [number, session] : graph_.by_number)
+      if (session.header.uuid == uuid) return number;
+    return std::nullopt;
+  }
+  Result<SessionNumber> begin_now(const SessionHeader& header) {
+    const std::lock_guard lock(mutex_);
+    if (const auto number = number_of(header.uuid)) return *number;
+    if (!refuse_begin.ok()) return refuse_begin;
+    storage::Session session;
+    session.number = static_cast<SessionNumber>(graph_.by_number.size() + 1);
+    session.header = header;
+    graph_.by_number[session.number] = session;
+    return session.number;
+  }
+
   void finish(std::size_t count, const Status& outcome) {
     std::vector<std::pair<Done, Result<std::uint64_t>>> said;
     {
@@ -173,12 +198,12 @@ class FakeSink final : public KeyframeSink {
       settle(session, decoded->sequence, decoded->sequence);
     } else if (const auto* gap = std::get_if<storage::GapRecord>(&record)) {
       storage::Session& session = graph_.by_number.at(gap->session);
-      graph_.settled[{gap->session, gap->to}] = {gap->from, gap->to, 0, false, gap->reason};
+      graph_.settled[{gap->session, gap->to}] = storage::Skipped{gap->from, gap->to, 0, false, gap->reason};
       settle(session, gap->from, gap->to);
     } else if (const auto* refusal = std::get_if<storage::RefusalRecord>(&record)) {
       storage::Session& session = graph_.by_number.at(refusal->session);
-      graph_.settled[{refusal->session, refusal->sequence}] = {refusal->sequence, refusal->sequence, refusal->crc, true,
-                                                               refusal->reason};
+      graph_.settled[{refusal->session, refusal->sequence}] =
+          storage::Skipped{refusal->sequence, refusal->sequence, refusal->crc, true, refusal->reason};
       settle(session, refusal->sequence, refusal->sequence);
     } else if (const auto* state = std::get_if<storage::SetSessionStateRecord>(&record)) {
       graph_.by_number.at(state->session).state = state->state;
@@ -198,6 +223,7 @@ class FakeSink final : public KeyframeSink {
   std::shared_ptr<const FakeGraph> lagging_;
   std::deque<std::pair<storage::JournalRecord, Done>> queue_;
   std::vector<storage::JournalRecord> journal_;
+  std::vector<std::pair<SessionHeader, Begun>> beginning_;
 };
 
 }  // namespace relmap::intake

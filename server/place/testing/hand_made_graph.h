@@ -6,14 +6,14 @@
 #include <memory>
 #include <utility>
 
-#include "storage/graph/graph.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap::place {
 
 // Cameras for its sessions: a pair of eyes, and the left one of them alone.
 inline constexpr StereoCamera kStereoCamera{400, 256, 192, 0.12, 512, 384}, kMonoCamera{400, 256, 192, 0, 512, 384};
 
-class HandMadeGraph final : public storage::Graph {
+class HandMadeGraph final : public storage::PartialGraph {
  public:
   void add_session(SessionNumber number, const StereoCamera& camera) {
     storage::Session session;
@@ -54,7 +54,7 @@ class HandMadeGraph final : public storage::Graph {
   std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override { return part(id, &Parts::hot); }
   std::shared_ptr<const storage::FrameWarm> warm(FrameId id) const override { return part(id, &Parts::warm); }
   std::shared_ptr<const storage::FrameCold> cold(FrameId id) const override { return part(id, &Parts::cold); }
-  std::vector<storage::Session> sessions() const override {
+  std::vector<storage::Session> all_sessions() const override {
     std::vector<storage::Session> all;
     for (const auto& [number, session] : sessions_) all.push_back(session);
     return all;
@@ -63,9 +63,6 @@ class HandMadeGraph final : public storage::Graph {
     const auto found = sessions_.find(number);
     return found == sessions_.end() ? std::nullopt : std::optional(found->second);
   }
-  void visit_skipped(SessionNumber, std::uint32_t, const SkippedVisit&) const override {}
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
   struct Parts {

@@ -47,8 +47,8 @@ void Overlay::build(const storage::Graph& graph, const Proceed& proceed) {
   };
   std::vector<Tie> ties;
   std::unordered_map<storage::ChunkId, std::uint32_t> places;
-  for (const storage::Session& session : graph.sessions()) {
-    if (session.frames == 0) continue;
+  graph.visit_sessions(0, [&](const storage::Session& session) {
+    if (session.frames == 0) return true;
     for (auto chunk = std::optional(storage::chunk_id({session.number, session.first})); chunk;) {
       check(made.memory_bytes() + ties.size() * sizeof(Tie) + chunks.size() * 64);
       const CellFrames frames = frames_of(graph, *chunk);
@@ -62,7 +62,8 @@ void Overlay::build(const storage::Graph& graph, const Proceed& proceed) {
       }
       chunk = next_chunk(graph, session, *chunk, frames);
     }
-  }
+    return true;
+  });
   std::vector<WeightedPair> pairs;
   for (const Tie& tie : ties)
     if (const auto other = places.find(tie.to); other != places.end() && tie.from < other->second)

@@ -200,7 +200,7 @@ class SoFar final : public storage::PartialGraph {
     std::erase_if(known->edges, [&](const storage::Edge& edge) { return !has(edge.a); });
     return known;
   }
-  std::vector<storage::Session> sessions() const override {
+  std::vector<storage::Session> all_sessions() const override {
     std::vector<storage::Session> all = frames_a_robot == 0 ? std::vector<storage::Session>() : town_.sessions();
     for (storage::Session& session : all) limit(session);
     return all;
@@ -464,7 +464,7 @@ class TangledGraph final : public storage::PartialGraph {
     const auto found = frames_.find(id);
     return found == frames_.end() ? nullptr : found->second;
   }
-  std::vector<storage::Session> sessions() const override {
+  std::vector<storage::Session> all_sessions() const override {
     return {*session(1), *session(2), *session(3), *session(4)};
   }
   std::optional<storage::Session> session(SessionNumber number) const override {

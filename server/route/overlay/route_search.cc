@@ -14,13 +14,6 @@ bool too_stale(const RouteIndex::Snapshot& map) {
   return map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10);
 }
 
-bool has_oneway(const storage::Graph& graph) {
-  const std::vector<storage::Session> sessions = graph.sessions();
-  return std::any_of(sessions.begin(), sessions.end(), [](const storage::Session& session) {
-    return session.header.oneway && !storage::is_deleted(session);
-  });
-}
-
 // The question to the cells, or UNSUPPORTED with the reason why cells cannot answer it.
 Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
   const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
@@ -36,7 +29,7 @@ Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const Rou
     return without("more than a tenth of the map has changed, which the cells do not know yet" +
                    (map.late_because.empty() ? "" : ": " + map.late_because));
   query.stale = map.stale;
-  if (options.filter.against_oneway && has_oneway(*map.view))
+  if (options.filter.against_oneway && map.view->session_counts().oneway > 0)
     return without("cells keep to the directions of one-way sessions");
   auto opened = cells_to_open(*map.overlay, options.filter);
   if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");

@@ -113,7 +113,7 @@ class DrawnMap final : public storage::PartialGraph {
   std::shared_ptr<const storage::FrameCold> cold(FrameId id) const override {
     return frames_.contains(id) ? std::make_shared<const storage::FrameCold>() : nullptr;
   }
-  std::vector<storage::Session> sessions() const override {
+  std::vector<storage::Session> all_sessions() const override {
     std::vector<storage::Session> all;
     for (const auto& [number, session] : sessions_) all.push_back(session);
     return all;

@@ -60,7 +60,7 @@ class StreetGrid final : public storage::PartialGraph {
     std::sort(frame->incoming.begin(), frame->incoming.end());
     return frame;
   }
-  std::vector<storage::Session> sessions() const override {
+  std::vector<storage::Session> all_sessions() const override {
     std::vector<storage::Session> all;
     for (std::uint32_t number = 1; number <= options_.robots; ++number) all.push_back(*session(number));
     return all;

@@ -22,14 +22,17 @@ class ServedMap {
 
   explicit ServedMap(RpcLimits limits = {}, const map::MapperOptions& options = {})
       : circuit(circuit_options()), elsewhere(elsewhere_options()) {
-    auto opened =
-        map::Mapper::open(storage::make_memory_engine(), std::make_shared<storage::Budget>(std::size_t{256} << 20),
-                          place::random_vocabulary(kWords, 60, 1), options);
-    mapper = std::move(opened).or_throw();
-    core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
+    start(limits, options);
     take_in(circuit);
     take_in(elsewhere);
     settle();
+  }
+
+  // Ends the service and serves the same map again.
+  void restart() {
+    core.reset();
+    mapper.reset();
+    start({}, {});
   }
 
   void take_in(const sim::PointsWorld& world) {
@@ -76,8 +79,17 @@ class ServedMap {
   }
 
   const sim::PointsWorld circuit, elsewhere;
+  const std::shared_ptr<storage::Engine> engine = storage::make_memory_engine();
   std::unique_ptr<map::Mapper> mapper;
   std::unique_ptr<Core> core;
+
+ private:
+  void start(RpcLimits limits, const map::MapperOptions& options) {
+    auto opened = map::Mapper::open(engine, std::make_shared<storage::Budget>(std::size_t{256} << 20),
+                                    place::random_vocabulary(kWords, 60, 1), options);
+    mapper = std::move(opened).or_throw();
+    core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
+  }
 };
 
 }  // namespace relmap::rpc
