@@ -11,6 +11,7 @@
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <unordered_set>
 #include <variant>
 #include <vector>
@@ -282,8 +283,15 @@ class LcmForgery : public ::testing::Test {
         continue;
       }
       kill_daemon();
-      // Nobody is there who could settle anything: the spool keeps what is not settled.
-      const std::uint64_t unsettled = publisher->progress().unsettled;
+      // Nobody is there who could settle anything: the spool keeps what is not settled. What the daemon said last may
+      // still be on its way.
+      std::uint64_t unsettled = publisher->progress().unsettled;
+      const auto settles = [&] {
+        std::this_thread::sleep_for(milliseconds(300));
+        return std::exchange(unsettled, publisher->progress().unsettled) != unsettled;
+      };
+      while (settles()) {
+      }
       for (std::uint32_t more = 0; more < 5; ++more) EXPECT_TRUE(publisher->push(keyframe(++s)).ok());
       std::this_thread::sleep_for(milliseconds(300));
       EXPECT_GE(publisher->progress().unsettled, unsettled + 5) << "a forged acknowledgement has emptied the spool";

@@ -570,6 +570,7 @@ TEST(Mapper, AnUnreadablePartIsReportedWithAdvice) {
     ASSERT_TRUE(feed(*mapper, world, 0, 20).ok());
   }
   const auto mapper = open_mapper(storage::open_fault_engine(disk, faults).or_throw());
+  ASSERT_TRUE(mapper->begin_session(world.keyframe(0).session).ok());  // its record is in memory from now on
   faults->reads = 1000;
   EXPECT_EQ(feed(*mapper, world, 20, 21).reason(), Reason::READ_ONLY);
   const Status storage = mapper->stats().storage;
