@@ -61,8 +61,10 @@ std::vector<Bytes> read_log(ByteSpan log) {
 void put_log_record(ByteWriter& w, ByteSpan record) {
   for (bool first = true, last = false; !last; first = false) {
     std::size_t left = kLogBlock - w.size() % kLogBlock;
-    for (; left < kPieceHeader; --left) w.put(std::uint8_t{0});
-    if (left == 0) left = kLogBlock;
+    if (left < kPieceHeader) {
+      w.put_bytes(Bytes(left, 0));
+      left = kLogBlock;
+    }
     const ByteSpan piece = record.first(std::min(record.size(), left - kPieceHeader));
     record = record.subspan(piece.size());
     last = record.empty();

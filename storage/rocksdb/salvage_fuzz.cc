@@ -8,10 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "storage/maintenance/testing/driven_map.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/frame_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/rocksdb/salvage.h"
 #include "storage/testing/patches.h"
+#include "storage/testing/random_frames.h"
 #include "storage/testing/temporary_folder.h"
 
 namespace {
@@ -21,7 +25,8 @@ using namespace relmap::storage;
 namespace fs = std::filesystem;
 
 constexpr std::size_t kChanges = 8;
-constexpr std::uint32_t kFewFrames = 70;  // more than a chunk, so that there are blobs
+constexpr std::uint32_t kChunks = 2, kFrames = 3;  // chunks of a session, frames of a chunk
+constexpr std::size_t kPicture = 5000;             // larger than what RocksDB keeps in tables
 
 void must(bool holds) {
   if (!holds) std::abort();
@@ -51,17 +56,63 @@ void write(const std::string& folder, const Files& files) {
   }
 }
 
-// The store of a drive of which a part is compacted and the rest in later tables and in RocksDB's own log.
+// A chunk with a few frames, in containers as they stand when it is open or closed; the cold parts become blobs.
+void put_chunk(std::vector<Put>& puts, RandomFrames& random, ChunkId chunk, bool closed) {
+  PartWriter hot(Part::kHot, chunk, 1), warm(Part::kWarm, chunk, 1);
+  for (std::uint32_t slot = 0; slot < kFrames; ++slot) {
+    const FrameId id = frame_in(chunk, slot);
+    ByteWriter h, w, c;
+    encode_hot(h, id, random.hot(id));
+    encode_warm(w, id, random.warm());
+    FrameCold cold = random.cold();
+    cold.picture.assign(kPicture, static_cast<std::uint8_t>(slot));
+    encode_cold(c, cold);
+    if (closed) {
+      hot.add(slot, h.bytes());
+      warm.add(slot, w.bytes());
+    } else {
+      puts.push_back({keys::frame(Part::kHot, id), frame_container(Part::kHot, id, 1, h.bytes())});
+      puts.push_back({keys::frame(Part::kWarm, id), frame_container(Part::kWarm, id, 1, w.bytes())});
+    }
+    puts.push_back({keys::frame(Part::kCold, id), frame_container(Part::kCold, id, 1, c.bytes())});
+  }
+  if (!closed) return;
+  puts.push_back({keys::part(Part::kHot, chunk), hot.finish()});
+  puts.push_back({keys::part(Part::kWarm, chunk), warm.finish()});
+}
+
+// A store of two sessions, of which a part is compacted and the rest in a later table and in RocksDB's own log.
 Files make_store(const std::string& data) {
   {
     RocksDbOptions options;
     options.cache_bytes = std::size_t{8} << 20;
     const auto engine = open_rocksdb(data, options).or_throw();
-    drive_map(engine, kFewFrames);
-    must(engine->compact([](std::uint64_t, std::uint64_t) { return Status(); }).ok());
-    const auto map = open_map(engine);
-    map->set_label({1, 3}, "hall", true);
-    must(map->commit().ok());
+    const std::uint64_t epoch = engine->acquire().or_throw();
+    RandomFrames random(1);
+    std::uint64_t applied = 0;
+    for (const SessionNumber number : {1, 2}) {
+      must(engine->allocate_session(epoch).or_throw() == number);
+      for (std::uint32_t chunk = 0; chunk < kChunks; ++chunk) {
+        std::vector<Put> puts;
+        put_chunk(puts, random, {number, chunk}, chunk + 1 < kChunks);
+        Session session = random.session(number);
+        session.first = 0;
+        session.last = chunk * kFramesPerChunk + kFrames - 1;
+        session.frames = (chunk + 1) * kFrames;
+        puts.push_back({keys::session(number), encode_session(session)});
+        const Skipped skipped = random.skipped();
+        puts.push_back({keys::skipped(number, skipped.to), encode_skipped(skipped)});
+        puts.push_back({keys::label("hall", {number, chunk}), {}});
+        puts.push_back({std::string("\x7f", 1) + "later", Bytes(10, 1)});
+        MapState state;
+        state.applied_sequence = applied;
+        puts.push_back({keys::map_state(), encode_state(state)});
+        const Bytes record(10, 1);
+        applied = engine->append(epoch, {&record, 1}).or_throw();
+        must(engine->commit(epoch, applied, puts, {}).ok());
+      }
+      if (number == 1) must(engine->compact([](std::uint64_t, std::uint64_t) { return Status(); }).ok());
+    }
   }
   return files_in(data + "/map");
 }
