@@ -4,8 +4,10 @@
 #   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, with label `ci`; those that THREAD_TESTS names, since
 #   they have threads, become NAME_threads_test, which is also built and run under ThreadSanitizer.
 # relmap_program(NAME SOURCE LINK ...)  one program, into bin/.
-# relmap_fuzzer(NAME SOURCE LINK ...)   with RELMAP_FUZZ a libFuzzer binary; otherwise a test that replays
-#                                       tests/corpus/NAME through it.
+# relmap_fuzzer(NAME SOURCES ... LINK ... COVERS files...)
+#   With RELMAP_FUZZ a libFuzzer binary; otherwise a test that replays tests/corpus/NAME through it. COVERS names the
+#   files, from the current folder, that the fuzzer is there for: `tools/fuzz --coverage` counts how many of their lines
+#   its corpus reaches.
 
 add_library(relmap_flags INTERFACE)
 target_include_directories(relmap_flags INTERFACE ${CMAKE_SOURCE_DIR})
@@ -41,8 +43,10 @@ if(CMAKE_BUILD_TYPE MATCHES "Rel" AND NOT RELMAP_SANITIZE AND NOT RELMAP_FUZZ)
   target_link_options(relmap_flags INTERFACE LINKER:-z,relro,-z,now)
 endif()
 if(RELMAP_FUZZ)
-  target_compile_options(relmap_flags INTERFACE -fsanitize=fuzzer-no-link)
-  target_link_options(relmap_flags INTERFACE -fsanitize=fuzzer-no-link)
+  # Fuzzers also count the lines that they reach (tools/fuzz --coverage).
+  set(fuzz_flags -fsanitize=fuzzer-no-link -fprofile-instr-generate)
+  target_compile_options(relmap_flags INTERFACE ${fuzz_flags} -fcoverage-mapping)
+  target_link_options(relmap_flags INTERFACE ${fuzz_flags})
 endif()
 
 find_package(GTest REQUIRED)
@@ -175,9 +179,24 @@ function(relmap_program name)
 endfunction()
 
 add_custom_target(relmap_fuzzers)
+set(RELMAP_FUZZERS ${CMAKE_BINARY_DIR}/fuzzers.txt)  # a line for each: its name and what it covers
+file(WRITE ${RELMAP_FUZZERS} "")
 function(relmap_fuzzer name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK;COVERS" ${ARGN})
   add_dependencies(relmap_fuzzers ${name})
+  set(covered "")
+  foreach(file ${arg_COVERS})
+    cmake_path(ABSOLUTE_PATH file NORMALIZE)
+    if(NOT EXISTS ${file})
+      message(FATAL_ERROR "${name} covers ${file}, which does not exist")
+    endif()
+    cmake_path(RELATIVE_PATH file BASE_DIRECTORY ${CMAKE_SOURCE_DIR})
+    string(APPEND covered " ${file}")
+  endforeach()
+  if(NOT covered)
+    message(FATAL_ERROR "${name} does not say which files it COVERS")
+  endif()
+  file(APPEND ${RELMAP_FUZZERS} "${name}${covered}\n")
   if(RELMAP_FUZZ)
     add_executable(${name} ${arg_SOURCES})
     target_link_options(${name} PRIVATE -fsanitize=fuzzer)
@@ -185,6 +204,7 @@ function(relmap_fuzzer name)
   else()
     add_executable(${name} ${arg_SOURCES} ${CMAKE_SOURCE_DIR}/tests/replay_corpus_main.cc)
     target_link_libraries(${name} PRIVATE relmap_flags ${arg_LINK})
+    target_compile_options(${name} PRIVATE ${RELMAP_QUICK_OPTIONS})
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
     add_test(NAME ${name}.corpus COMMAND ${name} ${CMAKE_SOURCE_DIR}/tests/corpus/${name})
     set_tests_properties(${name}.corpus PROPERTIES TIMEOUT 60 LABELS ci)

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -204,8 +205,10 @@ Status DiskSpool::find_segments() {
   std::error_code error;
   for (const fs::directory_entry& file : fs::directory_iterator(folder_, error)) {
     const std::string name = file.path().filename().string();
-    if (name.size() == 14 && name.ends_with(".seg") && name.find_first_not_of("0123456789") == 10)
-      segments_.emplace(static_cast<std::uint32_t>(std::stoul(name)), Segment{});
+    if (name.size() != 14 || !name.ends_with(".seg") || name.find_first_not_of("0123456789") != 10) continue;
+    // A file with a larger number is none of ours: after it there would be no next one.
+    if (const unsigned long number = std::stoul(name); number < std::numeric_limits<std::uint32_t>::max())
+      segments_.emplace(static_cast<std::uint32_t>(number), Segment{});
   }
   if (error) return {Reason::IO_ERROR, "list " + folder_ + ": " + error.message()};
   return {};
@@ -229,6 +232,7 @@ Status DiskSpool::load_segment(std::uint32_t number) {
     const auto kind = body.get<RecordKind>();
     if (kind == RecordKind::kKeyframe) {
       const auto sequence = body.get<std::uint32_t>();
+      if (!body.ok()) break;
       const auto payload_bytes = static_cast<std::uint32_t>(body.remaining());
       const std::uint64_t offset = in.position() - payload_bytes;
       keyframes_[sequence] = {crc32c(body.get_bytes(payload_bytes)), payload_bytes};
@@ -236,6 +240,7 @@ Status DiskSpool::load_segment(std::uint32_t number) {
       segment.end = std::max(segment.end, sequence + std::uint64_t{1});
     } else if (kind == RecordKind::kGap) {
       Gap gap{session_.uuid, body.get<std::uint32_t>(), body.get<std::uint32_t>(), body.get<Reason>()};
+      if (!body.ok()) break;
       gaps_.push_back(gap);
       segment.end = std::max(segment.end, gap.to + std::uint64_t{1});
     }

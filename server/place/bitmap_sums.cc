@@ -7,7 +7,9 @@
 #if defined(__x86_64__)
 #pragma GCC diagnostic push
 // GCC 12 warns of undefined registers that are masked out; which of the two warnings depends on -O.
+#if !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #include <immintrin.h>
 #pragma GCC diagnostic pop

@@ -47,7 +47,7 @@ std::vector<DescriptorMatch> match(std::span<const AppearanceFeature> features,
 
   std::vector<DescriptorMatch> matches;
   for (std::uint32_t f = 0; f < features.size(); ++f) {
-    const auto [p, distance] = point_of[f];
+    const std::uint32_t p = point_of[f].index, distance = point_of[f].distance;
     if (distance > kMaxDescriptorDistance || feature_of[p].index != f) continue;
     const auto rival = static_cast<std::uint32_t>(distance / (kDescriptorRatio * kDescriptorRatio));
     bool clear = true;
@@ -113,8 +113,9 @@ std::vector<DescriptorMatch> match_points_by_word(std::span<const AppearanceFeat
   const auto word = [&](std::uint32_t p) { return points[p].word; };
   std::ranges::stable_sort(order, {}, word);
   const auto of_word = [&](std::uint32_t, std::uint32_t f) {
-    const auto found = std::ranges::equal_range(order, words[f], {}, word);
-    return std::span<const std::uint32_t>(found.begin(), found.end());
+    const auto first = std::ranges::lower_bound(order, words[f], {}, word);
+    const auto last = std::ranges::upper_bound(first, order.end(), words[f], {}, word);
+    return std::span<const std::uint32_t>(first, last);
   };
   return nearest_of_all(match(features, descriptors_of(points), SamePoint{points}, of_word), points);
 }

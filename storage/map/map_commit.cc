@@ -38,9 +38,9 @@ struct Map::Impl::Batch {
     std::size_t first = 0, last = 0;                                    // its puts: from first up to last
     std::array<std::shared_ptr<const Frame>, kFramesPerChunk> decoded;  // its frames, where they are decoded
 
-    Part after(std::size_t puts) && {
-      first += puts;
-      last += puts;
+    Part after(std::size_t count) && {
+      first += count;
+      last += count;
       return std::move(*this);
     }
   };

@@ -10,12 +10,12 @@
 #include <map>
 #include <set>
 
-#include "proto/base/crc32c.h"
 #include "storage/format/chunk_codec.h"
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
+#include "storage/rocksdb/manifest_log.h"
 #include "storage/rocksdb/map_database.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/root.h"
@@ -92,101 +92,33 @@ std::vector<fs::path> files_of(const std::string& directory, const std::string& 
   return files;
 }
 
-// A MANIFEST is a log of RocksDB: blocks of 32 KiB, records in one or more pieces, each with a masked CRC, a length and
-// a type (1 whole, 2 first, 3 middle, 4 last).
-constexpr std::size_t kBlock = 32768, kPieceHeader = 7;
-
-std::vector<Bytes> read_log(ByteSpan log) {
-  std::vector<Bytes> records;
-  Bytes record;
-  for (std::size_t at = 0; at + kPieceHeader <= log.size();) {
-    if (kBlock - at % kBlock < kPieceHeader) {
-      at += kBlock - at % kBlock;
-      continue;
-    }
-    ByteReader r(log.subspan(at));
-    r.get<std::uint32_t>();
-    const auto length = r.get<std::uint16_t>();
-    const auto type = r.get<std::uint8_t>();
-    const ByteSpan piece = r.get_bytes(length);
-    if (!r.ok() || type < 1 || type > 4) break;
-    if (type == 1 || type == 2) record.clear();
-    record.insert(record.end(), piece.begin(), piece.end());
-    if (type == 1 || type == 4) records.push_back(record);
-    at += kPieceHeader + length;
-  }
-  return records;
+// The first or the last bytes of a file, at most `count`.
+Bytes end_of(const fs::path& path, std::uint64_t size, std::size_t count, bool last) {
+  Bytes bytes(std::min<std::uint64_t>(size, count));
+  std::ifstream in(path, std::ios::binary);
+  if (last) in.seekg(static_cast<std::streamoff>(size - bytes.size()));
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
 }
 
-void put_log_record(ByteWriter& w, ByteSpan record) {
-  for (bool first = true, last = false; !last; first = false) {
-    std::size_t left = kBlock - w.size() % kBlock;
-    for (; left < kPieceHeader; --left) w.put(std::uint8_t{0});
-    if (left == 0) left = kBlock;
-    const ByteSpan piece = record.first(std::min(record.size(), left - kPieceHeader));
-    record = record.subspan(piece.size());
-    last = record.empty();
-    Bytes typed{static_cast<std::uint8_t>(first ? (last ? 1 : 2) : (last ? 4 : 3))};
-    typed.insert(typed.end(), piece.begin(), piece.end());
-    const std::uint32_t crc = crc32c(typed);
-    w.put(((crc >> 15) | (crc << 17)) + 0xa282ead8u);  // as RocksDB masks it
-    w.put(static_cast<std::uint16_t>(piece.size()));
-    w.put_bytes(typed);
-  }
-}
-
-// The edit of a MANIFEST that adds a blob file.
-Bytes blob_addition(const fs::path& path) {
-  constexpr std::uint64_t kTag = 400, kFamilyTag = 200, kHeader = 30, kFooter = 32;
-  Bytes edit;
-  const auto put_varint = [&](std::uint64_t value) {
-    for (; value >= 0x80; value >>= 7) edit.push_back(static_cast<std::uint8_t>(value | 0x80));
-    edit.push_back(static_cast<std::uint8_t>(value));
-  };
-  const std::uint64_t size = fs::file_size(path);
-  std::uint64_t count = 1;  // matters to garbage collection only
-  if (std::ifstream in(path, std::ios::binary); size > kHeader + kFooter) {
-    in.seekg(static_cast<std::streamoff>(size - kFooter + 4));
-    in.read(reinterpret_cast<char*>(&count), sizeof count);
-  }
-  std::uint32_t family = 0;
-  if (std::ifstream in(path, std::ios::binary); in.seekg(8)) in.read(reinterpret_cast<char*>(&family), sizeof family);
-  put_varint(kTag);
-  put_varint(std::stoull(path.stem().string()));
-  put_varint(count);
-  put_varint(size > kHeader + kFooter ? size - kHeader - kFooter : 1);
-  edit.insert(edit.end(), {0, 0, 0});  // no checksum's method and value; the end of the addition
-  put_varint(kFamilyTag);
-  put_varint(family);
-  return edit;
-}
-
-// RocksDB's own repair makes the list of tables anew, and knows nothing of blob files. Here they are put in front of
-// the tables that refer to them.
+// RocksDB's own repair makes the list of tables anew, and knows nothing of blob files. Here they are added.
 Status list_blob_files(const std::string& directory) {
+  std::vector<BlobFile> blobs;
+  for (const fs::path& path : files_of(directory, ".blob")) {
+    const std::uint64_t size = fs::file_size(path);
+    if (const auto blob = blob_file(path.stem().string(), size, end_of(path, size, kBlobHeader, false),
+                                    end_of(path, size, kBlobFooter, true)))
+      blobs.push_back(*blob);
+  }
   std::string manifest;
   std::ifstream(directory + "/CURRENT") >> manifest;
   const std::string path = directory + "/" + manifest;
   std::ifstream in(path, std::ios::binary);
   const std::string old{std::istreambuf_iterator<char>(in), {}};
-  const std::vector<Bytes> records = read_log(as_bytes(old));
-  // They go behind the last record that adds a family: tag 201 and the family's name.
-  static constexpr std::string_view kFamilyAdded =
-      "\xc9\x01\x04"
-      "cold";
-  const ByteSpan added = as_bytes(kFamilyAdded);
-  std::size_t before = 0;
-  for (std::size_t i = 0; i < records.size(); ++i)
-    if (std::search(records[i].begin(), records[i].end(), added.begin(), added.end()) != records[i].end())
-      before = i + 1;
-  ByteWriter w;
-  for (std::size_t i = 0; i <= records.size(); ++i) {
-    if (i == before)
-      for (const fs::path& blob : files_of(directory, ".blob")) put_log_record(w, blob_addition(blob));
-    if (i < records.size()) put_log_record(w, records[i]);
-  }
+  const Bytes mended = with_blob_files(as_bytes(old), blobs);
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(w.bytes().data()), static_cast<std::streamsize>(w.size()));
+  out.write(reinterpret_cast<const char*>(mended.data()), static_cast<std::streamsize>(mended.size()));
   return out.flush() ? Status() : Status(Reason::IO_ERROR, path + " cannot be written");
 }
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <list>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <unordered_map>
@@ -55,7 +57,8 @@ FrameId get_frame(ByteReader& r) {
   return {session, r.get<std::uint32_t>()};
 }
 
-CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) {
+// nullopt if the bytes are no frames of a cell, though their checksum is right.
+std::optional<CellFrames> get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) {
   ByteReader r(bytes);
   CellFrames frames;
   frames.nodes.resize(nodes);
@@ -77,6 +80,11 @@ CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) 
     link.out = flags & kOutFlag;
     link.in = flags & kInFlag;
   }
+  const bool whole =
+      frames.begin.front() == 0 && frames.begin.back() == links &&
+      std::is_sorted(frames.begin.begin(), frames.begin.end()) &&
+      std::adjacent_find(frames.nodes.begin(), frames.nodes.end(), std::greater_equal<>()) == frames.nodes.end();
+  if (!whole) return std::nullopt;
   return frames;
 }
 
@@ -123,6 +131,7 @@ struct CellStore::Impl {
   SplitCostMatrix load_matrix(std::uint64_t offset, std::uint32_t nodes);
   void read(std::uint64_t offset, std::span<std::uint8_t> bytes);
   void read_sealed(std::uint64_t offset, std::span<std::uint8_t> bytes);
+  [[noreturn]] void throw_damaged();
   void charge(std::size_t bytes);
   std::size_t evict(std::size_t bytes);
   void drop(std::uint64_t offset) RELMAP_REQUIRES(mutex);
@@ -181,7 +190,9 @@ void CellStore::Impl::keep(std::uint64_t offset, T value, std::size_t bytes) {
 CellFrames CellStore::Impl::load_frames(std::uint64_t offset, std::uint32_t nodes, std::uint32_t links) {
   Bytes bytes(nodes * std::size_t{12} + 4 + links * kLinkBytes);
   read_sealed(offset, bytes);
-  return get_frames(bytes, nodes, links);
+  auto frames = get_frames(bytes, nodes, links);
+  if (!frames) throw_damaged();
+  return *std::move(frames);
 }
 
 SplitCostMatrix CellStore::Impl::load_matrix(std::uint64_t offset, std::uint32_t nodes) {
@@ -201,7 +212,10 @@ void CellStore::Impl::read_sealed(std::uint64_t offset, std::span<std::uint8_t> 
   std::uint32_t crc = 0;
   read(offset, {reinterpret_cast<std::uint8_t*>(&crc), kCrcBytes});
   read(offset + kCrcBytes, bytes);
-  if (crc == crc32c(bytes)) return;
+  if (crc != crc32c(bytes)) throw_damaged();
+}
+
+void CellStore::Impl::throw_damaged() {
   damaged = true;
   throw StatusError(
       Status(Reason::DATA_LOSS, "the cells in " + file->path() + " are damaged; they are made again from the map"));
