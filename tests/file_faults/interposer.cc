@@ -4,6 +4,7 @@
 // program.
 #include <dirent.h>
 #include <dlfcn.h>
+#include <execinfo.h>
 #include <fcntl.h>
 #include <link.h>
 #include <pthread.h>
@@ -24,6 +25,7 @@
 #include <cstring>
 #include <new>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/file_faults/control.h"
@@ -162,6 +164,38 @@ bool in_program(const void* address) {
   return at >= program_begin && at < program_end;
 }
 
+// Whether the address, which must be in the program, is in a template of the standard library. Looked up once each.
+bool in_template(const void* address) {
+  constexpr std::size_t kKnown = 1 << 16;
+  static std::atomic<std::uintptr_t> known[kKnown];  // the address, doubled, and the answer
+  const auto at = reinterpret_cast<std::uintptr_t>(address);
+  std::atomic<std::uintptr_t>& slot = known[at % kKnown];
+  if (const std::uintptr_t found = slot.load(std::memory_order_relaxed); found >> 1 == at) return (found & 1) != 0;
+  Dl_info info{};
+  const bool shared = ::dladdr(static_cast<const char*>(address) - 1, &info) != 0 && info.dli_sname != nullptr;
+  const std::string_view name = shared ? info.dli_sname : "";
+  const bool answer = name.starts_with("_ZNSt") || name.starts_with("_ZNKSt") || name.starts_with("_ZSt");
+  slot.store(at << 1 | (answer ? 1 : 0), std::memory_order_relaxed);
+  return answer;
+}
+
+// Whether the program itself asks, and not a library: which may do so by a template of the standard library that the
+// linker has taken from the program.
+bool program_asks(const void* caller) {
+  if (!in_program(caller)) return false;
+  if (!in_template(caller)) return true;
+  static thread_local bool asked = false;
+  if (asked) return false;
+  asked = true;
+  void* frames[16];
+  const int count = ::backtrace(frames, 16);
+  int at = 0;
+  while (at < count && frames[at] != caller) ++at;
+  while (at < count && in_program(frames[at]) && in_template(frames[at])) ++at;
+  asked = false;
+  return at < count && in_program(frames[at]);
+}
+
 __attribute__((constructor)) void begin() {
   const char* const folder = ::getenv(kFaultRoot);
   const char* const shared = ::getenv(kFaultControl);
@@ -185,6 +219,8 @@ __attribute__((constructor)) void begin() {
         return 1;
       },
       nullptr);
+  void* frames[4];
+  (void)::backtrace(frames, 4);  // the first call loads a library
   control = static_cast<FaultControl*>(mapped);
   root = new std::string(folder);
 }
@@ -325,7 +361,7 @@ ssize_t watched_gather(int fd, std::int64_t offset, const iovec* parts, int coun
 }
 
 void* allocated(const void* caller) {
-  if (control != nullptr && in_program(caller) && faulty(FaultKind::kAllocation)) return nullptr;
+  if (control != nullptr && program_asks(caller) && faulty(FaultKind::kAllocation)) return nullptr;
   return const_cast<void*>(caller);  // anything but null
 }
 using New = void*(std::size_t);
