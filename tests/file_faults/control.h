@@ -25,6 +25,7 @@ struct FaultControl {
   std::atomic<std::int32_t> error{0};                             // 0: it does not fail
   std::atomic<std::uint32_t> hang_ms{0};                          // before it fails or succeeds
   std::atomic<std::uint32_t> hits{0};                             // faults that happened
+  std::atomic<std::uint32_t> hanging{0};                          // that hang now
 };
 
 enum class OperationKind : std::uint32_t {

@@ -111,8 +111,10 @@ bool faulty(FaultKind kind) {
   ++control->hits;
   if (const std::uint32_t ms = control->hang_ms; ms > 0) {
     timespec left{ms / 1000, static_cast<long>(ms % 1000) * 1000000};
+    ++control->hanging;
     while (::nanosleep(&left, &left) != 0 && errno == EINTR) {
     }
+    --control->hanging;
   }
   if (control->error == 0) return false;
   errno = control->error;

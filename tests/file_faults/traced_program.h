@@ -29,6 +29,7 @@ class FileFaults {
   void fail(FaultKind kind, std::uint64_t n, int error, std::chrono::milliseconds hang = {});
   std::uint64_t count(FaultKind kind) const { return control_->counts[static_cast<std::size_t>(kind)]; }
   bool hit() const { return control_->hits > 0; }
+  bool hanging() const { return control_->hanging > 0; }  // now
 
   // The operations so far: whatever the program has told somebody since then rests on these.
   std::uint64_t recorded() const { return control_->recorded; }
