@@ -10,12 +10,14 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <new>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
+#include "server/ops/last_words.h"
 #include "server/ops/process.h"
 #include "server/ops/signals.h"
 #include "tools/terminal/command_line.h"
@@ -47,7 +49,7 @@ acknowledged is applied and committed. A second signal ends it at once, without 
 
 exit codes:
   0  stopped by a signal; with --check-config: the configuration is sound
-  1  the last commit failed (nothing acknowledged is lost), or an internal error
+  1  the last commit failed, memory ran out (BUDGET_EXCEEDED), or an internal error; nothing acknowledged is lost
   2  BAD_CONFIG, or wrong usage
   3  FOLDER_LOCKED: another process owns the data folder
   4  PORT_IN_USE: another process listens at the address of --listen
@@ -208,6 +210,7 @@ int run(const CommandLine& line, Config config) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  relmap::ops::name_reason_of_sudden_end();
   umask(S_IRWXG | S_IRWXO);  // what the daemon writes is nobody else's
   // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
@@ -231,6 +234,8 @@ int main(int argc, char** argv) {
   }
   try {
     return run(line, config);
+  } catch (const std::bad_alloc&) {
+    return fail({Reason::BUDGET_EXCEEDED, "out of memory"});
   } catch (const std::exception& error) {
     return fail({Reason::INTERNAL, error.what()});
   }

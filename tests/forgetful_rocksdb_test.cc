@@ -24,6 +24,7 @@ class Disk final : public FailingDisk {
   Result<std::shared_ptr<storage::Engine>> open() override {
     storage::RocksDbOptions options;
     options.cache_bytes = std::size_t{8} << 20;
+    options.space.reserve = std::size_t{1} << 20;
     options.journal_files = journal_;
     options.map_files = map_;
     options.folder_files = std::make_shared<storage::ForgetfulFolders>(map_);

@@ -19,7 +19,9 @@ DiskSpace::DiskSpace(std::shared_ptr<FileSystem> files, std::string folder, Disk
     options_.low_water = std::min(options_.low_water, room->size / 16);
     options_.reserve = std::min(options_.reserve, options_.low_water / 4);
   }
-  reserved_ = files_->open_read(reserve_path_).ok();
+  // After a power failure the file may be there without the room.
+  const auto reserve = files_->open_read(reserve_path_);
+  reserved_ = reserve.ok() && (*reserve)->size() >= options_.reserve;
   look(Clock::now());
 }
 

@@ -51,6 +51,15 @@ TEST_F(DiskSpaceTest, GivesTheReserveUpOnceAndMakesItAgainBeforeGoingOn) {
   EXPECT_TRUE(reserved());
 }
 
+// As a power failure leaves it.
+TEST(DiskSpace, AReserveThatLacksItsRoomIsMadeAgain) {
+  const TemporaryFolder folder;
+  const auto files = posix_file_system();
+  ASSERT_TRUE(files->open_append(folder / "RESERVE").ok());
+  const DiskSpace space(files, folder / ".", {4 * kMiB, kMiB});
+  EXPECT_EQ(files->open_read(folder / "RESERVE").or_throw()->size(), kMiB);
+}
+
 TEST_F(DiskSpaceTest, AFailedWriteOverridesTheReportedFreeSpace) {
   options.believe_failure = std::chrono::hours(1);
   DiskSpace space = open();

@@ -96,9 +96,10 @@ bool OpenFolder::remove_empty(const std::string& name) const {
   return ::unlinkat(fd_, name.c_str(), AT_REMOVEDIR) == 0;
 }
 
-void OpenFolder::clear() const {
+void OpenFolder::clear(const std::string& but) const {
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(path() + "/.", ignored)) fs::remove_all(entry.path(), ignored);
+  for (const auto& entry : fs::directory_iterator(path() + "/.", ignored))
+    if (entry.path().filename() != but) fs::remove_all(entry.path(), ignored);
 }
 
 }  // namespace relmap::storage

@@ -41,8 +41,8 @@ class OpenFolder {
   Status sync() const;
   // Removes a folder in this one, if it is empty.
   bool remove_empty(const std::string& name) const;
-  // Removes what is in it. Links are removed, not followed.
-  void clear() const;
+  // Removes what is in it, but what is called `but`. Links are removed, not followed.
+  void clear(const std::string& but = {}) const;
 
  private:
   explicit OpenFolder(int fd) : fd_(fd) {}

@@ -37,6 +37,7 @@ rocksdb::Status MapDatabase::open(const rocksdb::Options& options, const std::st
 }
 
 MapDatabase::~MapDatabase() {
+  if (!db_) return;  // its opening was given up half way
   for (auto* family : families_) (void)db_->DestroyColumnFamilyHandle(family);
 }
 

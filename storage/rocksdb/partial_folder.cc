@@ -77,23 +77,33 @@ Result<std::unique_ptr<OpenFolder>> parent_of(const fs::path& directory, const s
   return Status(Reason::NOT_ALLOWED, directory.string() + " is not below a folder for backups: " + all);
 }
 
-// Its mark says so, or nothing is in it but the beginning of one.
+std::string mark_of(const OpenFolder& folder) {
+  std::ifstream mark(folder.path() + kMark);
+  return {std::istreambuf_iterator<char>(mark), {}};
+}
+
+// Its mark says so, or nothing is in it but the beginning of one, which after a power failure may be zeros.
 bool is_leftover(const OpenFolder& folder) {
   if (!folder.ours()) return false;
-  std::ifstream mark(folder.path() + kMark);
-  const std::string text(std::istreambuf_iterator<char>(mark), {});
+  const std::string text = mark_of(folder);
   if (text.starts_with(kMarkText)) return true;
   const auto entries = fs::directory_iterator(folder.path() + "/.");
-  return std::string_view(kMarkText).starts_with(text) &&
+  return std::string_view(kMarkText).starts_with(text.substr(0, text.find('\0'))) &&
          std::all_of(begin(entries), end(entries),
                      [](const fs::directory_entry& entry) { return "/" + entry.path().filename().string() == kMark; });
 }
 
-Status write_mark(const std::string& folder) {
-  const auto file = posix_file_system()->open_append(folder + kMark);
+// The mark is durable before anything else is in the folder: a power failure must not leave the rest without it.
+Status write_mark(const OpenFolder& folder) {
+  const std::string path = folder.path() + kMark;
+  const bool whole = mark_of(folder).starts_with(kMarkText);
+  if (!whole) fs::remove(path);
+  const auto file = posix_file_system()->open_append(path);
   if (!file.ok()) return file.status();
-  if (Status written = (*file)->append(as_bytes(kMarkText)); !written.ok()) return written;
-  return (*file)->sync();
+  if (!whole)
+    if (Status written = (*file)->append(as_bytes(kMarkText)); !written.ok()) return written;
+  if (Status synced = (*file)->sync(); !synced.ok()) return synced;
+  return folder.sync();
 }
 
 }  // namespace
@@ -124,7 +134,7 @@ Result<std::unique_ptr<PartialFolder>> PartialFolder::begin(const NewFolder& to,
   if (!is_leftover(**own)) return Status(Reason::INVALID_ARGUMENT, in_the_way);
   if (Status restricted = (*own)->restrict_to_owner(); !restricted.ok()) return restricted;
   std::unique_ptr<PartialFolder> folder(new PartialFolder(std::move(*parent), std::move(*own), directory));
-  if (Status marked = write_mark(folder->path()); !marked.ok()) return folder->named(marked);
+  if (Status marked = write_mark(*folder->own_); !marked.ok()) return folder->named(marked);
   auto lock = FolderLock::take(folder->path());
   if (!lock.ok()) {
     folder->completed_ = true;  // it is another's
@@ -144,6 +154,8 @@ Result<std::unique_ptr<PartialFolder>> PartialFolder::begin(const NewFolder& to,
 
 PartialFolder::~PartialFolder() {
   if (completed_) return;
+  own_->clear(&kMark[1]);  // the mark goes last, or a power failure could leave the rest without it
+  (void)own_->sync();
   own_->clear();
   const std::string partial = final_name() + ".partial";
   if (parent_->has(partial, *own_)) parent_->remove_empty(partial);

@@ -31,6 +31,7 @@ std::string run(std::uint64_t seed, Syncs sync, int crashes) {
   options.cache_bytes = std::size_t{8} << 20;
   const auto journal_files = ForgetfulFiles::create(seed, sync.journal);
   const auto map_files = std::make_shared<ForgetfulMapFiles>(seed, sync.map);
+  options.space.reserve = std::size_t{1} << 20;
   options.journal_files = journal_files;
   options.map_files = map_files;
   options.folder_files = std::make_shared<ForgetfulFolders>(map_files);

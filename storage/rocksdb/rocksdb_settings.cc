@@ -11,6 +11,7 @@
 
 #include <algorithm>
 
+#include "storage/rocksdb/durable_manifest.h"
 #include "storage/rocksdb/gradual_deletion.h"
 #include "storage/rocksdb/retryable_files.h"
 
@@ -72,8 +73,8 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   const bool direct = wanted.direct_io && !wanted.map_files && has_direct_io(directory);
   o.use_direct_reads = direct;
   o.use_direct_io_for_flush_and_compaction = direct;
-  settings.env = rocksdb::NewCompositeEnv(
-      retryable_files(wanted.map_files ? wanted.map_files : gradual_deletion(rocksdb::FileSystem::Default())));
+  auto files = wanted.map_files ? wanted.map_files : gradual_deletion(rocksdb::FileSystem::Default());
+  settings.env = rocksdb::NewCompositeEnv(retryable_files(durable_manifest(std::move(files))));
   o.env = settings.env.get();
   o.max_bgerror_resume_count = 0;        // the engine's commits resume
   o.avoid_flush_during_shutdown = true;  // what was put beside the log is in the log too

@@ -266,6 +266,11 @@ Result<DiskRoom> ForgetfulFiles::room(const std::string&) const {
   return DiskRoom{kAmple, kAmple};
 }
 
-Status ForgetfulFiles::occupy(const std::string& path, std::uint64_t) { return open_append(path).status(); }
+Status ForgetfulFiles::occupy(const std::string& path, std::uint64_t bytes) {
+  if (Status opened = open_append(path).status(); !opened.ok()) return opened;
+  const std::lock_guard lock(mutex_);
+  names_[path]->bytes.resize(bytes);
+  return {};
+}
 
 }  // namespace relmap::storage

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -48,6 +49,7 @@ Process::Process(const std::vector<std::string>& arguments, const ProcessOptions
     redirect(STDERR_FILENO, options.standard_error);
     if (options.terminal >= 0)
       for (const int descriptor : {STDIN_FILENO, STDERR_FILENO}) ::dup2(options.terminal, descriptor);
+    for (const std::string& variable : options.environment) ::putenv(const_cast<char*>(variable.c_str()));
     ::execvp(argv[0], argv.data());
     ::_exit(kNoProgram);
   }
@@ -99,9 +101,12 @@ double Process::cpu_seconds() const {
   return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
-Finished run_program(const std::vector<std::string>& arguments, milliseconds patience) {
+Finished run_program(const std::vector<std::string>& arguments, milliseconds patience,
+                     const std::vector<std::string>& environment) {
   const storage::TemporaryFolder folder;
-  Process process(arguments, {folder / "out", folder / "err"});
+  ProcessOptions options{folder / "out", folder / "err"};
+  options.environment = environment;
+  Process process(arguments, options);
   const auto code = process.wait(patience);
   Finished finished{code.value_or(-1), read_text(folder / "out"), read_text(folder / "err")};
   if (!code) throw std::runtime_error(arguments.front() + " did not end in time: " + finished.standard_error);

@@ -22,6 +22,7 @@ struct ProcessOptions {
   std::optional<Multicast> own_network = {};
   // Descriptor of a terminal that becomes standard input and standard error; -1: standard input is that of the test.
   int terminal = -1;
+  std::vector<std::string> environment = {};  // NAME=value, beside that of the test
 };
 
 // The process is killed when the test ends, even if the test crashes.
@@ -54,7 +55,8 @@ struct Finished {
   std::string standard_output, standard_error;
 };
 // Runs a program to its end; throws if it takes longer than `patience`.
-Finished run_program(const std::vector<std::string>& arguments, std::chrono::milliseconds patience = kPatience);
+Finished run_program(const std::vector<std::string>& arguments, std::chrono::milliseconds patience = kPatience,
+                     const std::vector<std::string>& environment = {});
 
 std::string read_text(const std::string& path);
 

@@ -43,9 +43,10 @@ std::vector<std::string> daemon_arguments(const DaemonOptions& options) {
 }
 
 RunningDaemon::RunningDaemon(const DaemonOptions& options, milliseconds patience) : options_(options) {
-  process_ = std::make_unique<Process>(
-      daemon_arguments(options),
-      ProcessOptions{.standard_output = "", .standard_error = log_file(options), .own_network = options.own_network});
+  process_ = std::make_unique<Process>(daemon_arguments(options), ProcessOptions{.standard_output = "",
+                                                                                 .standard_error = log_file(options),
+                                                                                 .own_network = options.own_network,
+                                                                                 .environment = options.environment});
   const auto deadline = steady_clock::now() + patience;
   while (patience.count() > 0 && !serving()) {
     if (!process_->running()) throw std::runtime_error("relmapd ended: " + log());

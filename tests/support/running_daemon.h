@@ -23,6 +23,7 @@ struct DaemonOptions {
   std::string program = {};                   // relmapd of another build; empty: of this one
   std::optional<Multicast> own_network = {};  // see ProcessOptions
   std::string credentials = {};               // folder, to serve TLS and authenticate LCM with; empty: neither
+  std::vector<std::string> environment = {};  // see ProcessOptions
 };
 
 // Throws with the daemon's log if it does not serve within `patience`; 0: does not wait.
