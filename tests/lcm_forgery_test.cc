@@ -11,8 +11,8 @@
 #include <random>
 #include <string>
 #include <thread>
-#include <utility>
 #include <unordered_set>
+#include <utility>
 #include <variant>
 #include <vector>
 
