@@ -239,25 +239,18 @@ TEST_P(WrongQuestions, AreNotAnsweredWrongly) {
   sessions_.stop();  // throws if a camera is in doubt: none is
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Recordings, WrongQuestions,
-    ::testing::Values(Recording{"kitti_raw_0926_1405", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20},
-                      Recording{"kitti_odom_06_first51", "kitti", "image_0", "image_1", {"--every", "2"}},
-                      Recording{"kitti_odom_00_first201", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20},
-                      Recording{"karlsruhe_20100309_0019", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20},
-                      Recording{
-                          "boofcv_backyard", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20, true, 0.05},
-                      Recording{"euroc_v101_keyframes100",
-                                "euroc",
-                                "cam0",
-                                "cam1",
-                                {"--all-keyframes", "--every", "2"},
-                                5,
-                                15,
-                                4,
-                                false,
-                                0.1}),
-    name_of);
+const Recording kShort[] = {
+    {"kitti_odom_06_first51", "kitti", "image_0", "image_1", {"--every", "2"}},
+    {"euroc_v101_keyframes100", "euroc", "cam0", "cam1", {"--all-keyframes", "--every", "2"}, 5, 15, 4, false, 0.1},
+};
+const Recording kLong[] = {
+    {"kitti_raw_0926_1405", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20},
+    {"kitti_odom_00_first201", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20},
+    {"karlsruhe_20100309_0019", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20},
+    {"boofcv_backyard", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 20, true, 0.05},
+};
+INSTANTIATE_TEST_SUITE_P(Recordings, WrongQuestions, ::testing::ValuesIn(kShort), name_of);
+INSTANTIATE_TEST_SUITE_P(LongRecordings, WrongQuestions, ::testing::ValuesIn(kLong), name_of);
 
 }  // namespace
 }  // namespace relmap::testing
