@@ -20,7 +20,7 @@ Cell random_cell(std::mt19937& random) {
   const std::uint32_t nodes = random() % 20;
   cell.frames.begin.push_back(0);
   for (std::uint32_t n = 0; n < nodes; ++n) {
-    cell.frames.nodes.push_back({static_cast<std::uint32_t>(1 + random() % 3), 100 * n});
+    cell.frames.nodes.push_back({1 + n / 7, 100 * n});  // ascending
     for (std::size_t links = random() % 3; links > 0; --links) {
       Link link;
       link.to = {static_cast<std::uint32_t>(1 + random() % 9), static_cast<std::uint32_t>(random())};
