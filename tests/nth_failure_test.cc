@@ -249,13 +249,17 @@ class NthFailure : public ::testing::Test {
     return kWithout.counts[static_cast<std::size_t>(kind)];
   }
 
-  // `number` of the operations of this kind, evenly spread; 0: every one.
+  // `number` of the operations of this kind, evenly spread; 0: every one. The first and the last are among those that
+  // fail, but not among those that hang: nobody reads before the start or after the end.
   std::vector<Fault> faults(FaultKind kind, std::uint64_t number, int error, milliseconds hang = {}) {
     const std::uint64_t all = total(kind);
     if (number == 0 || number > all) number = all;
     std::vector<Fault> chosen;
     for (std::uint64_t i = 0; i < number; ++i)
-      chosen.push_back({kind, 1 + i * (all - 1) / std::max<std::uint64_t>(number - 1, 1), error, hang});
+      chosen.push_back({kind,
+                        1 + (hang.count() > 0 ? (2 * i + 1) * all / (2 * number)
+                                              : i * (all - 1) / std::max<std::uint64_t>(number - 1, 1)),
+                        error, hang});
     return chosen;
   }
   std::vector<Fault> hangs(std::uint64_t number, milliseconds hang) {
