@@ -52,12 +52,14 @@ Intake::~Intake() {
 
 // Whether the sender may send for the session. What has not begun is of the robot that first proved to send for it.
 Status Intake::check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const {
-  const bool proved = !entry.begun && entry.sender && !entry.sender->robot.empty();
-  const std::string& owner = entry.begun ? entry.intake.header().robot : proved ? entry.sender->robot : sender.robot;
+  const bool proved = !entry.intake.has_begun() && entry.sender && !entry.sender->robot.empty();
+  const std::string& owner = entry.intake.has_begun() ? entry.intake.header().robot
+                             : proved                 ? entry.sender->robot
+                                                      : sender.robot;
   if (!sender.robot.empty() && sender.robot != owner)
     return {Reason::NOT_ALLOWED,
             sender.robot + " may not send to session " + session.to_string() + ", which is another robot's"};
-  if (sender.anyone && (proved || (entry.begun && options_.proving.contains(owner))))
+  if (sender.anyone && (proved || (entry.intake.has_begun() && options_.proving.contains(owner))))
     return {Reason::NOT_ALLOWED,
             "nobody may send to session " + session.to_string() + " who does not prove to be robot " + owner};
   return {};
@@ -67,7 +69,8 @@ Status Intake::check_sender(const SessionUuid& session, const Entry& entry, cons
 Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, const Sender& sender) {
   auto it = sessions_.find(session);
   // What anyone has sent must not stand in the way of the robot itself.
-  if (it != sessions_.end() && !it->second.begun && it->second.sender && it->second.sender->anyone && !sender.anyone) {
+  if (it != sessions_.end() && !it->second.intake.has_begun() && it->second.sender && it->second.sender->anyone &&
+      !sender.anyone) {
     forget(session);
     it = sessions_.end();
   }
@@ -95,7 +98,6 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
                                      AcknowledgementSchedule(options_.times)})
              .first;
     it->second.schedule.news();  // tells the robot what the daemon has
-    it->second.begun = it->second.intake.has_begun();
     it->second.heard_first = now;
   }
   Entry& entry = it->second;
@@ -165,7 +167,7 @@ void Intake::forget_silent(SteadyTime now) {
 // Keeps a silent robot in the list of robots, where an operator looks for it. Sessions that have not begun are not
 // kept: they may be garbage.
 void Intake::remember(const SessionUuid& session, Entry& entry, SteadyTime now) {
-  if (!entry.begun || entry.intake.ended()) return;
+  if (!entry.intake.has_begun() || entry.intake.ended()) return;
   if (silent_.size() >= options_.max_sessions)
     silent_.erase(std::min_element(silent_.begin(), silent_.end(),
                                    [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; }));
@@ -196,7 +198,7 @@ Intake::Namesakes Intake::namesakes(SteadyTime now) const {
   for (const Live& item : sessions_) {
     const Entry& entry = item.second;
     if (entry.intake.header().robot == kUsualRobot) continue;
-    if (entry.begun && !entry.intake.ended() && now - entry.schedule.last_heard() <= kLive)
+    if (entry.intake.has_begun() && !entry.intake.ended() && now - entry.schedule.last_heard() <= kLive)
       by_name[entry.intake.header().robot].push_back(&item);
   }
   Namesakes found;
@@ -254,7 +256,7 @@ void Intake::take_part(const KeyframePart& part, SteadyTime now, const Sender& s
   entry->bytes.add(now, static_cast<double>(part.data.size()));
   if (!wanted(*entry, part.sequence, part.payload_crc) || !paced(*entry, part.sequence, now)) return;
   entry->intake.seen(part.sequence);
-  auto whole = reassembly_.add(part, entry->begun ? part.session : SessionUuid{});
+  auto whole = reassembly_.add(part, entry->intake.has_begun() ? part.session : SessionUuid{});
   if (!whole.ok()) return count_part(*entry, whole.reason());
   if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now, sender);
 } catch (const StatusError& error) {
@@ -294,7 +296,7 @@ void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t 
   const bool sound = entry.intake.take(sequence, std::move(payload), sender).ok();
   if (!sound) entry.schedule.news();
   advance(session, entry, now);
-  if (sound && entry.begun && !std::exchange(entry.announced, true))
+  if (sound && entry.intake.has_begun() && !std::exchange(entry.announced, true))
     note(RobotEvent::Kind::kHeard, session, entry, now);
 }
 
@@ -350,7 +352,7 @@ void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(r
 const Status& Intake::blocked(const Entry& entry) const { return entry.in_line ? no_room_ : entry.intake.blocked(); }
 
 void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
-  if (!entry.begun)
+  if (!entry.intake.has_begun())
     try_to_begin(session, entry, now);
   else if (entry.intake.has_next())
     join_line(session, entry);
@@ -407,7 +409,6 @@ void Intake::take_outcomes(SteadyTime now) {
       entry.begin_again = now + (number.reason() == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails);
       continue;
     }
-    entry.begun = true;
     ++begun_version_;
     if (!std::exchange(entry.announced, true)) note(RobotEvent::Kind::kHeard, session, entry, now);
     join_line(session, entry);
@@ -460,7 +461,7 @@ void Intake::replenish(Entry& entry, SteadyTime now) {
 bool Intake::may_begin(Entry& entry, const Sender& sender, SteadyTime now) {
   constexpr double kAnyones = 10;
   const bool limited = sender.anyone || !sender.robot.empty();
-  if (options_.max_new_sessions_per_min <= 0 || entry.begun || entry.may_begin || !limited) return true;
+  if (options_.max_new_sessions_per_min <= 0 || entry.intake.has_begun() || entry.may_begin || !limited) return true;
   const double most = options_.max_new_sessions_per_min * (sender.anyone ? kAnyones : 1);
   const auto [it, fresh] = allowances_.try_emplace(sender.robot, Allowance{most, now});
   Allowance& allowance = it->second;
@@ -485,7 +486,7 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   tell_of_namesakes(now);
   for (auto& [session, entry] : sessions_) {
     if (entry.intake.blocked().ok()) continue;
-    if (entry.begun)
+    if (entry.intake.has_begun())
       join_line(session, entry);
     else
       try_to_begin(session, entry, now);  // it cannot, for example since the map has as many as its memory allows
@@ -495,7 +496,7 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   for (auto& [session, entry] : sessions_) {
     tell_pace(session, entry, now);
     const SteadyTime said = entry.schedule.due(imperfect(session, entry));
-    if (said > now || (!entry.begun && said > entry.schedule.last_heard() + kStranger)) continue;
+    if (said > now || (!entry.intake.has_begun() && said > entry.schedule.last_heard() + kStranger)) continue;
     entry.schedule.sent(now);
     due.push_back(make_acknowledgement(session, entry));
   }
@@ -526,7 +527,7 @@ SteadyTime Intake::next_due(SteadyTime now) const {
   SteadyTime next = now + kIdle;
   for (const auto& [session, entry] : sessions_) {
     const SteadyTime said = entry.schedule.due(imperfect(session, entry));
-    if (entry.begun || said <= entry.schedule.last_heard() + kStranger) next = std::min(next, said);
+    if (entry.intake.has_begun() || said <= entry.schedule.last_heard() + kStranger) next = std::min(next, said);
     const Reason reason = blocked(entry).reason();
     if (reason != Reason::OK)
       next = std::min(next, now + (reason == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails));
@@ -537,7 +538,7 @@ SteadyTime Intake::next_due(SteadyTime now) const {
 // A session that has not begun is asked for missing parts only at the regular interval: it may be garbage, which must
 // not be answered with floods.
 bool Intake::imperfect(const SessionUuid& session, const Entry& entry) const {
-  return entry.begun && (entry.intake.has_missing() || reassembly_.has_incomplete(session));
+  return entry.intake.has_begun() && (entry.intake.has_missing() || reassembly_.has_incomplete(session));
 }
 
 // The keyframes that have come already, and as many more as there is room for, shared among the sessions. At least one
@@ -630,7 +631,7 @@ std::vector<RobotStats> Intake::robots(SteadyTime now) {
 std::set<SessionUuid> Intake::begun() const {
   std::set<SessionUuid> begun;
   for (const auto& [session, entry] : sessions_)
-    if (entry.begun) begun.insert(begun.end(), session);
+    if (entry.intake.has_begun()) begun.insert(begun.end(), session);
   return begun;
 }
 

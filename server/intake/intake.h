@@ -94,8 +94,7 @@ class Intake {
     SteadyTime heard_first{};
     SteadyTime begin_again{};  // when it may try to begin again, after it was refused that
     bool in_line = false;
-    bool may_begin = false;  // counted among the new sessions of its sender
-    bool begun = false;
+    bool may_begin = false;      // counted among the new sessions of its sender
     bool announced = false;      // kHeard has been logged
     bool namesake_told = false;  // kSameName has been logged
   };

@@ -19,6 +19,11 @@ std::size_t heap(const std::vector<T>& items) {
   return block(items.capacity() * sizeof(T));
 }
 
+std::size_t heap(const std::string& text) {
+  const bool inside = text.capacity() <= std::string().capacity();
+  return inside ? 0 : block(text.capacity() + 1);
+}
+
 // What a shared_ptr to such an object holds, with its counts.
 template <typename T>
 std::size_t shared(const T&) {
@@ -34,7 +39,7 @@ std::size_t memory_bytes(const FrameHot& frame) {
     bytes += heap(edge.bound_frames) + heap(edge.consistent_with) + heap(edge.history) + heap(edge.carried_by) +
              heap(edge.unseen) + heap_bytes(edge.unknown) + (edge.around ? shared(*edge.around) : 0);
   for (const Landmark& landmark : frame.landmarks) bytes += heap(landmark.claims) + heap(landmark.observers);
-  for (const std::string& label : frame.labels) bytes += label.capacity();
+  for (const std::string& label : frame.labels) bytes += heap(label);
   return bytes;
 }
 
@@ -50,9 +55,8 @@ void shrink_deleted(Session& session) {
 }
 
 std::size_t memory_bytes(const Session& session) {
-  const auto heap_of = [](const std::string& text) { return text.size() < 16 ? 0 : text.size() + 16; };
-  return sizeof(Session) + 32 + heap_of(session.header.robot) + heap_of(session.header.name) +
-         heap_of(session.display_name) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown);
+  return shared(session) + heap(session.header.robot) + heap(session.header.name) + heap(session.display_name) +
+         heap_bytes(session.header.unknown) + heap_bytes(session.unknown);
 }
 
 }  // namespace relmap::storage

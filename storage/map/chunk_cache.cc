@@ -92,9 +92,14 @@ void ChunkCache::update(const Written<Frame>& written, std::uint64_t number) {
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
       if (!records[slot].there()) records[slot] = old.record(slot);
   }
-  if (before != index_.end()) before->second->through = number - 1;
-  insert_locked({key, std::make_shared<const PackedPart<Frame>>(budget_, written.id, std::move(records)), number,
-                 kNewest, sizeof(Entry)});
+  supersede({key, std::make_shared<const PackedPart<Frame>>(budget_, written.id, std::move(records)), number, kNewest,
+             sizeof(Entry)});
+}
+
+void ChunkCache::supersede(Entry entry) {
+  if (const auto before = version_locked(entry.key, entry.from); before != index_.end())
+    before->second->through = entry.from - 1;
+  insert_locked(std::move(entry));
 }
 
 void ChunkCache::committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
@@ -103,8 +108,7 @@ void ChunkCache::committed(std::uint64_t number, std::span<const Written<FrameHo
   const MutexLock lock(mutex_);
   current_ = number;
   for (const auto& session : sessions)
-    if (const auto before = version_locked({std::nullopt, session->number, 0}, number); before != index_.end())
-      before->second->through = number - 1;
+    supersede({{std::nullopt, session->number, 0}, session, number, kNewest, sizeof(Entry) + memory_bytes(*session)});
   for (const auto& written : hot) update(written, number);
   for (const auto& written : warm) update(written, number);
   evict_locked();

@@ -95,6 +95,7 @@ class ChunkCache {
 
   template <typename Frame>
   void update(const Written<Frame>& written, std::uint64_t number) RELMAP_REQUIRES(mutex_);
+  void supersede(Entry entry) RELMAP_REQUIRES(mutex_);  // by what commit entry.from wrote
   std::shared_ptr<const void> find(const Key& key, std::uint64_t commit);
   void insert(Entry entry, std::uint64_t loaded_at);
   void insert_locked(Entry entry) RELMAP_REQUIRES(mutex_);

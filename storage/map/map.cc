@@ -71,7 +71,7 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
   impl->cache = std::make_shared<ChunkCache>(budget, snapshot.commit_number());
   impl->ledger = std::make_shared<ViewLedger>(budget);
   impl->budget = std::move(budget);
-  impl->published_sessions = std::make_shared<const SessionTable>(impl->sessions);
+  impl->publish_sessions();
   impl->show();
   return std::unique_ptr<Map>(new Map(std::move(impl)));
 } catch (const StatusError& error) {
@@ -104,8 +104,8 @@ std::optional<Session> Map::session(SessionNumber number) const {
 }
 
 std::shared_ptr<const Session> Map::Impl::session(SessionNumber number) const {
-  if (const auto at = place_of(sessions, number); at != sessions.end() && (*at)->number == number) return *at;
-  return cache->session(*snapshot, number);
+  auto edited = find_session(sessions, number);
+  return edited ? edited : cache->session(*snapshot, number);
 }
 
 void Map::visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const {
@@ -215,39 +215,26 @@ void Map::add_session(Session session) {
   impl_->sessions.insert(place_of(impl_->sessions, number), std::make_shared<Session>(std::move(session)));
   impl_->fresh_sessions.insert(number);
   impl_->dirty_sessions.insert(number);
-  impl_->edited_at[number] = ++impl_->session_edits;
 }
 
 Session& Map::edit_session(SessionNumber number) { return impl_->edit_session(number); }
 
 Session& Map::Impl::edit_session(SessionNumber number) {
-  const auto before = session(number);
-  if (!before) throw StatusError(no_such_session(number));
   auto at = sessions.begin() + (place_of(sessions, number) - sessions.begin());
-  if (fresh_sessions.insert(number).second) {
+  const bool edited = at != sessions.end() && (*at)->number == number;
+  if (!edited || !fresh_sessions.contains(number)) {
+    const auto before = edited ? *at : cache->session(*snapshot, number);
+    if (!before) throw StatusError(no_such_session(number));
+    auto copy = std::make_shared<Session>(*before);
+    if (edited)
+      *at = std::move(copy);
+    else
+      at = sessions.insert(at, std::move(copy));
     session_counts.remove(*before);
-    if (at == sessions.end() || (*at)->number != number) at = sessions.insert(at, nullptr);
-    *at = std::make_shared<Session>(*before);
+    fresh_sessions.insert(number);
+    dirty_sessions.insert(number);
   }
-  dirty_sessions.insert(number);
-  edited_at[number] = ++session_edits;
   return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
-}
-
-// Of the sessions that have been committed and not been edited since, keeps those that were edited last.
-void Map::Impl::forget_old_sessions() {
-  const auto clean = [this](const auto& session) { return !dirty_sessions.contains(session->number); };
-  std::vector<std::uint64_t> last_edits;
-  for (const auto& session : sessions)
-    if (clean(session)) last_edits.push_back(edited_at.at(session->number));
-  if (last_edits.size() <= kRecentSessions) return;
-  const auto oldest_kept = last_edits.end() - kRecentSessions;
-  std::nth_element(last_edits.begin(), oldest_kept, last_edits.end());
-  std::erase_if(sessions, [&](const auto& session) {
-    if (!clean(session) || edited_at.at(session->number) >= *oldest_kept) return false;
-    edited_at.erase(session->number);
-    return true;
-  });
 }
 
 void Map::skip(SessionNumber number, const Skipped& skipped) {
@@ -328,7 +315,7 @@ bool Map::commit_is_due() const {
   const bool writing =
       impl_->committing && impl_->committing->written.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
   if (writing) return impl_->dirty_bytes > allowance / 4 * 3;
-  return dirty_bytes() > allowance / 4 || impl_->dirty_sessions.size() > 4 * kRecentSessions;
+  return dirty_bytes() > allowance / 4 || impl_->dirty_sessions.size() > kEditedSessions;
 }
 std::size_t Map::dirty_bytes() const { return impl_->dirty_bytes - (impl_->committing ? impl_->committing->bytes : 0); }
 

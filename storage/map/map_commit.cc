@@ -133,8 +133,7 @@ std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* com
 // The session as the engine has it once the commit under way is through.
 std::shared_ptr<const Session> Map::Impl::last_committed(SessionNumber number) const {
   if (committing)
-    for (const auto& session : committing->sessions)
-      if (session->number == number) return session;
+    if (auto writing = find_session(committing->sessions, number)) return writing;
   return cache->session(*snapshot, number);
 }
 
@@ -374,7 +373,7 @@ void Map::Impl::complete(Commit& commit) {
       if (chunk.cold.frames[slot]) ledger->retire(chunk.cold.since[slot], version + 1, chunk.cold.bytes[slot]);
   budget->release(Share::kDirty, commit.bytes);
   dirty_bytes -= commit.bytes;
-  forget_old_sessions();
+  std::erase_if(sessions, [&](const auto& session) { return !dirty_sessions.contains(session->number); });
   for (const auto& [entry, present] : commit.labels)
     if (const auto at = labels.find(entry); at->second == present) labels.erase(at);
   for (const auto& [entry, item] : commit.skipped)
@@ -396,7 +395,7 @@ void Map::Impl::complete(Commit& commit) {
   published_dirty = std::move(table);
   published_labels = std::make_shared<const LabelChanges>(labels);
   published_skipped = std::make_shared<const SkippedTable>(skipped);
-  published_sessions = std::make_shared<const SessionTable>(sessions);
+  publish_sessions();
   show();
 }
 

@@ -7,7 +7,6 @@
 #include <optional>
 #include <set>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "proto/base/mutex.h"
@@ -37,8 +36,8 @@ class RecentChunks {
 // Bytes of a dirty chunk without frames: the worker's copy, and the published one.
 inline constexpr std::size_t kEmptyChunk = sizeof(WorkingChunk) + sizeof(DirtyChunk);
 
-// So many sessions stay in memory after they have been committed: those that robots are sending.
-inline constexpr std::size_t kRecentSessions = 1024;
+// A commit ought to begin when more sessions than this have been edited, so that their table stays short.
+inline constexpr std::size_t kEditedSessions = 4096;
 
 using WorkingChunks = std::map<ChunkId, WorkingChunk>;
 inline const WorkingChunk* find_chunk(const WorkingChunks& chunks, ChunkId id) {
@@ -58,15 +57,13 @@ struct Map::Impl {
   WorkingChunks dirty;           // since the last commit was begun
   std::vector<ChunkId> touched;  // since the last publish
   EditWatcher edit_watcher;
-  std::vector<ChunkId> hot_edits;  // what edit_watcher is told next
-  SessionTable sessions;
+  std::vector<ChunkId> hot_edits;          // what edit_watcher is told next
+  SessionTable sessions;                   // those that are dirty, or that a commit is writing
   std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
   std::set<SessionNumber> dirty_sessions;  // since the last commit was begun
   SessionCounts session_counts;            // of all that are not fresh, as they are; of those, without them
-  std::unordered_map<SessionNumber, std::uint64_t> edited_at;  // of each in `sessions`: number of its last edit
-  std::uint64_t session_edits = 0;
-  std::size_t session_bytes = 0;  // charged for `sessions`
-  LabelChanges labels;            // changes to the snapshot, including those that a commit is writing
+  std::size_t session_bytes = 0;           // charged for `sessions`
+  LabelChanges labels;                     // changes to the snapshot, including those that a commit is writing
   bool labels_touched = false;
   SkippedTable skipped;  // likewise
   bool skipped_touched = false;
@@ -135,8 +132,8 @@ struct Map::Impl {
   // As the worker sees it; null if there is none.
   std::shared_ptr<const Session> session(SessionNumber number) const;
   Session& edit_session(SessionNumber number);
-  void forget_old_sessions();
   void set_skipped(const SkippedTable::key_type& key, std::optional<Skipped> value);
+  void publish_sessions();
   std::shared_ptr<const MapView> publish();
   std::shared_ptr<const MapView> show();  // a new version of what is published
   void charge_rest();

@@ -93,8 +93,8 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
   }
   if (!fresh_sessions.empty()) {
     for (const SessionNumber number : fresh_sessions) session_counts.add(*find_session(sessions, number));
-    published_sessions = std::make_shared<const SessionTable>(sessions);
     fresh_sessions.clear();
+    publish_sessions();
   }
   if (labels_touched) {
     published_labels = std::make_shared<const LabelChanges>(labels);
@@ -143,6 +143,15 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   return view;
 }
 
+void Map::Impl::publish_sessions() {
+  published_sessions = std::make_shared<const SessionTable>(sessions);
+  std::size_t bytes = 0;
+  for (const auto& session : sessions) bytes += 2 * memory_bytes(*session);  // also as the worker edits it
+  budget->release(Share::kSessions, session_bytes);
+  budget->charge(Share::kSessions, bytes);
+  session_bytes = bytes;
+}
+
 void Map::Impl::charge_rest() {
   const auto charge = [this](Share share, std::size_t& charged, std::size_t bytes) {
     if (bytes == charged) return;
@@ -151,7 +160,6 @@ void Map::Impl::charge_rest() {
     charged = bytes;
   };
   charge(Share::kSessions, pending_bytes, state.pending.memory_bytes());
-  charge(Share::kSessions, session_bytes, 2 * sessions.size() * (sizeof(Session) + 128));
   charge(Share::kDirty, spare_bytes, spare_hot.bytes());
 }
 

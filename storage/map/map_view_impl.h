@@ -29,8 +29,8 @@ struct MapView::Impl {
   void check_alive() const;
   // Null if there is none.
   std::shared_ptr<const Session> session(SessionNumber number) const {
-    if (const auto at = place_of(*sessions, number); at != sessions->end() && (*at)->number == number) return *at;
-    return cache->session(*snapshot, number);
+    auto edited = find_session(*sessions, number);
+    return edited ? edited : cache->session(*snapshot, number);
   }
   // Releases what the view holds, once nobody reads it any more.
   void let_go() {

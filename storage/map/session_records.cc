@@ -28,9 +28,9 @@ SessionTable::const_iterator place_of(const SessionTable& table, SessionNumber n
                           [](const auto& entry, SessionNumber key) { return entry->number < key; });
 }
 
-const Session* find_session(const SessionTable& table, SessionNumber number) {
+std::shared_ptr<const Session> find_session(const SessionTable& table, SessionNumber number) {
   const auto it = place_of(table, number);
-  return it != table.end() && (*it)->number == number ? it->get() : nullptr;
+  return it != table.end() && (*it)->number == number ? *it : nullptr;
 }
 
 std::optional<Session> load_session(const EngineSnapshot& snapshot, SessionNumber number) {

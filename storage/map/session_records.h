@@ -1,5 +1,5 @@
-// The records of sessions as a view has them: those that have been edited lately in memory, all others in the snapshot
-// of the last commit.
+// The records of sessions as a view has them: those that have been edited since the last commit in memory, all others
+// in the snapshot of that commit.
 #pragma once
 
 #include <memory>
@@ -11,14 +11,13 @@
 
 namespace relmap::storage {
 
-// Sessions in memory, ascending by number: all that have been edited since the last commit, and of the others those
-// that were edited last. Immutable once it is published.
+// The sessions that have been edited since the last commit, ascending by number. Immutable once it is published.
 using SessionTable = std::vector<std::shared_ptr<const Session>>;
 
 // Where the session stands, or would stand.
 SessionTable::const_iterator place_of(const SessionTable& table, SessionNumber number);
 // Null if the table has no such session.
-const Session* find_session(const SessionTable& table, SessionNumber number);
+std::shared_ptr<const Session> find_session(const SessionTable& table, SessionNumber number);
 
 // The committed record of a session; nullopt if there is none. Throws StatusError (IO_ERROR, DATA_LOSS).
 std::optional<Session> load_session(const EngineSnapshot& snapshot, SessionNumber number);
