@@ -78,7 +78,7 @@ Result<std::unique_ptr<DiskSpool>> DiskSpool::open(const std::string& folder, Se
                                                    const std::string& recording) {
   if (Status made = spool_file::create_folder(folder); !made.ok()) return made;
   const std::string lock_path = folder + "/lock";
-  const int lock = ::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  const int lock = ::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, spool_file::kOwnerOnly);
   if (lock < 0) return io_error("open", lock_path);
   std::unique_ptr<DiskSpool> spool(new DiskSpool(folder, lock));
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0)
@@ -260,7 +260,7 @@ Status DiskSpool::open_segment() {
   if (file_ >= 0) ::close(file_);
   const std::uint32_t number = segments_.empty() ? 0 : segments_.rbegin()->first + 1;
   const std::string path = segment_path(number);
-  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
+  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, spool_file::kOwnerOnly);
   if (file_ < 0) return io_error("create", path);
   segments_.emplace(number, Segment{});
   ByteWriter header;

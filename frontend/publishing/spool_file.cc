@@ -88,8 +88,8 @@ Status create_folder(const std::string& folder) {
   std::vector<fs::path> missing;
   for (fs::path path = fs::absolute(folder); !fs::exists(path, error); path = path.parent_path())
     missing.push_back(path);
-  fs::create_directories(folder, error);
-  if (error) return {Reason::IO_ERROR, "create " + folder + ": " + error.message()};
+  for (auto path = missing.rbegin(); path != missing.rend(); ++path)
+    if (::mkdir(path->c_str(), S_IRWXU) != 0 && errno != EEXIST) return io_error("create", *path);
   for (const fs::path& path : missing)
     if (Status synced = sync_folder(path.parent_path()); !synced.ok()) return synced;
   return {};
@@ -99,7 +99,7 @@ Status replace(const std::string& folder, const std::string& name, ByteSpan byte
   const std::string path = folder + "/" + name;
   const std::string fresh = path + ".new";
   {
-    const File file(::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    const File file(::open(fresh.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kOwnerOnly));
     if (!file.ok()) return io_error("create", fresh);
     if (Status s = write_all(file.get(), bytes, fresh); !s.ok()) return s;
     if (::fsync(file.get()) != 0) return io_error("sync", fresh);

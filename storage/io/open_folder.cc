@@ -66,6 +66,21 @@ bool OpenFolder::private_to_us() const {
   return (own.st_uid == ::geteuid() || own.st_uid == 0) && (own.st_mode & (S_IWGRP | S_IWOTH)) == 0;
 }
 
+bool OpenFolder::is_safe_way(const std::string& path) {
+  const auto is_safe = [](const fs::path& folder) {
+    struct stat facts {};
+    return ::stat(folder.c_str(), &facts) == 0 && (facts.st_uid == ::geteuid() || facts.st_uid == 0) &&
+           ((facts.st_mode & (S_IWGRP | S_IWOTH)) == 0 || (facts.st_mode & S_ISVTX) != 0);
+  };
+  for (fs::path name = fs::absolute(path).parent_path();; name = name.parent_path()) {
+    for (fs::path folder = fs::canonical(name);; folder = folder.parent_path()) {
+      if (!is_safe(folder)) return false;
+      if (folder == folder.parent_path()) break;
+    }
+    if (name == name.parent_path()) return true;
+  }
+}
+
 bool OpenFolder::has(const std::string& name, const OpenFolder& other) const {
   struct stat found {
   }, wanted{};

@@ -31,6 +31,9 @@ class OpenFolder {
   bool empty() const;
   bool ours() const;           // it belongs to this user
   bool private_to_us() const;  // only this user, or root, can change what is in it
+  // Whether only this user, or root, can change where a path leads: nobody else owns a folder on the way to it, its
+  // links followed, or may put something into one. (Where a sticky bit is set, names of others cannot be taken away.)
+  static bool is_safe_way(const std::string& path);
   bool has(const std::string& name, const OpenFolder& other) const;  // `name` in this folder is `other`
   bool exists(const std::string& name) const;                        // a link that leads nowhere exists, too
 

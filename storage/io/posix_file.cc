@@ -103,7 +103,7 @@ class PosixFileSystem final : public FileSystem {
   explicit PosixFileSystem(bool sync) : sync_(sync) {}
 
   Status create_directory(const std::string& path) override {
-    if (::mkdir(path.c_str(), 0777) != 0 && errno != EEXIST) return failed("creation of folder", path);
+    if (::mkdir(path.c_str(), S_IRWXU) != 0 && errno != EEXIST) return failed("creation of folder", path);
     return {};
   }
 
@@ -121,7 +121,7 @@ class PosixFileSystem final : public FileSystem {
   }
 
   Result<std::unique_ptr<AppendFile>> open_append(const std::string& path) override {
-    const int fd = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0666);
+    const int fd = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
     if (fd < 0) return failed("opening of", path);
     return std::unique_ptr<AppendFile>(std::make_unique<PosixAppendFile>(fd, path, sync_));
   }
@@ -167,7 +167,7 @@ class PosixFileSystem final : public FileSystem {
   }
 
   Status occupy(const std::string& path, std::uint64_t bytes) override {
-    const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
+    const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR));
     if (!fd.ok()) return failed("opening of", path);
     const int error = ::posix_fallocate(fd.get(), 0, static_cast<off_t>(bytes));
     if (error == 0) return {};

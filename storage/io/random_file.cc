@@ -19,7 +19,7 @@ Status error(const std::string& what) {
 }  // namespace
 
 Result<std::unique_ptr<RandomFile>> RandomFile::open(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (fd < 0) return error("opening of " + path);
   return std::unique_ptr<RandomFile>(new RandomFile(fd, path));
 }

@@ -46,6 +46,10 @@ Status check_apart(const std::string& directory, const std::string& source) {
 Result<std::unique_ptr<OpenFolder>> parent_below(const fs::path& root, const fs::path& directory) {
   auto at = OpenFolder::open(root.string());
   if (!at.ok()) return at.status();
+  for (const fs::path& way : {root, fs::canonical(root)})
+    if (!OpenFolder::is_safe_way(way.string()))
+      return Status(Reason::NOT_ALLOWED,
+                    "others can change where " + root.string() + " leads to: no backup is made there");
   fs::path name = root;
   const fs::path below = directory.lexically_relative(root).parent_path();
   for (auto step = below.begin();; ++step) {

@@ -355,6 +355,17 @@ TEST(RocksDbEngine, ACheckpointIsMadeOnlyBelowItsRootsAndThroughNoLink) {
   fs::permissions(root, fs::perms::all);
   EXPECT_EQ(engine->checkpoint({root + "/a", {root}}, patient).reason(), Reason::NOT_ALLOWED) << "everyone's folder";
   fs::permissions(root, fs::perms::owner_all);
+  // Nor where others can put another folder in the root's place, or change a link on the way to it.
+  fs::create_directories(folder / "shared/backups");
+  fs::create_directory_symlink(root, folder / "shared/link");
+  fs::permissions(folder / "shared", fs::perms::all);
+  for (const std::string way : {"shared/backups", "shared/link"})
+    EXPECT_EQ(engine->checkpoint({folder / (way + "/a"), {folder / way}}, patient).reason(), Reason::NOT_ALLOWED)
+        << way;
+  fs::permissions(folder / "shared", fs::perms::all | fs::perms::sticky_bit);
+  EXPECT_TRUE(engine->checkpoint({folder / "shared/link/a", {folder / "shared/link"}}, patient).ok());
+  fs::remove_all(root + "/a");
+  fs::remove_all(folder / "shared");
   EXPECT_TRUE(names() == before);
 
   const Status made = engine->checkpoint({root + "/monday/morning", {folder / "nowhere", root}}, patient);
