@@ -20,6 +20,9 @@ namespace relmap::rpc {
 namespace {
 
 constexpr std::size_t kMaxPrinted = 64 * 1024;  // an imported graph has megabytes
+constexpr std::size_t kMaxLines = 1024;         // that wait to be written
+constexpr std::size_t kMaxCallers = 1024;       // whose failures are counted each by themselves
+constexpr std::chrono::minutes kCounted{1};
 
 std::string time_of_day(std::int64_t us) {
   const std::time_t seconds = us / 1'000'000;
@@ -29,6 +32,22 @@ std::string time_of_day(std::int64_t us) {
   const std::size_t size = std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
   std::snprintf(text + size, sizeof text - size, ".%03dZ", static_cast<int>(us / 1000 % 1000));
   return text;
+}
+
+std::string line_of(const AuditLog::Entry& entry) {
+  return Json()
+             .add("time", time_of_day(now_us()))
+             .add("who", entry.who)
+             .add("role", entry.who.empty() ? std::string() : entry.role)
+             .add("from", entry.from)
+             .add("method", entry.method)
+             .add("request", entry.request)
+             .add("request_id", entry.request_id)
+             .add("outcome", reason_name(entry.outcome.reason()))
+             .add("message", entry.outcome.message())
+             .add("seconds", 1e-6 * static_cast<double>(entry.took.count()))
+             .text() +
+         "\n";
 }
 
 bool write_all(int file, const std::string& text) {
@@ -45,13 +64,19 @@ bool write_all(int file, const std::string& text) {
 
 Result<std::unique_ptr<AuditLog>> AuditLog::open(const std::string& file, std::uint64_t file_bytes) {
   std::unique_ptr<AuditLog> log(new AuditLog(file, file_bytes));
-  const MutexLock lock(log->mutex_);
   if (Status opened = log->reopen(); !opened.ok()) return opened;
+  log->thread_ = std::thread([writer = log.get()] { writer->run(); });
   return log;
 }
 
 AuditLog::~AuditLog() {
-  const MutexLock lock(mutex_);
+  {
+    const MutexLock lock(mutex_);
+    sum_up(Clock::time_point::max());
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
@@ -74,20 +99,81 @@ void AuditLog::rotate() {
 }
 
 void AuditLog::write(const Entry& entry) {
-  const std::string line = Json()
-                               .add("time", time_of_day(now_us()))
-                               .add("who", entry.who)
-                               .add("role", entry.who.empty() ? std::string() : entry.role)
-                               .add("from", entry.from)
-                               .add("method", entry.method)
-                               .add("request", entry.request)
-                               .add("request_id", entry.request_id)
-                               .add("outcome", reason_name(entry.outcome.reason()))
-                               .add("message", entry.outcome.message())
-                               .add("seconds", 1e-6 * static_cast<double>(entry.took.count()))
-                               .text() +
-                           "\n";
   const MutexLock lock(mutex_);
+  sum_up(Clock::now() - kCounted);
+  if (lists(entry)) queue(line_of(entry));
+}
+
+void AuditLog::flush() {
+  MutexLock lock(mutex_);
+  changed_.wait(mutex_, [this]() RELMAP_REQUIRES(mutex_) { return lines_.empty() && !writing_; });
+}
+
+// Whether the call has a line of its own.
+bool AuditLog::lists(const Entry& entry) {
+  if (entry.outcome.ok()) return true;
+  std::string caller = entry.who.empty() ? entry.from.substr(0, entry.from.rfind(':')) : entry.who;
+  if (failures_.size() >= kMaxCallers && !failures_.contains(caller)) caller.clear();
+  Failures& failures = failures_.try_emplace(caller, Failures{Clock::now(), 0, 0, {}}).first->second;
+  if (++failures.listed <= kFailuresListed) return true;
+  ++failures.unlisted;
+  failures.last = entry;
+  return false;
+}
+
+// Lists the number of those that have no line, for callers whose minute began before `until`.
+void AuditLog::sum_up(Clock::time_point until) {
+  for (auto it = failures_.begin(); it != failures_.end();) {
+    if (it->second.since > until) {
+      ++it;
+      continue;
+    }
+    if (it->second.unlisted > 0) {
+      Entry entry = std::move(it->second.last);
+      entry.outcome = {entry.outcome.reason(), std::to_string(it->second.unlisted) +
+                                                   " calls within a minute failed and are not listed, this one last: " +
+                                                   entry.outcome.message()};
+      queue(line_of(entry));
+    }
+    it = failures_.erase(it);
+  }
+}
+
+void AuditLog::queue(std::string line) {
+  if (lines_.size() >= kMaxLines) {
+    ++lost_;
+    return;
+  }
+  lines_.push_back(std::move(line));
+  changed_.notify_all();
+}
+
+void AuditLog::run() {
+  for (MutexLock lock(mutex_);;) {
+    // Wakes now and then, so that what was not listed is told also where nobody calls any more.
+    changed_.wait_for(mutex_, kCounted, [this]() RELMAP_REQUIRES(mutex_) { return stopping_ || !lines_.empty(); });
+    sum_up(Clock::now() - kCounted);
+    if (lines_.empty()) {
+      if (stopping_) return;
+      continue;
+    }
+    std::string line = std::move(lines_.front());
+    lines_.pop_front();
+    if (const std::uint64_t lost = std::exchange(lost_, 0); lost > 0) {
+      Entry entry;
+      entry.outcome = {Reason::IO_ERROR, std::to_string(lost) + " lines are lost, since the disk took too long"};
+      line += line_of(entry);
+    }
+    writing_ = true;
+    lock.unlock();
+    put(line);
+    lock.lock();
+    writing_ = false;
+    changed_.notify_all();
+  }
+}
+
+void AuditLog::put(const std::string& line) {
   Status status;
   if (descriptor_ < 0 || written_ >= file_bytes_) {
     if (written_ >= file_bytes_) rotate();

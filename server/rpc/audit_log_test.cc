@@ -1,9 +1,12 @@
 #include "server/rpc/audit_log.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -42,6 +45,7 @@ TEST(AuditLog, HasOneObjectALineForItsOwnerOnly) {
   EXPECT_EQ(facts.st_mode & 0077, 0u);
   const auto log = AuditLog::open(file).or_throw();  // goes on behind what is there
   log->write({"anna", "operator", "", "Admin.Commit", "", "id-3", Status()});
+  log->flush();
   const auto lines = lines_of(file);
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0]["who"], "anna");
@@ -64,6 +68,7 @@ TEST(AuditLog, IsRotatedAndBounded) {
   const std::string file = folder / "audit.jsonl";
   const auto log = AuditLog::open(file, 1000).or_throw();
   for (int i = 0; i < 200; ++i) log->write({"anna", "operator", "", "Admin.Commit", std::to_string(i), "", Status()});
+  log->flush();
   EXPECT_TRUE(std::filesystem::exists(file + ".8"));
   EXPECT_FALSE(std::filesystem::exists(file + ".9"));
   std::vector<std::string> names{file};
@@ -75,6 +80,61 @@ TEST(AuditLog, IsRotatedAndBounded) {
     for (auto line = lines.rbegin(); line != lines.rend(); ++line)
       EXPECT_EQ((*line)["request"], std::to_string(--last)) << name;
   }
+}
+
+// A reader that is refused without end must not push out what operators did.
+TEST(AuditLog, OfManyFailuresOfACallerTheNumberIsWritten) {
+  const storage::TemporaryFolder folder;
+  const std::string file = folder / "audit.jsonl";
+  {
+    const auto log = AuditLog::open(file).or_throw();
+    const Status refused(Reason::NOT_ALLOWED, "Map.SetLabel is for the role operator");
+    for (int i = 0; i < 500; ++i) log->write({"dash", "reader", "ipv4:10.0.0.1:5", "Map.SetLabel", "", "", refused});
+    for (int i = 0; i < 100; ++i) log->write({"anna", "operator", "ipv4:10.0.0.2:5", "Map.SetLabel", "", "", Status()});
+  }
+  int refusals = 0, edits = 0, sums = 0;
+  for (const nlohmann::json& line : lines_of(file)) {
+    const std::string message = line["message"];
+    sums += message.starts_with("440 calls within a minute failed and are not listed, this one last: Map.SetLabel");
+    refusals += line["who"] == "dash";
+    edits += line["who"] == "anna";
+  }
+  EXPECT_EQ(refusals, AuditLog::kFailuresListed + 1);
+  EXPECT_EQ(sums, 1);
+  EXPECT_EQ(edits, 100);
+}
+
+// The file is a pipe that nobody reads, which is a disk that hangs.
+TEST(AuditLog, NoCallWaitsForTheDiskAndWhatIsLostIsCounted) {
+  const storage::TemporaryFolder folder;
+  const std::string file = folder / "audit.jsonl";
+  ASSERT_EQ(mkfifo(file.c_str(), 0600), 0);
+  const int reader = ::open(file.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  std::string text;
+  const auto read_all = [&] {
+    std::array<char, 65536> buffer{};
+    for (;;) {
+      const ssize_t size = ::read(reader, buffer.data(), buffer.size());
+      if (size == 0) return;
+      if (size > 0)
+        text.append(buffer.data(), static_cast<std::size_t>(size));
+      else
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  };
+  std::thread drain;
+  {
+    const auto log = AuditLog::open(file).or_throw();
+    const AuditLog::Entry entry{"anna", "operator", "", "Admin.Commit", std::string(1000, 'x'), "", Status()};
+    for (int i = 0; i < 3000; ++i) log->write(entry);  // the pipe takes some sixty
+    drain = std::thread(read_all);
+    log->flush();
+    log->write(entry);
+  }
+  drain.join();
+  ::close(reader);
+  EXPECT_THAT(text, ::testing::ContainsRegex("\"[0-9]+ lines are lost"));
 }
 
 TEST(AuditLog, LargeRequestsAreCutOff) {
