@@ -317,6 +317,7 @@ TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
     EXPECT_THAT(storage.message(), testing::HasSubstr(throws ? "beyond record 11" : "journal record 12"));
     EXPECT_EQ(mapper->submit_and_wait(storage::IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
     EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
+    EXPECT_EQ(mapper->wait_applied(12, soon()).reason(), Reason::READ_ONLY);
     const SessionNumber session = view->sessions().front().number;
     EXPECT_EQ(mapper->wait_deleted(session, soon()).reason(), Reason::READ_ONLY) << "no frame would go";
   }

@@ -10,14 +10,11 @@
 
 namespace relmap::map {
 
-Result<std::uint64_t> write_proposal(Mapper& mapper, const OperatorProposal& proposal,
-                                     std::chrono::steady_clock::time_point deadline) {
-  place::PictureCache pictures;
-  auto found = propose_closure(*mapper.view(), mapper.places(), pictures, proposal.a, proposal.b);
-  if (!found.ok()) return found.status();
-  const FrameId query = found->query, match = found->match;
-  if (!proposal.accept) found->edit = proposal.edit;
-  const auto written = mapper.submit_and_wait(std::move(found).value());
+Result<std::uint64_t> write_proposal(Mapper& mapper, storage::ClosureProposalRecord found,
+                                     const OperatorProposal& proposal, std::chrono::steady_clock::time_point deadline) {
+  const FrameId query = found.query, match = found.match;
+  if (!proposal.accept) found.edit = proposal.edit;
+  const auto written = mapper.submit_and_wait(std::move(found));
   if (!written.ok()) return written.status();
   if (Status applied = mapper.wait_applied(*written, deadline); !applied.ok()) return applied;
   const auto view = mapper.view();

@@ -14,18 +14,17 @@ namespace relmap::map {
 
 // What happens to a closure that an operator proposes.
 struct OperatorProposal {
-  FrameId a, b;
   bool accept = false;  // the closure is put into force at once
   std::string note;     // of the acceptance
   storage::EditKey edit = {};
 };
 
-// Journals the closure that propose_closure() finds between the two frames and, if it is to be put into force, that
-// edit once the closure is in the map. Returns the sequence of the last record, which is durable but perhaps not
-// applied yet. The reasons are those of propose_closure(), Mapper::submit_and_wait(), Mapper::wait_applied() and
-// check_edge_edit(), whose message then names the closure that was stored, or overtaken().
-Result<std::uint64_t> write_proposal(Mapper& mapper, const OperatorProposal& proposal,
-                                     std::chrono::steady_clock::time_point deadline);
+// Journals the closure that propose_closure() has found and, if it is to be put into force, that edit once the closure
+// is in the map. Returns the sequence of the last record, which is durable but perhaps not applied yet. The reasons are
+// those of Mapper::submit_and_wait(), Mapper::wait_applied() and check_edge_edit(), whose message then names the
+// closure that was stored, or overtaken().
+Result<std::uint64_t> write_proposal(Mapper& mapper, storage::ClosureProposalRecord found,
+                                     const OperatorProposal& proposal, std::chrono::steady_clock::time_point deadline);
 
 // The closure between these two frames, or frames beside them, that the record with this sequence proposed or put into
 // force; nullopt if that record stored none.

@@ -40,7 +40,7 @@ class AdminService final : public v1::Admin::CallbackService {
     return unary(context, "Admin.FreezeSession", request, reply, freeze_session, Lane::kEdits);
   }
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
-    return stream<v1::Progress>(context, "Admin.DeleteSession", request, delete_session);
+    return stream<v1::Progress>(context, "Admin.DeleteSession", request, delete_session, Lane::kEdits);
   }
 
  private:
@@ -52,10 +52,11 @@ class AdminService final : public v1::Admin::CallbackService {
   }
   template <typename Reply, typename Request, typename... Parts>
   Stream<Reply>* stream(Context* context, const char* method, const Request* request,
-                        Result<Producer<Reply>> (*handler)(const Request&, const Deadline&, Parts...)) {
-    return gateway_.stream<Reply>(
-        context, method, Lane::kMaintenance, request,
-        [this, handler](const Request& r, const Deadline& d) { return call(core_, handler, r, d); });
+                        Result<Producer<Reply>> (*handler)(const Request&, const Deadline&, Parts...),
+                        Lane lane = Lane::kMaintenance) {
+    return gateway_.stream<Reply>(context, method, lane, request, [this, handler](const Request& r, const Deadline& d) {
+      return call(core_, handler, r, d);
+    });
   }
 
   Core& core_;

@@ -5,6 +5,7 @@
 #include "server/map/operator_proposal.h"
 #include "server/map/propose.h"
 #include "server/rpc/charge.h"
+#include "server/rpc/core.h"
 #include "server/rpc/edit_log.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
@@ -18,11 +19,17 @@ void add_effect(EdgeId edited, const std::vector<map::EdgeChange>& changes, v1::
   for (const EdgeId other : map::also_changed(changes, edited)) *reply.add_also_changed() = to_wire(other);
 }
 
-Result<v1::ProposeEdgeReply> propose_dry(map::Mapper& mapper, const RpcLimits& limits, FrameId a, FrameId b,
-                                         const v1::ProposeEdgeRequest& request, const Deadline& deadline) {
-  const auto view = mapper.view();
+Result<storage::ClosureProposalRecord> find_closure(const storage::Graph& view, map::Mapper& mapper, PictureTurn& turn,
+                                                    FrameId a, FrameId b) {
+  const MutexLock lock(turn.mutex);
   place::PictureCache pictures;
-  const auto proposal = map::propose_closure(*view, mapper.places(), pictures, a, b);
+  return map::propose_closure(view, mapper.places(), pictures, a, b);
+}
+
+Result<v1::ProposeEdgeReply> propose_dry(map::Mapper& mapper, const RpcLimits& limits, PictureTurn& turn, FrameId a,
+                                         FrameId b, const v1::ProposeEdgeRequest& request, const Deadline& deadline) {
+  const auto view = mapper.view();
+  const auto proposal = find_closure(*view, mapper, turn, a, b);
   if (!proposal.ok()) return proposal.status();
   SearchWork work(mapper.budget(), limits.max_search_frames, deadline);
   map::DryRun run(*view, view->state(), work.limit().proceed);
@@ -88,17 +95,21 @@ Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& requ
 }
 
 Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request, const Deadline& deadline,
-                                          map::Mapper& mapper, EditLog& edits, const RpcLimits& limits) {
+                                          map::Mapper& mapper, EditLog& edits, const RpcLimits& limits,
+                                          PictureTurn& turn) {
   const auto a = existing_frame(*mapper.view(), request.has_a(), request.a(), "a");
   if (!a.ok()) return a.status();
   const auto b = existing_frame(*mapper.view(), request.has_b(), request.b(), "b");
   if (!b.ok()) return b.status();
   if (Status status = check_note(request.note()); !status.ok()) return status;
-  if (request.dry_run()) return propose_dry(mapper, limits, *a, *b, request, deadline);
+  if (request.dry_run()) return propose_dry(mapper, limits, turn, *a, *b, request, deadline);
 
-  const auto written =
-      edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&](const storage::EditKey& named) {
-        return map::write_proposal(mapper, {*a, *b, request.accept(), request.note(), named}, deadline.at);
+  const auto written = edits.once(
+      request.idempotency_key(), request.SerializeAsString(), deadline,
+      [&](const storage::EditKey& named) -> Result<std::uint64_t> {
+        auto found = find_closure(*mapper.view(), mapper, turn, *a, *b);
+        if (!found.ok()) return found.status();
+        return map::write_proposal(mapper, *std::move(found), {request.accept(), request.note(), named}, deadline.at);
       });
   if (!written.ok()) return written.status();
   if (Status applied = mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;

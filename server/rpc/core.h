@@ -88,6 +88,11 @@ struct ImportTurn {
   Mutex mutex;
 };
 
+// Locked while the pictures' reserve of memory is in use, and guards no data.
+struct PictureTurn {
+  Mutex mutex;
+};
+
 // Owns what the handlers work on. A handler does not see it: it declares the parts that it uses as its last parameters,
 // and call() passes them.
 struct Core {
@@ -100,7 +105,8 @@ struct Core {
         edits(m.remembered_edits()) {}
 
   auto parts() {
-    return std::tie(mapper, facts, limits, intake, process, routes, metrics, views, edits, imports, maintenance);
+    return std::tie(mapper, facts, limits, intake, process, routes, metrics, views, edits, imports, pictures,
+                    maintenance);
   }
 
   map::Mapper& mapper;
@@ -113,6 +119,7 @@ struct Core {
   ViewKeeper views;
   EditLog edits;
   ImportTurn imports;
+  PictureTurn pictures;
   MaintenanceTurn maintenance;
 };
 

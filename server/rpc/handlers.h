@@ -63,12 +63,12 @@ class CommitReply;
 
 namespace relmap::rpc {
 
-// Need the pictures' reserve of memory: one at a time (Lane::kPictures).
+// Need the pictures' reserve of memory: one at a time (Lane::kPictures, with PictureTurn held).
 Result<v1::LocaliseReply> localise(const v1::LocaliseRequest& request, const Deadline& deadline, map::Mapper& mapper);
 Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, const Deadline& deadline,
                                         map::Mapper& mapper);
 
-// Needs the pictures' reserve (Lane::kPictures) if an end is a view.
+// Needs the pictures' reserve too if an end is a view.
 Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& request, const Deadline& deadline,
                                                 map::Mapper& mapper, Routes& routes, const RpcLimits& limits);
 bool needs_picture(const v1::FindRouteRequest& request);
@@ -86,9 +86,10 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
                                       map::Mapper& mapper, ViewKeeper& views, const RpcLimits& limits);
 Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& request, const Deadline& deadline,
                                              map::Mapper& mapper, EditLog& edits, const RpcLimits& limits);
-// Needs the pictures' reserve (Lane::kPictures).
+// Takes the pictures' reserve for a moment, and waits for the disk without it.
 Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request, const Deadline& deadline,
-                                          map::Mapper& mapper, EditLog& edits, const RpcLimits& limits);
+                                          map::Mapper& mapper, EditLog& edits, const RpcLimits& limits,
+                                          PictureTurn& turn);
 Result<v1::SetLabelReply> set_label(const v1::SetLabelRequest& request, const Deadline& deadline, map::Mapper& mapper,
                                     EditLog& edits);
 Result<v1::ImportGraphReply> import_graph(const v1::ImportGraphRequest& request, const Deadline& deadline,

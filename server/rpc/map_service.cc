@@ -41,7 +41,7 @@ class MapService final : public v1::Map::CallbackService {
     return unary(context, "Map.SetEdgeState", request, reply, set_edge_state, Lane::kEdits);
   }
   Unary* ProposeEdge(Context* context, const v1::ProposeEdgeRequest* request, v1::ProposeEdgeReply* reply) override {
-    return unary(context, "Map.ProposeEdge", request, reply, propose_edge, Lane::kPictures);
+    return unary(context, "Map.ProposeEdge", request, reply, propose_edge, Lane::kEdits);
   }
   Unary* SetLabel(Context* context, const v1::SetLabelRequest* request, v1::SetLabelReply* reply) override {
     return unary(context, "Map.SetLabel", request, reply, set_label, Lane::kEdits);
@@ -69,16 +69,23 @@ class MapService final : public v1::Map::CallbackService {
   template <typename Request, typename Reply, typename... Parts>
   Unary* unary(Context* context, const char* method, const Request* request, Reply* reply,
                Result<Reply> (*handler)(const Request&, const Deadline&, Parts...), Lane lane = Lane::kGeneral) {
-    return gateway_.unary(context, method, lane, request, reply,
-                          [this, handler](const Request& r, const Deadline& d) { return call(core_, handler, r, d); });
+    return gateway_.unary(context, method, lane, request, reply, [=, this](const Request& r, const Deadline& d) {
+      return in_turn(lane, [&] { return call(core_, handler, r, d); });
+    });
   }
   template <typename Reply, typename Request, typename... Parts>
   Stream<Reply>* stream(Context* context, const char* method, const Request* request,
                         Result<Producer<Reply>> (*handler)(const Request&, const Deadline&, Parts...),
                         Lane lane = Lane::kGeneral) {
-    return gateway_.stream<Reply>(context, method, lane, request, [this, handler](const Request& r, const Deadline& d) {
-      return call(core_, handler, r, d);
+    return gateway_.stream<Reply>(context, method, lane, request, [=, this](const Request& r, const Deadline& d) {
+      return in_turn(lane, [&] { return call(core_, handler, r, d); });
     });
+  }
+  template <typename Handler>
+  auto in_turn(Lane lane, Handler handler) {
+    if (lane != Lane::kPictures) return handler();
+    const MutexLock lock(core_.pictures.mutex);
+    return handler();
   }
 
   // For an RPC that is defined but not served yet. It answers with its name, through the gateway like all others.
