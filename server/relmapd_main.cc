@@ -167,14 +167,18 @@ int fail(const Status& status) {
 }
 
 // At SIGHUP: what can change while the daemon runs is read again. Nothing of it can end the daemon.
-void reload(const CommandLine& line, relmap::ops::Daemon& daemon) {
+void reload(const CommandLine& line, relmap::ops::Daemon& daemon) try {
   Config fresh;
   if (const Status status = line.apply(fresh); status.ok())
     spdlog::set_level(spdlog::level::from_str(fresh.log_level));
   else
     spdlog::error("SIGHUP: the log level stays as it was: {}", status.to_string());
   daemon.reload();
-  spdlog::info("SIGHUP: certificates, access list and log level were read again; other settings need a restart");
+  spdlog::info(
+      "SIGHUP: access list and log level were read again, and the files of TLS are within ten seconds; other settings "
+      "need a restart");
+} catch (const std::exception& error) {
+  spdlog::error("SIGHUP: not everything was read again: {}", error.what());
 }
 
 // So few that connections cannot take the files that the map needs. They are counted over TCP and again at the socket.
@@ -191,7 +195,6 @@ void limit_connections(Config& config) {
 }
 
 int run(const CommandLine& line, Config config) {
-  relmap::ops::block_stop_signals();
   limit_connections(config);
   auto daemon = relmap::ops::Daemon::start(config);
   if (!daemon.ok()) return fail(daemon.status());
@@ -210,6 +213,7 @@ int run(const CommandLine& line, Config config) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  relmap::ops::block_stop_signals();  // first, so that a SIGHUP while the daemon starts does not end it
   relmap::ops::name_reason_of_sudden_end();
   umask(S_IRWXG | S_IRWXO);  // what the daemon writes is nobody else's
   // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.

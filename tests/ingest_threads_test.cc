@@ -36,7 +36,7 @@ class Wire {
     if constexpr (std::is_same_v<Message, KeyframePart>)
       server_->take_part(message);
     else
-      (void)server_->take_gap(message);
+      server_->take_gap(message, {});
   }
   std::atomic<double> loss = 0;
 

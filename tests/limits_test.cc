@@ -105,7 +105,21 @@ TEST_F(LimitsTest, RequestsThatNeverArriveAndIdleConnectionsKeepNobodyOut) {
   for (RawHttp2& one : halves) one.call(kStatus, std::string(20, 'x'), 10);
   const auto idle = connect(400, 65535);
   expect_answers(20);
-  EXPECT_TRUE(eventually([&] { return daemon_->log().find("connections are refused") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] { return daemon_->log().find("make room for others") != std::string::npos; }));
+  EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
+}
+
+// A connection is kept for a call that runs over it, and not for a request that is half sent.
+TEST_F(LimitsTest, ConnectionsOverWhichNobodyCallsAreClosed) {
+  serve("rpc: {quiet_s: 2, stalled_s: 600}\n");
+  drive();
+  auto halves = connect(5, 65535);
+  for (RawHttp2& one : halves) one.call(kStatus, std::string(20, 'x'), 10);
+  auto running = connect(1, 0);
+  running.front().call(kExport, kGraph);
+  for (RawHttp2& one : halves) EXPECT_TRUE(eventually([&] { return one.ended(); }));
+  EXPECT_FALSE(running.front().ended());
+  expect_answers(1);
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 

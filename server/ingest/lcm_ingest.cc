@@ -86,7 +86,7 @@ struct LcmIngest::Impl {
       sender.robot = opened->robot;
     }
     // From now on its uuid is known to everyone on the network.
-    (void)server.claim(session, sender);
+    server.claim(session, sender);
     LcmLink* const out = opened_link;
     if (out && !welcome.empty()) out->publish(kMapChannel, welcome);
   }
@@ -162,9 +162,9 @@ Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const LcmOptions& options, i
       {running->on(kKeyframeChannel, decode_lcm_part,
                    [&](KeyframePart part, Sender from) { server.take_part(std::move(part), std::move(from)); }),
        running->on(kGapChannel, decode_lcm_gap,
-                   [&](const Gap& gap, const Sender& from) { (void)server.take_gap(gap, from); }),
+                   [&](const Gap& gap, const Sender& from) { server.take_gap(gap, from); }),
        running->on(kEndChannel, decode_lcm_end,
-                   [&](const SessionEnd& end, const Sender& from) { (void)server.take_end(end, from); }),
+                   [&](const SessionEnd& end, const Sender& from) { server.take_end(end, from); }),
        {kHelloChannel, [running](ByteSpan datagram) { running->take_hello(datagram); }}},
       options.queue_bytes);
   if (!link.ok()) return link.status();

@@ -24,6 +24,7 @@ class MapperSink final : public intake::KeyframeSink {
   Status submit(storage::JournalRecord record, Done done) override {
     return mapper_.submit(std::move(record), std::move(done));
   }
+  std::shared_ptr<const void> hold_session(SessionNumber session) override { return mapper_.hold_session(session); }
   std::shared_ptr<const storage::Graph> view() const override { return mapper_.view(); }
   std::size_t free_bytes() const override;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -20,15 +21,18 @@ SteadyTime now() { return std::chrono::steady_clock::now(); }
 
 constexpr int kPartsAtOnce = 64;  // taken in under one lock
 constexpr std::size_t kMaxNews = 4096;
+constexpr std::size_t kMaxWaiting = 1024;  // messages for which the map is read first
+const Status kStopped{Reason::SHUTTING_DOWN, "the daemon takes nothing more in"};
 
 // Locks are taken in the order subscribers_mutex, mutex, and wake_mutex or queue_mutex last.
 struct IngestServer::Impl {
-  Impl(KeyframeSink& sink, storage::Budget& b, const BootId& boot_id, IngestServerOptions options)
-      : identity{boot_id, options.map},
+  Impl(KeyframeSink& map, storage::Budget& b, const BootId& boot_id, IngestServerOptions options)
+      : sink(map),
+        identity{boot_id, options.map},
         budget(b),
         queue_bytes(options.part_queue_bytes),
         queue(options.part_queue_bytes),
-        intake(sink, b, boot_id, std::move(options), [this] { wake(); }) {
+        intake(map, b, boot_id, std::move(options), [this] { wake(); }) {
     budget.charge(storage::Share::kReassembly, queue_bytes);
   }
   ~Impl() { budget.release(storage::Share::kReassembly, queue_bytes); }
@@ -90,21 +94,87 @@ struct IngestServer::Impl {
     }
   }
 
-  // `action` returns what the sender is to know.
-  template <typename Take>
-  Status take(Take&& action) {
+  // A message that waits until what the map knows of its session, or of its sequence, has been read.
+  struct Waiting {
+    SessionUuid session;
+    std::optional<std::uint32_t> sequence;
+    std::function<Status(Intake&)> action;  // returns what the sender is to know
+    Taken taken;
+
+    void done(const Status& status) const {
+      if (taken) taken(status);
+    }
+  };
+
+  // Takes the message in, unless the map has to be read first.
+  bool try_to_take(const Waiting& message, Status& status) {
     bool sooner = false;
-    Status status;
     {
       const MutexLock lock(mutex);
-      if (stopped) return {};
-      status = action(intake);
-      const SteadyTime next = intake.next_due(now());
-      sooner = next < planned;
-      planned = std::min(planned, next);
+      if (stopped) {
+        status = kStopped;
+        return true;
+      }
+      if (intake.question(message.session, message.sequence)) return false;
+      status = message.action(intake);
+      sooner = plan();
     }
     if (sooner) wake();
-    return status;
+    return true;
+  }
+
+  void take(Waiting message) {
+    Status status;
+    if (!try_to_take(message, status)) {
+      const MutexLock lock(waiting_mutex);
+      if (waiting_stopping) {
+        status = kStopped;
+      } else if (waiting.size() >= kMaxWaiting) {
+        status = {Reason::BUDGET_EXCEEDED, "too many messages wait until the map was read"};
+      } else {
+        waiting.push_back(std::move(message));
+        return waiting_condition.notify_one();
+      }
+    }
+    message.done(status);
+  }
+
+  // Whether the thread has to poll sooner than it plans to.
+  bool plan() RELMAP_REQUIRES(mutex) {
+    const SteadyTime next = intake.next_due(now());
+    const bool sooner = next < planned;
+    planned = std::min(planned, next);
+    return sooner;
+  }
+
+  // Reads the map for the messages that wait, and takes them in.
+  void read_map() {
+    for (;;) {
+      Waiting message;
+      {
+        MutexLock lock(waiting_mutex);
+        waiting_condition.wait(
+            waiting_mutex, [this]() RELMAP_REQUIRES(waiting_mutex) { return waiting_stopping || !waiting.empty(); });
+        if (waiting.empty()) return;
+        message = std::move(waiting.front());
+        waiting.pop_front();
+      }
+      Status status;
+      while (!try_to_take(message, status)) read_one(message);
+      message.done(status);
+    }
+  }
+
+  void read_one(const Waiting& message) {
+    std::optional<MapQuestion> question;
+    {
+      const MutexLock lock(mutex);
+      question = intake.question(message.session, message.sequence);
+    }
+    if (!question) return;
+    MapAnswer read = answer(sink, *question);
+    const MutexLock lock(mutex);
+    intake.know(*question, std::move(read));
   }
 
   void enqueue(KeyframePart part, Sender sender) {
@@ -139,11 +209,30 @@ struct IngestServer::Impl {
       }
       if (parts.empty()) return;
       std::optional<std::set<SessionUuid>> changed;
-      (void)take([&](Intake& i) RELMAP_REQUIRES(mutex) {
-        for (const PartQueue::Sent& sent : parts) i.take_part(sent.part, now(), sent.sender);
-        if (std::exchange(begun_version, i.begun_version()) != i.begun_version()) changed = i.begun();
-        return Status();
-      });
+      std::vector<PartQueue::Sent> later;
+      bool sooner = false;
+      {
+        const MutexLock lock(mutex);
+        for (PartQueue::Sent& sent : parts)
+          if (intake.question(sent.part.session, sent.part.sequence))
+            later.push_back(std::move(sent));
+          else
+            intake.take_part(sent.part, now(), sent.sender);
+        if (std::exchange(begun_version, intake.begun_version()) != intake.begun_version()) changed = intake.begun();
+        sooner = plan();
+      }
+      if (sooner) wake();
+      for (PartQueue::Sent& sent : later) {
+        const SessionUuid session = sent.part.session;
+        const std::uint32_t sequence = sent.part.sequence;
+        take({session,
+              sequence,
+              [sent = std::make_shared<const PartQueue::Sent>(std::move(sent))](Intake& i) {
+                i.take_part(sent->part, now(), sent->sender);
+                return Status();
+              },
+              {}});
+      }
       if (!changed) continue;
       const MutexLock lock(queue_mutex);
       begun = std::move(*changed);
@@ -151,6 +240,7 @@ struct IngestServer::Impl {
     }
   }
 
+  KeyframeSink& sink;
   const DaemonIdentity identity;
   storage::Budget& budget;
   const std::size_t queue_bytes;
@@ -174,13 +264,18 @@ struct IngestServer::Impl {
   ReasonCounts unsound RELMAP_GUARDED_BY(queue_mutex){};       // parts that check_part() refused
   bool queue_stopping RELMAP_GUARDED_BY(queue_mutex) = false;
 
+  Mutex waiting_mutex;
+  ConditionVariable waiting_condition;
+  std::deque<Waiting> waiting RELMAP_GUARDED_BY(waiting_mutex);
+  bool waiting_stopping RELMAP_GUARDED_BY(waiting_mutex) = false;
+
   mutable Mutex mutex;
   Intake intake RELMAP_GUARDED_BY(mutex);
   std::uint64_t begun_version RELMAP_GUARDED_BY(mutex) = 0;
   bool stopped RELMAP_GUARDED_BY(mutex) = false;
   SteadyTime planned RELMAP_GUARDED_BY(mutex) = SteadyTime::min();  // when the thread polls next without being woken
 
-  std::thread thread, parts_thread;
+  std::thread thread, parts_thread, map_thread;
 };
 
 class IngestServer::Entry : public IngestServer::Subscription {
@@ -200,28 +295,35 @@ IngestServer::IngestServer(KeyframeSink& sink, storage::Budget& budget, const Bo
     : impl_(std::make_shared<Impl>(sink, budget, boot, std::move(options))) {
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
   impl_->parts_thread = std::thread([impl = impl_.get()] { impl->serve_parts(); });
+  impl_->map_thread = std::thread([impl = impl_.get()] { impl->read_map(); });
 }
 
 IngestServer::~IngestServer() { stop(); }
 
 void IngestServer::take_part(KeyframePart part, Sender sender) { impl_->enqueue(std::move(part), std::move(sender)); }
 
-Status IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                                  const Sender& sender) {
-  return impl_->take(
-      [&](Intake& intake) { return intake.take_payload(session, sequence, crc, std::move(payload), now(), sender); });
+void IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
+                                const Sender& sender, Taken taken) {
+  auto bytes = std::make_shared<Bytes>(std::move(payload));
+  impl_->take(
+      {session, sequence,
+       [=](Intake& intake) { return intake.take_payload(session, sequence, crc, std::move(*bytes), now(), sender); },
+       std::move(taken)});
 }
 
-Status IngestServer::take_gap(const Gap& gap, const Sender& sender) {
-  return impl_->take([&](Intake& intake) { return intake.take_gap(gap, now(), sender); });
+void IngestServer::take_gap(const Gap& gap, const Sender& sender, Taken taken) {
+  impl_->take({gap.session, std::nullopt, [=](Intake& intake) { return intake.take_gap(gap, now(), sender); },
+               std::move(taken)});
 }
 
-Status IngestServer::take_end(const SessionEnd& end, const Sender& sender) {
-  return impl_->take([&](Intake& intake) { return intake.take_end(end, now(), sender); });
+void IngestServer::take_end(const SessionEnd& end, const Sender& sender, Taken taken) {
+  impl_->take({end.session, std::nullopt, [=](Intake& intake) { return intake.take_end(end, now(), sender); },
+               std::move(taken)});
 }
 
-Status IngestServer::claim(const SessionUuid& session, const Sender& sender) {
-  return impl_->take([&](Intake& intake) { return intake.claim(session, now(), sender); });
+void IngestServer::claim(const SessionUuid& session, const Sender& sender, Taken taken) {
+  impl_->take(
+      {session, std::nullopt, [=](Intake& intake) { return intake.claim(session, now(), sender); }, std::move(taken)});
 }
 
 void IngestServer::count_foreign(Reason reason) {
@@ -230,6 +332,7 @@ void IngestServer::count_foreign(Reason reason) {
 }
 
 Result<Acknowledgement> IngestServer::acknowledgement(const SessionUuid& session) {
+  impl_->read_one({session, std::nullopt, {}, {}});
   const MutexLock lock(impl_->mutex);
   return impl_->intake.acknowledgement(session);
 }
@@ -289,6 +392,12 @@ void IngestServer::stop() {
     impl_->queue_condition.notify_one();
   }
   if (impl_->parts_thread.joinable()) impl_->parts_thread.join();
+  {
+    const MutexLock lock(impl_->waiting_mutex);
+    impl_->waiting_stopping = true;
+    impl_->waiting_condition.notify_one();
+  }
+  if (impl_->map_thread.joinable()) impl_->map_thread.join();
   {
     const MutexLock lock(impl_->mutex);
     impl_->stopped = true;

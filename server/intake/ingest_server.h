@@ -18,7 +18,7 @@ struct IngestServerOptions : IntakeOptions {
 
 class IngestServer {
  public:
-  // Starts two threads. `sink` and `budget` must outlive the server.
+  // Starts three threads. `sink` and `budget` must outlive the server.
   IngestServer(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IngestServerOptions options = {});
   // Calls stop().
   ~IngestServer();
@@ -27,13 +27,17 @@ class IngestServer {
 
   // For transports without flow control: checks the part, queues it for its sender (part_queue.h) and returns at once.
   void take_part(KeyframePart part, Sender sender = {});
-  // As Intake's.
-  Status take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
-                      const Sender& sender = {});
-  Status take_gap(const Gap& gap, const Sender& sender = {});
-  Status take_end(const SessionEnd& end, const Sender& sender = {});
-  Status claim(const SessionUuid& session, const Sender& sender);
+  // As Intake's. `taken` is called once with what the sender is to know, within the call or, if something has to be
+  // read of the map first, from a thread of this object; then a later message may be taken in before. BUDGET_EXCEEDED
+  // if too many wait for that, SHUTTING_DOWN after stop().
+  using Taken = std::function<void(const Status&)>;
+  void take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload,
+                    const Sender& sender, Taken taken = {});
+  void take_gap(const Gap& gap, const Sender& sender, Taken taken = {});
+  void take_end(const SessionEnd& end, const Sender& sender, Taken taken = {});
+  void claim(const SessionUuid& session, const Sender& sender, Taken taken = {});
   void count_foreign(Reason reason);
+  // May wait for the disk.
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
   std::vector<RobotStats> robots() const;
@@ -59,7 +63,7 @@ class IngestServer {
   };
   std::unique_ptr<Subscription> subscribe(Listener listener);
 
-  // Takes in the parts that wait, sends the last acknowledgements and ends the threads. Later messages are ignored.
+  // Takes in what waits, sends the last acknowledgements and ends the threads. Later messages are ignored.
   void stop();
 
  private:

@@ -65,6 +65,49 @@ Status Intake::check_sender(const SessionUuid& session, const Entry& entry, cons
   return {};
 }
 
+std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::optional<std::uint32_t> sequence) const {
+  if (const auto entry = sessions_.find(session); entry != sessions_.end()) {
+    const SessionIntake& intake = entry->second.intake;
+    if (!sequence || intake.knows(*sequence)) return std::nullopt;
+    return MapQuestion{session, intake.number(), sequence};
+  }
+  const auto at = known_.find(session);
+  if (at == known_.end()) {
+    const auto number = sink_.find_session(session);
+    return number ? std::optional(MapQuestion{session, *number, std::nullopt}) : std::nullopt;
+  }
+  const auto& [failed, known, judged] = at->second;
+  if (!failed.ok() || !known.session || !sequence || *sequence >= known.session->next_sequence ||
+      judged.contains(*sequence))
+    return std::nullopt;
+  return MapQuestion{session, known.session->number, sequence};
+}
+
+// Of a sequence that cannot be read is known only that it is settled.
+void Intake::know(const MapQuestion& question, MapAnswer answer) {
+  const Judged judged = answer.failed.ok() ? answer.judged : Judged{0, answer.failed.reason(), true};
+  if (const auto entry = sessions_.find(question.uuid); entry != sessions_.end()) {
+    if (question.sequence) entry->second.intake.know(*question.sequence, judged);
+    return;
+  }
+  if (!known_.contains(question.uuid) && known_.size() >= options_.max_sessions) known_.erase(known_.begin());
+  Known& known = known_[question.uuid];
+  if (question.sequence) {
+    known.judged.emplace(*question.sequence, judged);
+  } else {
+    known.failed = answer.failed;
+    known.session = std::move(answer.session);
+  }
+}
+
+Intake::Known Intake::known(const SessionUuid& session) {
+  if (auto known = known_.extract(session)) return std::move(known.mapped());
+  const auto number = sink_.find_session(session);
+  if (!number) return {};
+  MapAnswer read = answer(sink_, {session, *number, std::nullopt});
+  return {read.failed, std::move(read.session), {}};
+}
+
 // The session's entry, which is made if it is not there. BUDGET_EXCEEDED: there are too many. NOT_ALLOWED.
 Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, const Sender& sender) {
   auto it = sessions_.find(session);
@@ -92,11 +135,14 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
         if (outcomes->wake) outcomes->wake();
       });
     };
+    const Known from = known(session);
+    if (!from.failed.ok()) return from.failed;
     it = sessions_
-             .emplace(session, Entry{SessionIntake(session, sink_, std::move(submit), std::move(begin), stats_,
-                                                   options_.robots, options_.proving),
+             .emplace(session, Entry{SessionIntake(session, sink_, from.session, std::move(submit), std::move(begin),
+                                                   stats_, options_.robots, options_.proving),
                                      AcknowledgementSchedule(options_.times)})
              .first;
+    for (const auto& [sequence, judged] : from.judged) it->second.intake.know(sequence, judged);
     it->second.schedule.news();  // tells the robot what the daemon has
     it->second.heard_first = now;
   }
@@ -459,11 +505,11 @@ void Intake::replenish(Entry& entry, SteadyTime now) {
 // Whether the session, if it has not begun, may do so. Sessions stay for good, so whoever begins them without end fills
 // the map. Operators may.
 bool Intake::may_begin(Entry& entry, const Sender& sender, SteadyTime now) {
-  constexpr double kAnyones = 10;
-  const bool limited = sender.anyone || !sender.robot.empty();
+  constexpr double kUnproved = 10;
+  const bool limited = sender.anyone || !sender.robot.empty() || !sender.from.empty();
   if (options_.max_new_sessions_per_min <= 0 || entry.intake.has_begun() || entry.may_begin || !limited) return true;
-  const double most = options_.max_new_sessions_per_min * (sender.anyone ? kAnyones : 1);
-  const auto [it, fresh] = allowances_.try_emplace(sender.robot, Allowance{most, now});
+  const double most = options_.max_new_sessions_per_min * (sender.robot.empty() ? kUnproved : 1);
+  const auto [it, fresh] = allowances_.try_emplace({sender.robot, sender.from}, Allowance{most, now});
   Allowance& allowance = it->second;
   const double minutes = std::chrono::duration<double, std::ratio<60>>(now - allowance.at).count();
   allowance = {std::min(most, allowance.left + minutes * most), now};
@@ -567,7 +613,11 @@ Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const E
 
 Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try {
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
-  if (const auto number = sink_.find_session(session); !number || !sink_.view()->session(*number))
+  if (!known_.contains(session))
+    if (const auto number = sink_.find_session(session))
+      know({session, *number, std::nullopt}, answer(sink_, {session, *number, std::nullopt}));
+  if (const auto at = known_.find(session);
+      at == known_.end() || (at->second.failed.ok() && !at->second.session.session))
     return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
   const auto entry = open(session, SteadyTime{}, {});
   return entry.ok() ? make_acknowledgement(session, **entry) : Result<Acknowledgement>(entry.status());

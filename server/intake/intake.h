@@ -14,6 +14,7 @@
 #include "proto/base/mutex.h"
 #include "server/intake/acknowledgement.h"
 #include "server/intake/ingest_stats.h"
+#include "server/intake/known_session.h"
 #include "server/intake/rate_meter.h"
 #include "server/intake/session_intake.h"
 
@@ -31,7 +32,8 @@ struct IntakeOptions {
   // catch up by kIntakeWindow keyframes or two seconds' worth, whichever is more.
   double max_keyframes_per_s = 0;
   // Mean number of sessions that one robot may begin, per minute, if it is proved who it is; so many may be begun at
-  // once. All who prove nothing may begin ten times as many together. 0: no limit.
+  // once. Who proves nothing may begin ten times as many together with all others of the same address, or of unknown
+  // addresses. 0: no limit.
   double max_new_sessions_per_min = 0;
   std::set<std::string> robots;   // names of the robots whose keyframes are taken; empty: all
   std::set<std::string> proving;  // for these nobody may send who proves nothing (Sender::anyone)
@@ -43,6 +45,12 @@ class Intake {
   Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IntakeOptions options,
          std::function<void()> wake);
   ~Intake();
+
+  // What must be read of the map before a message of this session, or of a keyframe with this sequence, can be taken in
+  // without waiting for the disk; nullopt: nothing. The answer is passed to know(). What was not asked for is read when
+  // it is needed.
+  std::optional<MapQuestion> question(const SessionUuid& session, std::optional<std::uint32_t> sequence) const;
+  void know(const MapQuestion& question, MapAnswer answer);
 
   // Errors are counted by reason, and the next acknowledgement tells the robot what to do. NOT_ALLOWED, and nothing is
   // done, if the sender may not send for the session: it is another robot's, or its robot must be proved.
@@ -98,6 +106,12 @@ class Intake {
     bool announced = false;      // kHeard has been logged
     bool namesake_told = false;  // kSameName has been logged
   };
+  // What was asked of a session that is not taken in yet.
+  struct Known {
+    Status failed;
+    KnownSession session;
+    std::map<std::uint32_t, Judged> judged;
+  };
   // A robot that fell silent without an end, as it was last heard.
   struct Silent {
     RobotStats stats;
@@ -122,6 +136,7 @@ class Intake {
     std::function<void()> wake RELMAP_GUARDED_BY(mutex);
   };
 
+  Known known(const SessionUuid& session);
   Result<Entry*> open(const SessionUuid& session, SteadyTime now, const Sender& sender);
   Status check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const;
   void forget(const SessionUuid& session);
@@ -165,9 +180,10 @@ class Intake {
   IngestStats stats_;
   Reassembly reassembly_;
   std::map<SessionUuid, Entry> sessions_;
+  std::map<SessionUuid, Known> known_;    // disjoint from sessions_, until they are taken in
   std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};
-  std::map<std::string, Allowance> allowances_;  // by robot; "": of all who prove nothing
+  std::map<std::pair<std::string, std::string>, Allowance> allowances_;  // by robot, or address; "": not known
   // Sessions that have something to submit, each once, in the order in which they are served, one record at a time. It
   // is empty but while the sink has no room: then a session that sends more than others waits longer than they do.
   std::deque<SessionUuid> line_;

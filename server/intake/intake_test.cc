@@ -1066,8 +1066,12 @@ TEST_F(IntakeTest, NewSessionsAreLimitedByRobot) {
   EXPECT_EQ(begun(), 8u) << "two in 24 s";
   for (int i = 0; i < 100; ++i) begin({{}, true}, "robot " + std::to_string(i));
   EXPECT_EQ(begun(), 58u) << "who proves nothing is one of many";
+  for (int i = 0; i < 100; ++i) begin({{}, false, "ipv4:10.0.0.1"}, "robot " + std::to_string(i));
+  EXPECT_EQ(begun(), 108u) << "nor is one address without proof";
+  begin({{}, false, "ipv4:10.0.0.2"}, "cart");
+  EXPECT_EQ(begun(), 109u) << "another address is another's";
   for (int i = 0; i < 100; ++i) begin({}, "robot " + std::to_string(i));
-  EXPECT_EQ(begun(), 158u) << "operators know what they do";
+  EXPECT_EQ(begun(), 209u) << "operators know what they do";
 }
 
 TEST_F(IntakeTest, TimesFarAheadOfTheServerAreRefusedByName) {

@@ -31,6 +31,9 @@ class KeyframeSink {
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   virtual Status submit(storage::JournalRecord record, Done done) = 0;
 
+  // Once the session's record was read or changed, view()->session() finds it in memory as long as the result lives.
+  virtual std::shared_ptr<const void> hold_session(SessionNumber session) = 0;
+
   // The map. It may lag behind the durable records, except before the first submit().
   virtual std::shared_ptr<const storage::Graph> view() const = 0;
 

@@ -15,7 +15,6 @@ namespace {
 constexpr std::size_t kKeepJudged = 4 * kIntakeWindow;
 constexpr std::size_t kMaxBeforeBegin = 1024;
 constexpr std::size_t kMaxConflicts = 16;
-constexpr std::uint32_t kNewest = 4096;  // refusals among so many last sequences are repeated to a robot that returns
 
 // Checks the keyframe alone. Its place in the session is judged when its turn comes.
 Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Result<Keyframe>& keyframe) {
@@ -39,8 +38,8 @@ Status check_clock(std::int64_t time_us) {
 
 }  // namespace
 
-SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, Begin begin,
-                             IngestStats& stats, const std::set<std::string>& robots,
+SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, const KnownSession& known, Submit submit,
+                             Begin begin, IngestStats& stats, const std::set<std::string>& robots,
                              const std::set<std::string>& proving)
     : uuid_(uuid),
       sink_(sink),
@@ -49,20 +48,16 @@ SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit
       stats_(stats),
       robots_(robots),
       proving_(proving) {
-  const auto number = sink_.find_session(uuid);
-  const auto view = sink_.view();
-  const auto session = number ? view->session(*number) : std::nullopt;
+  const auto& session = known.session;
   if (!session) return;
+  record_ = known.held;
   number_ = session->number;
   header_ = session->header;
   ended_ = session->state == storage::SessionState::kEnded;
   durable_ = turn_ = seen_ = session->next_sequence;
   if (session->frames > 0) durable_time_us_ = turn_time_us_ = session->last_time_us;
-  const std::uint32_t newest = session->next_sequence - std::min(session->next_sequence, kNewest);
-  view->visit_skipped(session->number, newest, [&](const storage::Skipped& settled) {
+  for (const storage::Skipped& settled : known.skipped)
     if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
-    return true;
-  });
 }
 
 // What the map knows of the session; where it cannot be read, as it was read last.
@@ -74,30 +69,27 @@ std::optional<storage::Session> SessionIntake::session() const try {
   return last_read_;
 }
 
-std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequence) {
+void SessionIntake::know(std::uint32_t sequence, const Judged& judged) {
+  prune_judged();
+  judged_.emplace(sequence, judged);
+}
+
+Judged SessionIntake::judged(std::uint32_t sequence) {
   if (const auto it = judged_.find(sequence); it != judged_.end()) return it->second;
-  if (!number_) return std::nullopt;
-  const auto view = sink_.view();
-  std::optional<Judged> found;
-  if (const auto hot = view->hot({*number_, sequence}); hot && hot->present) {
-    found = Judged{hot->payload_crc, Reason::OK, false};
-  } else {
-    view->visit_skipped(*number_, sequence, [&](const storage::Skipped& settled) {
-      if (settled.from <= sequence) found = Judged{settled.crc, settled.reason, !settled.refused};
-      return false;
-    });
-  }
-  if (found) judged_.emplace(sequence, *found);
-  return found;
+  if (!number_) return {0, Reason::OK, true};
+  const MapAnswer found = answer(sink_, {uuid_, *number_, sequence});
+  throw_if(found.failed);
+  know(sequence, found.judged);
+  return found.judged;
 }
 
 SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint32_t crc) {
   if (sequence < turn_) {
-    const auto known = judged(sequence);
-    if (known && !known->gap && known->crc == crc) return Verdict::kRepeat;
+    const Judged known = judged(sequence);
+    if (!known.gap && known.crc == crc) return Verdict::kRepeat;
     // Other keyframes of a deleted session are no conflict between two robots: the recording is being taken in again.
     if (judge_session().reason() == Reason::SESSION_DELETED) return Verdict::kDeleted;
-    return !known || known->gap ? Verdict::kSettled : Verdict::kConflict;
+    return known.gap ? Verdict::kSettled : Verdict::kConflict;
   }
   if (const auto it = held_.find(sequence); it != held_.end())
     return it->second.crc == crc ? Verdict::kRepeat : Verdict::kConflict;
@@ -261,6 +253,7 @@ void SessionIntake::begun(const Result<SessionNumber>& number) {
   if (!number.ok()) return;
   number_ = *number;
   header_ = header;
+  record_ = sink_.hold_session(*number);
 }
 
 bool SessionIntake::journal_before_begin() {

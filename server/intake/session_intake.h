@@ -16,6 +16,7 @@
 #include "proto/keyframe/ingest_messages.h"
 #include "server/intake/ingest_stats.h"
 #include "server/intake/keyframe_sink.h"
+#include "server/intake/known_session.h"
 #include "server/intake/reassembly.h"
 
 namespace relmap::intake {
@@ -25,8 +26,9 @@ inline constexpr std::uint32_t kMaxSequence = 0xfffffffe;  // so that its succes
 
 // Who has sent a message, as far as that is proved.
 struct Sender {
-  std::string robot;    // proved to be this one; empty: an operator, who may send for any robot, or anyone
-  bool anyone = false;  // nothing is proved
+  std::string robot;      // proved to be this one; empty: an operator, who may send for any robot, or anyone
+  bool anyone = false;    // nothing is proved, and robots that must prove themselves are out of reach
+  std::string from = {};  // the address of one who proves nothing and may do everything; empty: another, or not known
 };
 
 class SessionIntake {
@@ -39,12 +41,15 @@ class SessionIntake {
 
   // Resumes from what the map knows of the session. `robots` names the robots whose keyframes are taken; empty: all.
   // `proving` names those whose keyframes nobody may send who proves nothing.
-  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, Begin begin, IngestStats& stats,
-                const std::set<std::string>& robots, const std::set<std::string>& proving);
+  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, const KnownSession& known, Submit submit, Begin begin,
+                IngestStats& stats, const std::set<std::string>& robots, const std::set<std::string>& proving);
 
-  // What a keyframe with this sequence and checksum would be now.
+  // What a keyframe with this sequence and checksum would be now. Reads the map unless it knows what became of the
+  // sequence.
   enum class Verdict { kTake, kRepeat, kConflict, kSettled, kDeleted, kTooFar };
   Verdict classify(std::uint32_t sequence, std::uint32_t crc);
+  bool knows(std::uint32_t sequence) const { return sequence >= turn_ || !number_ || judged_.contains(sequence); }
+  void know(std::uint32_t sequence, const Judged& judged);
 
   // Takes a complete payload for which classify() returned kTake. Not OK: the reason for which the sequence will be
   // refused when its turn comes, NOT_ALLOWED if the sender may not send the keyframes of its robot.
@@ -116,12 +121,6 @@ class SessionIntake {
   };
   // Settled while the session had no number.
   using BeforeBegin = std::variant<storage::GapRecord, storage::RefusalRecord>;
-  // The verdict on a sequence.
-  struct Judged {
-    std::uint32_t crc = 0;
-    Reason reason = Reason::OK;  // not OK: refused, or given up
-    bool gap = false;
-  };
   struct Submitted {
     std::uint64_t ticket = 0;
     std::uint64_t end = 0;  // 1 + its last sequence; 0: settled before the session began, or the session's end
@@ -137,7 +136,7 @@ class SessionIntake {
   };
 
   bool submit_in_turn();
-  std::optional<Judged> judged(std::uint32_t sequence);
+  Judged judged(std::uint32_t sequence);
   Status judge_in_turn(const Held& held) const;
   Status judge_session() const;
   std::optional<storage::Session> session() const;
@@ -159,6 +158,7 @@ class SessionIntake {
   const std::set<std::string>& proving_;
 
   std::optional<SessionNumber> number_;     // nullopt: nothing is durable yet
+  std::shared_ptr<const void> record_;      // keeps the session's record in memory
   std::optional<SessionHeader> beginning_;  // what begin_() was called with, until begun()
   SessionHeader header_;
   mutable std::optional<storage::Session> last_read_;  // of session()

@@ -548,6 +548,10 @@ void Mapper::begin_session(const SessionHeader& header, Begun begun) {
 }
 std::optional<SessionNumber> Mapper::find_session(const SessionUuid& uuid) const { return impl_->sessions.find(uuid); }
 
+std::shared_ptr<const void> Mapper::hold_session(SessionNumber session) const {
+  return impl_->map->hold_session(session);
+}
+
 Status Mapper::submit(storage::JournalRecord record, Done done) {
   return impl_->submit(std::move(record), std::move(done));
 }
@@ -559,11 +563,12 @@ Result<std::uint64_t> Mapper::submit_and_wait(storage::JournalRecord record) {
 const std::map<std::uint64_t, storage::EditKey>& Mapper::remembered_edits() const { return impl_->remembered_edits; }
 
 Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) const {
+  const auto durable = [&] { return "journal record " + std::to_string(sequence) + " is durable but not applied"; };
   MutexLock lock(impl_->mutex);
-  if (impl_->changed.wait_until(impl_->mutex, deadline,
-                                [&]() RELMAP_REQUIRES(impl_->mutex) { return impl_->applied >= sequence; }))
-    return {};
-  return {Reason::DEADLINE, "journal record " + std::to_string(sequence) + " is durable but not applied yet"};
+  const auto ended = [&]() RELMAP_REQUIRES(impl_->mutex) { return impl_->applied >= sequence || impl_->failed; };
+  if (!impl_->changed.wait_until(impl_->mutex, deadline, ended)) return {Reason::DEADLINE, durable() + " yet"};
+  if (impl_->applied >= sequence) return {};
+  return {impl_->storage.reason(), durable() + ": " + impl_->storage.message()};
 }
 
 std::optional<std::vector<EdgeChange>> Mapper::edge_changes(std::uint64_t sequence) const {

@@ -81,6 +81,8 @@ class Mapper {
   void begin_session(const SessionHeader& header, Begun begun);
   // The number of the session with this uuid; nullopt if it has not begun. view() may not show it yet.
   std::optional<SessionNumber> find_session(const SessionUuid& uuid) const;
+  // As storage::Map::hold_session().
+  std::shared_ptr<const void> hold_session(SessionNumber session) const;
 
   // Queues the record for the journal. If the result is OK, `done` is called once, from the journal thread, with the
   // record's sequence when it is durable, or with the reason why it is not. Otherwise `done` is not called:
@@ -89,7 +91,8 @@ class Mapper {
   Status submit(storage::JournalRecord record, Done done);
   Result<std::uint64_t> submit_and_wait(storage::JournalRecord record);
 
-  // Waits until the record is applied and visible in view(). DEADLINE if it is not by then.
+  // Waits until the record is applied and visible in view(). DEADLINE if it is not by then; READ_ONLY if it will not
+  // be, since the map has failed.
   Status wait_applied(std::uint64_t sequence, std::chrono::steady_clock::time_point deadline) const;
   // The changes of edges by a record, known for the last kRemembered closure proposals and edits; otherwise nullopt.
   static constexpr std::size_t kRemembered = 256;

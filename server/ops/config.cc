@@ -137,6 +137,7 @@ const std::map<std::string, Setter>& settings() {
       {"tls.key", text([](Config& c) -> std::string& { return c.tls.key; })},
       {"tls.client_authority", text([](Config& c) -> std::string& { return c.tls.client_authority; })},
       {"rpc.max_connections", number([](Config& c) -> std::size_t& { return c.connections.total; }, 1, 100000)},
+      {"rpc.quiet_s", number([](Config& c) -> double& { return c.connections.quiet_s; }, 1, 1e6)},
       {"rpc.max_connections_per_peer",
        number([](Config& c) -> std::size_t& { return c.connections.per_peer; }, 1, 100000)},
       {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},

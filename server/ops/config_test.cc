@@ -127,7 +127,7 @@ TEST(Config, ListeningOverTcpNeedsTlsOrInsecure) {
 TEST(Config, AFolderOfCredentialsNamesWhatNothingElseNames) {
   Config config;
   ASSERT_TRUE(parse_config("credentials: /etc/relmap/credentials\ntls: { key: /elsewhere/key.pem }\n"
-                           "rpc: { max_connections: 20, max_connections_per_peer: 10 }\n",
+                           "rpc: { max_connections: 20, max_connections_per_peer: 10, quiet_s: 90.5 }\n",
                            "relmapd.yaml", config)
                   .ok());
   complete_config(config);
@@ -137,6 +137,7 @@ TEST(Config, AFolderOfCredentialsNamesWhatNothingElseNames) {
   EXPECT_EQ(config.access, "/etc/relmap/credentials/access");
   EXPECT_EQ(config.connections.total, 20u);
   EXPECT_EQ(config.connections.per_peer, 10u);
+  EXPECT_EQ(config.connections.quiet_s, 90.5);
   Config plain;
   complete_config(plain);
   EXPECT_EQ(plain.access + plain.tls.certificate, "");

@@ -46,6 +46,21 @@ class AccessTest : public testing::Test {
     server_.reset();
   }
 
+  // A connection by hand, over which nothing is sent.
+  int connect_stranger() const {
+    sockaddr_in where{};
+    where.sin_family = AF_INET;
+    where.sin_port = htons(server_->port());
+    where.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    EXPECT_EQ(connect(fd, reinterpret_cast<const sockaddr*>(&where), sizeof where), 0);
+    return fd;
+  }
+  static bool is_closed(int fd) {
+    char byte;
+    return recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK) == 0;
+  }
+
   std::string address() const { return "127.0.0.1:" + std::to_string(server_->port()); }
   std::string socket() const { return "unix:" + fleet_.file("socket"); }
   std::shared_ptr<grpc::Channel> channel(const access::Credentials& shown) const {
@@ -284,38 +299,52 @@ TEST_F(AccessTest, ASessionThatHasNotBegunIsOfWhoSentForItFirst) {
   const Bytes payload = encode_keyframe(world.keyframe(0));
   const std::uint64_t frames = map_.mapper->view()->state().keyframes;
   // The keyframe is of another robot than the sender: it is refused for good, and begins nothing.
-  EXPECT_TRUE(intake_->take_payload(uuid, 0, crc32c(payload), payload, {"thief"}).ok());
-  EXPECT_EQ(intake_->take_payload(uuid, 0, crc32c(payload), payload, {"second"}).reason(), Reason::NOT_ALLOWED);
-  EXPECT_EQ(intake_->take_end({uuid, 1}, {"second"}).reason(), Reason::NOT_ALLOWED);
+  std::vector<Reason> taken;
+  const auto note = [&](const Status& status) { taken.push_back(status.reason()); };
+  intake_->take_payload(uuid, 0, crc32c(payload), payload, {"thief"}, note);
+  intake_->take_payload(uuid, 0, crc32c(payload), payload, {"second"}, note);
+  intake_->take_end({uuid, 1}, {"second"}, note);
+  EXPECT_THAT(taken, testing::ElementsAre(Reason::OK, Reason::NOT_ALLOWED, Reason::NOT_ALLOWED));
   EXPECT_EQ(intake_->stats().refused_before_begin[intake::index_of(Reason::NOT_ALLOWED)], 1u);
   EXPECT_EQ(map_.mapper->view()->state().keyframes, frames);
 }
 
-TEST_F(AccessTest, ConnectionsAreLimitedAndTheSocketStaysOpen) {
+TEST_F(AccessTest, ConnectionsAreLimitedAndStrangersMakeRoomForThoseWhoAreKnown) {
   const access::Credentials boss = fleet_.certificate(Role::kOperator, "boss");
   start({.total = 8, .per_peer = 4});
-  std::vector<int> idle;
-  const auto connect_one = [&] {
-    sockaddr_in where{};
-    where.sin_family = AF_INET;
-    where.sin_port = htons(server_->port());
-    where.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    idle.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    ASSERT_EQ(connect(idle.back(), reinterpret_cast<const sockaddr*>(&where), sizeof where), 0);
-  };
-  const auto is_closed = [](int fd) {
-    char byte;
-    return recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK) == 0;
-  };
-  for (int i = 0; i < 20; ++i) connect_one();
-  const auto closed = [&] { return std::count_if(idle.begin(), idle.end(), is_closed); };
+  const auto known = channel(boss);
+  ASSERT_TRUE(call(known, kStatus).ok());
+  std::vector<int> strangers;
+  for (int i = 0; i < 20; ++i) strangers.push_back(connect_stranger());
+  const auto closed = [&] { return std::count_if(strangers.begin(), strangers.end(), is_closed); };
   const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
-  while (closed() < 16 && std::chrono::steady_clock::now() < until)
+  while (closed() < 17 && std::chrono::steady_clock::now() < until)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_GE(closed(), 16);  // the other four have ten seconds for their handshakes
+  EXPECT_GE(closed(), 17);  // the other three have ten seconds for their handshakes
+  for (int i = 0; i < 16; ++i) EXPECT_TRUE(is_closed(strangers[static_cast<std::size_t>(i)])) << "the oldest go first";
+  EXPECT_EQ(known->GetState(false), GRPC_CHANNEL_READY) << "who is known stays";
+  for (int i = 0; i < 3; ++i) {
+    const grpc::Status status = call(channel(boss), kStatus);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+  }
   EXPECT_TRUE(call(open(socket(), grpc::InsecureChannelCredentials()), kStatus).ok());
-  for (const int fd : idle) close(fd);
-  // Those that have gone count no more.
+  for (const int fd : strangers) close(fd);
+}
+
+// Known callers are not pushed out by one another.
+TEST_F(AccessTest, WhereAllAreKnownNewConnectionsAreRefused) {
+  const access::Credentials boss = fleet_.certificate(Role::kOperator, "boss");
+  start({.total = 8, .per_peer = 3});
+  std::vector<std::shared_ptr<grpc::Channel>> known;
+  for (int i = 0; i < 3; ++i) {
+    known.push_back(channel(boss));
+    ASSERT_TRUE(call(known.back(), kStatus).ok());
+  }
+  EXPECT_EQ(call(channel(boss), kStatus).error_code(), StatusCode::UNAVAILABLE);
+  for (const auto& one : known) EXPECT_EQ(one->GetState(false), GRPC_CHANNEL_READY);
+  known.pop_back();
+  // One that has gone counts no more.
+  const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
   grpc::Status status;
   do status = call(channel(boss), kStatus);
   while (!status.ok() && std::chrono::steady_clock::now() < until);

@@ -20,13 +20,13 @@ namespace {
 // theirs separately.
 constexpr std::size_t kBytesPerCall = 64 * 1024;
 constexpr std::size_t kMaxRequestId = 64;
-constexpr int kEditThreads = 2;  // edits take turns (EditLog); one of them may wait until what it wrote is visible
+constexpr int kEditThreads = 4;  // edits take turns (EditLog); others may wait until what they wrote is visible
 constexpr int kWaitThreads = 4;  // all wait for the same, so more would gain nothing
 constexpr std::chrono::milliseconds kWatchInterval{500};
 
 // Whose calls are counted together. Those who prove nothing are told apart by their address.
 std::string counted_as(const Identity& caller, std::string peer) {
-  if (caller.name != kAnonymous) return caller.name;
+  if (caller.name != kAnonymous) return std::string(access::role_name(caller.role)) + " " + caller.name;
   return peer.substr(0, peer.rfind(':'));
 }
 
@@ -55,11 +55,12 @@ std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerCont
 }  // namespace
 
 Gateway::Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics, const Gatekeeper& gatekeeper,
-                 AuditLog* audit)
+                 Connections& connections, AuditLog* audit)
     : limits_(limits),
       budget_(budget),
       metrics_(metrics),
       gatekeeper_(gatekeeper),
+      connections_(connections),
       audit_(audit),
       general_(limits.threads),
       picture_thread_(1),
@@ -112,20 +113,66 @@ void Gateway::forget(Call* call) {
   while (cancelling_ == call) stop_.wait(mutex_);
 }
 
-Status Gateway::enter(const std::string& caller, Lane lane, std::size_t bytes) {
-  const MutexLock lock(mutex_);
-  if (lane == Lane::kIngest) {
-    if (++streamers_[caller].calls <= limits_.max_ingest_streams_per_caller) return {};
-    return {Reason::BUDGET_EXCEEDED, std::to_string(limits_.max_ingest_streams_per_caller) +
-                                         " streams of keyframes of " + caller + " are open already"};
+Gateway::Kind Gateway::kind_of(Lane lane) {
+  switch (lane) {
+    case Lane::kIngest:
+      return Kind::kStream;
+    case Lane::kEdits:
+      return Kind::kEdit;
+    case Lane::kWaits:
+      return Kind::kWait;
+    case Lane::kGeneral:
+    case Lane::kPictures:
+    case Lane::kMaintenance:
+      break;
   }
+  return Kind::kQuestion;
+}
+
+Gateway::Limit Gateway::limit_of(Kind kind) const {
+  switch (kind) {
+    case Kind::kStream:
+      return {limits_.max_ingest_streams, limits_.max_ingest_streams_per_caller, "streams of keyframes", "are open"};
+    case Kind::kEdit:
+      return {limits_.max_waiting, limits_.max_concurrent_per_caller, "edits", "wait"};
+    case Kind::kWait:
+      return {limits_.max_waiting, limits_.max_concurrent_per_caller, "calls of WaitIdle", "wait"};
+    case Kind::kQuestion:
+      break;
+  }
+  return {limits_.max_concurrent, limits_.max_concurrent_per_caller, "calls", "are running"};
+}
+
+TaskPool& Gateway::threads_of(Lane lane) {
+  switch (lane) {
+    case Lane::kPictures:
+      return picture_thread_;
+    case Lane::kMaintenance:
+      return maintenance_thread_;
+    case Lane::kEdits:
+      return edit_threads_;
+    case Lane::kWaits:
+      return wait_threads_;
+    case Lane::kGeneral:
+    case Lane::kIngest:
+      break;
+  }
+  return general_;
+}
+
+Status Gateway::enter(const std::string& caller, Lane lane, std::size_t bytes) {
+  const Kind kind = kind_of(lane);
+  const Limit limit = limit_of(kind);
+  const MutexLock lock(mutex_);
   Load& load = callers_[caller];
+  const bool first = load.bytes == 0;
   load.bytes += bytes;
-  if (++load.calls > limits_.max_concurrent_per_caller)
+  if (++load.calls[static_cast<std::size_t>(kind)] > limit.per_caller)
     return {Reason::BUDGET_EXCEEDED,
-            std::to_string(limits_.max_concurrent_per_caller) + " calls of " + caller + " are running already"};
+            std::to_string(limit.per_caller) + " " + limit.what + " of " + caller + " " + limit.state + " already"};
+  if (kind == Kind::kStream) return {};
   const std::size_t share = budget_.allowance(storage::Share::kReplies);
-  if (load.calls > 1 && load.bytes > share / 2)
+  if (!first && load.bytes > share / 2)
     return {Reason::BUDGET_EXCEEDED, "calls of " + caller + " use half of the " + std::to_string(share) +
                                          " bytes that the memory budget leaves for replies"};
   return {};
@@ -133,10 +180,10 @@ Status Gateway::enter(const std::string& caller, Lane lane, std::size_t bytes) {
 
 void Gateway::leave(const std::string& caller, Lane lane, std::size_t bytes) {
   const MutexLock lock(mutex_);
-  auto& loads = lane == Lane::kIngest ? streamers_ : callers_;
-  Load& load = loads[caller];
-  load.bytes -= lane == Lane::kIngest ? 0 : bytes;
-  if (--load.calls == 0) loads.erase(caller);
+  const auto load = callers_.find(caller);
+  load->second.bytes -= bytes;
+  --load->second.calls[static_cast<std::size_t>(kind_of(lane))];
+  if (load->second.calls == decltype(Load::calls){}) callers_.erase(load);
 }
 
 Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane)
@@ -156,6 +203,7 @@ Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* m
 Call::~Call() {
   leave();
   if (!counted_) return;
+  if (!known_peer_.empty()) gateway_.connections_.call_ends(known_peer_);
   gateway_.forget(this);
   --gateway_.calls_;
 }
@@ -170,16 +218,8 @@ bool Call::stalled(std::chrono::steady_clock::time_point now) const {
 void Call::leave() {
   if (!running_) return;
   running_ = false;
-  if (entered_) gateway_.leave(entered_as_, lane_, entered_bytes_);
-  if (lane_ == Lane::kIngest) {
-    --gateway_.ingest_;
-    return;
-  }
-  if (lane_ == Lane::kEdits || lane_ == Lane::kWaits) {
-    --(lane_ == Lane::kEdits ? gateway_.edits_ : gateway_.waits_);
-    return;
-  }
-  --gateway_.running_;
+  gateway_.leave(entered_as_, lane_, entered_bytes_);
+  --gateway_.running_[static_cast<std::size_t>(Gateway::kind_of(lane_))];
   if (lane_ == Lane::kPictures) --gateway_.pictures_;
 }
 
@@ -188,11 +228,13 @@ Status Call::admit_caller(std::size_t bytes) {
   auto caller = gateway_.gatekeeper_.identify(evidence_of(*context_, *context_->auth_context()));
   if (!caller.ok()) return caller.status();
   caller_ = std::move(*caller);
+  known_peer_ = context_->peer();
+  gateway_.connections_.call_begins(known_peer_);
   if (Status may = check_role(caller_); !may.ok()) return may;
   entered_as_ = counted_as(caller_, context_->peer());
   entered_ = true;
-  entered_bytes_ = bytes;
-  return gateway_.enter(entered_as_, lane_, bytes);
+  entered_bytes_ = lane_ == Lane::kIngest ? 0 : bytes;
+  return gateway_.enter(entered_as_, lane_, entered_bytes_);
 }
 
 Status Call::admit(std::size_t more) {
@@ -202,51 +244,35 @@ Status Call::admit(std::size_t more) {
     const MutexLock lock(gateway_.mutex_);
     gateway_.open_.insert(this);
   }
-  const Status may = admit_caller(kBytesPerCall + more);
-  if (!may.ok() && !entered_) return may;
+  const std::size_t bytes = kBytesPerCall + more;
+  const Status may = admit_caller(bytes);
+  if (!entered_) return may;
   running_ = true;
-  if (lane_ == Lane::kIngest) {
-    const int streams = ++gateway_.ingest_;
-    if (!may.ok()) return may;
-    if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
-    if (streams > gateway_.limits_.max_ingest_streams)
-      return {Reason::BUDGET_EXCEEDED,
-              std::to_string(gateway_.limits_.max_ingest_streams) + " streams of keyframes are open already"};
-    // Streams must leave room for answers.
-    const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
-    if (static_cast<std::size_t>(streams) * (kBytesPerCall + more) > share / 2)
-      return {Reason::BUDGET_EXCEEDED, "open streams of keyframes use half of the " + std::to_string(share) +
-                                           " bytes that the memory budget leaves for replies"};
-    charge_.emplace(gateway_.budget_, storage::Share::kReplies);
-    return charge_->grow_to(kBytesPerCall + more);
-  }
-  if (lane_ == Lane::kEdits || lane_ == Lane::kWaits) {
-    const int waiting = ++(lane_ == Lane::kEdits ? gateway_.edits_ : gateway_.waits_);
-    if (!may.ok()) return may;
-    if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
-    if (waiting > gateway_.limits_.max_waiting)
-      return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_waiting) + " such calls wait already"};
-    charge_.emplace(gateway_.budget_, storage::Share::kReplies);
-    return charge_->grow_to(kBytesPerCall + more);
-  }
-  const int running = ++gateway_.running_;
+  const Gateway::Kind kind = Gateway::kind_of(lane_);
+  const Gateway::Limit limit = gateway_.limit_of(kind);
+  const int running = ++gateway_.running_[static_cast<std::size_t>(kind)];
   const int pictures = lane_ == Lane::kPictures ? ++gateway_.pictures_ : 0;
   if (!may.ok()) return may;
   if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
-  if (running > gateway_.limits_.max_concurrent)
-    return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_concurrent) + " calls are running already"};
+  if (running > limit.all)
+    return {Reason::BUDGET_EXCEEDED, std::to_string(limit.all) + " " + limit.what + " " + limit.state + " already"};
   if (pictures > gateway_.limits_.max_pictures)
     return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_pictures) + " pictures are waiting already"};
+  // Streams, and pictures that wait, must leave room for the replies of other calls.
+  const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
+  const auto too_much = [share](const char* what) {
+    return Status(Reason::BUDGET_EXCEEDED, std::string(what) + " use half of the " + std::to_string(share) +
+                                               " bytes that the memory budget leaves for replies");
+  };
+  if (kind == Gateway::Kind::kStream && static_cast<std::size_t>(running) * bytes > share / 2)
+    return too_much("open streams of keyframes");
   charge_.emplace(gateway_.budget_, storage::Share::kReplies);
   if (Status status = charge_->grow_to(kBytesPerCall); !status.ok()) return status;
   // The picture that is being described has reserved memory; those that wait behind it do not.
-  if (lane_ == Lane::kPictures && pictures == 1) return {};
-  // Waiting pictures must leave room for the replies of other calls.
-  const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
-  if (lane_ == Lane::kPictures && gateway_.budget_.used(storage::Share::kReplies) + more > share / 2)
-    return {Reason::BUDGET_EXCEEDED, "waiting pictures use half of the " + std::to_string(share) +
-                                         " bytes that the memory budget leaves for replies"};
-  return charge_->grow_to(kBytesPerCall + more);
+  if (pictures == 1) return {};
+  if (pictures > 1 && gateway_.budget_.used(storage::Share::kReplies) + more > share / 2)
+    return too_much("waiting pictures");
+  return charge_->grow_to(bytes);
 }
 
 Status Call::check_role(const Identity& caller) const {
@@ -267,14 +293,7 @@ Status Call::check_caller() const {
              : Status(Reason::UNAUTHENTICATED, "the credentials of " + caller_.name + " have changed");
 }
 
-void Call::post(std::function<void()> task) {
-  TaskPool& pool = lane_ == Lane::kPictures      ? gateway_.picture_thread_
-                   : lane_ == Lane::kMaintenance ? gateway_.maintenance_thread_
-                   : lane_ == Lane::kEdits       ? gateway_.edit_threads_
-                   : lane_ == Lane::kWaits       ? gateway_.wait_threads_
-                                                 : gateway_.general_;
-  pool.post(std::move(task));
-}
+void Call::post(std::function<void()> task) { gateway_.threads_of(lane_).post(std::move(task)); }
 
 void Call::asks(const google::protobuf::Message& request) {
   if (gateway_.audit_ && is_audited(method_)) asked_ = AuditLog::text_of(request);

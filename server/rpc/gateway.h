@@ -5,6 +5,7 @@
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/server_callback.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -19,6 +20,7 @@
 #include "proto/base/mutex.h"
 #include "server/rpc/audit_log.h"
 #include "server/rpc/charge.h"
+#include "server/rpc/connections.h"
 #include "server/rpc/deadline.h"
 #include "server/rpc/gatekeeper.h"
 #include "server/rpc/limits.h"
@@ -32,18 +34,19 @@ namespace relmap::rpc {
 // The lanes of calls, which have separate threads and limits. Pictures are described one at a time by a thread of their
 // own, since this needs a fixed reserve of memory. Maintenance streams wait for hours of work on another thread, so
 // that no query waits behind them. Edits wait for the disk, and WaitIdle for all that was sent: each kind has threads
-// and a limit of its own, so that many of them hold up nothing else. Streams of keyframes last as long as a robot
-// drives: they have a limit of their own, but no deadline and no thread.
+// and a limit of its own, so that many of them hold up nothing else. What waits for the disk must be in one of these
+// two, or in maintenance. Streams of keyframes last as long as a robot drives: they have a limit of their own, but no
+// deadline and no thread.
 enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest, kEdits, kWaits };
 
 class Call;
 
 class Gateway {
  public:
-  // `budget`, `metrics`, `gatekeeper` and `audit` must outlive it. `audit`: where edits and calls of operators are
-  // written down; null: nowhere.
+  // All but `limits` must outlive it. `connections` are told whose callers are known. `audit`: where edits and calls of
+  // operators are written down; null: nowhere.
   Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics, const Gatekeeper& gatekeeper,
-          AuditLog* audit = nullptr);
+          Connections& connections, AuditLog* audit = nullptr);
   ~Gateway();
 
   // From now on refuses new calls with SHUTTING_DOWN and interrupts running ones (Deadline::check()).
@@ -66,32 +69,43 @@ class Gateway {
 
   void watch();
   void forget(Call* call);
-  // The calls of one caller, and the memory that they hold for replies.
+  // Lanes whose calls are counted together, so that those of others have room.
+  enum class Kind : std::uint8_t { kQuestion, kStream, kEdit, kWait };
+  static constexpr std::size_t kKinds = 4;
+  static Kind kind_of(Lane lane);
+  struct Limit {
+    int all, per_caller;
+    const char *what, *state;  // for messages: "calls", "are running"
+  };
+  Limit limit_of(Kind kind) const;
+  // The calls of one caller, and the memory that they hold for replies, streams of keyframes apart.
   struct Load {
-    int calls = 0;
+    std::array<int, kKinds> calls{};
     std::size_t bytes = 0;
   };
   // Counts a call of this caller; BUDGET_EXCEEDED if it has as many as one may have, or half of the memory for replies.
   Status enter(const std::string& caller, Lane lane, std::size_t bytes);
   void leave(const std::string& caller, Lane lane, std::size_t bytes);
+  TaskPool& threads_of(Lane lane);
 
   const RpcLimits limits_;
   storage::Budget& budget_;
   Metrics& metrics_;
   const Gatekeeper& gatekeeper_;
+  Connections& connections_;
   AuditLog* const audit_;
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
   // Calls that are not answered yet; gRPC may hold a call a little longer.
-  std::atomic<int> running_{0}, pictures_{0}, ingest_{0}, edits_{0}, waits_{0};
+  std::array<std::atomic<int>, kKinds> running_{};
+  std::atomic<int> pictures_{0};  // of these
 
   Mutex mutex_;
   ConditionVariable stop_;
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
-  std::set<Call*> open_ RELMAP_GUARDED_BY(mutex_);                   // admitted, and not destroyed yet
-  Call* cancelling_ RELMAP_GUARDED_BY(mutex_) = nullptr;             // by watch_, which is about to cancel it
-  std::map<std::string, Load> callers_ RELMAP_GUARDED_BY(mutex_);    // calls that run, streams of keyframes apart
-  std::map<std::string, Load> streamers_ RELMAP_GUARDED_BY(mutex_);  // streams of keyframes
+  std::set<Call*> open_ RELMAP_GUARDED_BY(mutex_);                 // admitted, and not destroyed yet
+  Call* cancelling_ RELMAP_GUARDED_BY(mutex_) = nullptr;           // by watch_, which is about to cancel it
+  std::map<std::string, Load> callers_ RELMAP_GUARDED_BY(mutex_);  // those who have calls that run
   // Declared last, so that they are joined first.
   TaskPool general_, picture_thread_, maintenance_thread_, edit_threads_, wait_threads_;
   std::thread watch_;
@@ -113,6 +127,8 @@ class Call {
   Status check_caller() const;
   const Deadline& deadline() const { return deadline_; }
   std::string peer() const { return context_->peer(); }
+  // Where a caller who proves nothing comes from, without a port; empty for all others.
+  std::string unproved_from() const { return caller_.name == kAnonymous ? entered_as_ : std::string(); }
   // What is asked, for the audit log, if the method is one that it has.
   void asks(const google::protobuf::Message& request);
   // A message was given to gRPC, or has left it. A call whose message does not leave in time is cancelled.
@@ -147,6 +163,7 @@ class Call {
   Deadline deadline_;
   std::atomic<std::int64_t> writing_since_{0};  // 0: nothing is being written
   bool counted_ = false, running_ = false, entered_ = false;
+  std::string known_peer_;  // over whose connection a known caller calls; empty: the caller is not known
   std::string entered_as_;  // whose calls it is counted among
   std::size_t entered_bytes_ = 0;
   std::string asked_;  // the request, for the audit log

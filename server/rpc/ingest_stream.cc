@@ -21,7 +21,14 @@ constexpr std::size_t kStreamBytes = 64 * 1024;
 
 IngestStream::IngestStream(map::Mapper& mapper, const Intake& intake, Gateway& gateway,
                            grpc::CallbackServerContext* context)
-    : mapper_(mapper), intake_(intake.server), call_(gateway, context, "Ingest.Stream", Lane::kIngest) {
+    : mapper_(mapper),
+      intake_(intake.server),
+      call_(gateway, context, "Ingest.Stream", Lane::kIngest),
+      self_(std::make_shared<Self>()) {
+  {
+    const MutexLock lock(self_->mutex);
+    self_->stream = this;
+  }
   Status admitted = call_.admit(kStreamBytes);
   if (admitted.ok() && !intake_) admitted = {Reason::UNSUPPORTED, "this server takes no keyframes in"};
   if (admitted.ok())
@@ -33,17 +40,35 @@ IngestStream::IngestStream(map::Mapper& mapper, const Intake& intake, Gateway& g
 void IngestStream::OnReadDone(bool ok) {
   if (!ok) return end({});  // the robot has closed its side
   const Status taken = call_.guarded([&] { return take(request_); });
-  if (!taken.ok()) return end(taken);
-  request_.Clear();
+  if (!taken.ok()) end(taken);
+}
+
+void IngestStream::read_next() {
   const MutexLock lock(mutex_);
   if (!ending_) StartRead(&request_);
 }
 
-Status IngestStream::take(v1::IngestRequest& request) {
+// Goes on when the intake has taken the message in, which may be while the map is still read for it, in another thread.
+intake::IngestServer::Taken IngestStream::then_go_on(const SessionUuid& session) {
+  return [self = self_, session](const Status& taken) {
+    const MutexLock lock(self->mutex);
+    IngestStream* const stream = self->stream;
+    if (!stream) return;
+    if (taken.ok()) return stream->read_next();
+    stream->leave(session);
+    stream->end(taken);
+  };
+}
+
+Status IngestStream::take(const v1::IngestRequest& request) {
   if (Status known = call_.check_caller(); !known.ok()) return known;
-  if (!subscription_) return begin(request);
+  if (!subscription_) {
+    if (Status begun = begin(request); !begun.ok()) return begun;
+    read_next();
+    return {};
+  }
   intake::IngestServer& intake = *intake_;
-  const std::string robot = call_.caller().robot();
+  const intake::Sender sender{call_.caller().robot(), false, call_.unproved_from()};
   switch (request.content_case()) {
     case v1::IngestRequest::kKeyframe: {
       const v1::KeyframePayload& keyframe = request.keyframe();
@@ -53,27 +78,30 @@ Status IngestStream::take(v1::IngestRequest& request) {
       if (keyframe.payload().size() > kMaxKeyframeBytes)
         return {Reason::BAD_SIZE, "a keyframe of " + std::to_string(keyframe.payload().size()) + " bytes; at most " +
                                       std::to_string(kMaxKeyframeBytes)};
-      return leave_unless(intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
-                                              Bytes(keyframe.payload().begin(), keyframe.payload().end()), {robot}),
-                          *uuid);
+      intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
+                          Bytes(keyframe.payload().begin(), keyframe.payload().end()), sender, then_go_on(*uuid));
+      return {};
     }
     case v1::IngestRequest::kGap: {
       const auto gap = read_gap(request.gap());
       if (!gap.ok()) break;
       if (Status joined = join(gap->session); !joined.ok()) return joined;
-      return leave_unless(intake.take_gap(*gap, {robot}), gap->session);
+      intake.take_gap(*gap, sender, then_go_on(gap->session));
+      return {};
     }
     case v1::IngestRequest::kEnd: {
       const auto ended = read_end(request.end());
       if (!ended.ok()) break;
       if (Status joined = join(ended->session); !joined.ok()) return joined;
-      return leave_unless(intake.take_end(*ended, {robot}), ended->session);
+      intake.take_end(*ended, sender, then_go_on(ended->session));
+      return {};
     }
     case v1::IngestRequest::kHello:
     case v1::IngestRequest::CONTENT_NOT_SET:
       break;
   }
   intake.count_foreign(Reason::INVALID_ARGUMENT);
+  read_next();
   return {};
 }
 
@@ -103,13 +131,11 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
   return {};
 }
 
-// Ends the stream of a robot that sends to another's session, of which it must hear nothing either.
-Status IngestStream::leave_unless(const Status& taken, const SessionUuid& session) {
-  if (taken.ok()) return {};
+// A robot that sends to another's session must hear nothing of it.
+void IngestStream::leave(const SessionUuid& session) {
   const MutexLock lock(mutex_);
   sessions_.erase(session);
   acknowledgements_.erase(session);
-  return taken;
 }
 
 Status IngestStream::join(const SessionUuid& session) {
@@ -174,6 +200,10 @@ void IngestStream::OnWriteDone(bool ok) {
 
 void IngestStream::OnDone() {
   if (!who_.empty()) spdlog::info("{} is no longer connected", who_);
+  {
+    const MutexLock lock(self_->mutex);
+    self_->stream = nullptr;
+  }
   delete this;
 }
 

@@ -31,10 +31,18 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   void OnDone() override;
 
  private:
-  Status take(v1::IngestRequest& request);
+  // By which the intake finds the stream when it has taken a message, unless the stream has gone.
+  struct Self {
+    Mutex mutex;
+    IngestStream* stream RELMAP_GUARDED_BY(mutex);
+  };
+
+  Status take(const v1::IngestRequest& request);
   Status begin(const v1::IngestRequest& request);
   Status join(const SessionUuid& session);
-  Status leave_unless(const Status& taken, const SessionUuid& session);
+  intake::IngestServer::Taken then_go_on(const SessionUuid& session);
+  void leave(const SessionUuid& session);
+  void read_next();
   void hear(const Acknowledgement& ack);
   void hear(const PoseNews& news);
   void end(const Status& status);
@@ -43,6 +51,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   map::Mapper& mapper_;
   intake::IngestServer* const intake_;  // null: refused
   Call call_;
+  const std::shared_ptr<Self> self_;
   v1::IngestRequest request_;
   std::string who_;  // robot and address, set by its hello
 

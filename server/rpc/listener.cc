@@ -1,6 +1,5 @@
 #include "server/rpc/listener.h"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <grp.h>
 #include <netdb.h>
@@ -14,6 +13,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -28,35 +28,12 @@ namespace {
 constexpr int kBacklog = 512;
 constexpr std::chrono::milliseconds kPause{100};  // when nothing can be accepted, as without a free descriptor
 constexpr std::chrono::seconds kToldAgain{1};     // between messages of what is refused
+constexpr std::chrono::milliseconds kQuietLook{
+    5000};  // between looks for connections that have been quiet for too long
 
 int open_spare() { return open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
 std::string error_text() { return std::strerror(errno); }
-
-// Device and inode, which no other open file has.
-std::pair<dev_t, ino_t> identity_of(int descriptor) {
-  struct stat facts {};
-  return fstat(descriptor, &facts) == 0 ? std::pair(facts.st_dev, facts.st_ino) : std::pair<dev_t, ino_t>(0, 0);
-}
-
-// The address of the other side, without its port; empty for a Unix socket.
-std::string peer_of(int connection) {
-  sockaddr_storage address{};
-  socklen_t size = sizeof address;
-  if (getpeername(connection, reinterpret_cast<sockaddr*>(&address), &size) != 0) return "gone";
-  std::array<char, INET6_ADDRSTRLEN> text{};
-  if (address.ss_family == AF_INET) {
-    const auto& v4 = reinterpret_cast<const sockaddr_in&>(address);
-    inet_ntop(AF_INET, &v4.sin_addr, text.data(), text.size());
-  } else if (address.ss_family == AF_INET6) {
-    const auto& v6 = reinterpret_cast<const sockaddr_in6&>(address);
-    // Whoever has one address of IPv6 has the /64 around it (RFC 6177), which counts as one peer.
-    in6_addr network = v6.sin6_addr;
-    if (!IN6_IS_ADDR_V4MAPPED(&network)) std::memset(network.s6_addr + 8, 0, 8);
-    inet_ntop(AF_INET6, &network, text.data(), text.size());
-  }
-  return text.data();
-}
 
 }  // namespace
 
@@ -142,8 +119,8 @@ std::uint16_t ListeningSocket::port() const {
                                              : reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 
-Listener::Listener(std::vector<Source> sources, const ConnectionLimits& limits)
-    : sources_(std::move(sources)), limits_(limits), wake_(eventfd(0, EFD_CLOEXEC)), spare_(open_spare()) {
+Listener::Listener(std::vector<Source> sources, Connections& connections)
+    : sources_(std::move(sources)), connections_(connections), wake_(eventfd(0, EFD_CLOEXEC)), spare_(open_spare()) {
   if (wake_ < 0) throw StatusError(Status(Reason::IO_ERROR, "no eventfd: " + error_text()));
   thread_ = std::thread([this] { run(); });
 }
@@ -163,8 +140,16 @@ void Listener::run() {
   std::vector<pollfd> waiting;
   for (const Source& source : sources_) waiting.push_back({source.socket.fd(), POLLIN, 0});
   waiting.push_back({wake_, POLLIN, 0});
+  const std::chrono::milliseconds half(static_cast<std::int64_t>(500 * connections_.limits().quiet_s));
+  const auto look = std::min(kQuietLook, half);
+  auto looked = Connections::Clock::now();
   for (;;) {
-    if (poll(waiting.data(), waiting.size(), -1) < 0) continue;  // EINTR
+    const int ready = poll(waiting.data(), waiting.size(), static_cast<int>(look.count()));
+    if (const auto now = Connections::Clock::now(); now - looked >= look) {
+      connections_.close_quiet(now);
+      looked = now;
+    }
+    if (ready <= 0) continue;  // EINTR
     if (waiting.back().revents != 0) return;
     for (std::size_t i = 0; i < sources_.size(); ++i)
       if (waiting[i].revents != 0) accept_from(sources_[i]);
@@ -185,19 +170,19 @@ void Listener::accept_from(const Source& source) {
     poll(&wake, 1, static_cast<int>(kPause.count()));
     return;
   }
-  std::string peer = peer_of(connection);
-  if (!admit(peer)) {
-    if (tells())
-      spdlog::warn("connections are refused, the last from {}: {} are open", peer.empty() ? "the socket" : peer,
-                   open_.size());
+  const Connections::Added added = connections_.add(connection);
+  if (added != Connections::Added::kYes && tells())
+    spdlog::warn(
+        "connections {}: {} are open",
+        added == Connections::Added::kNo ? "are refused" : "of callers that are not known make room for others",
+        connections_.open());
+  if (added == Connections::Added::kNo) {
     close(connection);
     return;
   }
   const int on = 1;
-  if (!peer.empty()) setsockopt(connection, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  if (const auto former = open_.find(connection); former != open_.end()) forget(former);
-  ++by_peer_[peer];
-  open_.emplace(connection, Open{identity_of(connection), std::move(peer)});
+  (void)setsockopt(connection, IPPROTO_TCP, TCP_NODELAY, &on,
+                   sizeof on);  // fails, and does nothing, for the Unix socket
   source.take(source.socket.fd(), connection);
 }
 
@@ -218,30 +203,6 @@ bool Listener::tells() {
   if (now - told_ < kToldAgain) return false;
   told_ = now;
   return true;
-}
-
-// gRPC does not tell when it closes a connection: then its descriptor is closed, or is another file's by now.
-void Listener::forget_closed() {
-  for (auto it = open_.begin(); it != open_.end();)
-    it = identity_of(it->first) == it->second.file ? std::next(it) : forget(it);
-}
-
-std::map<int, Listener::Open>::iterator Listener::forget(std::map<int, Open>::iterator it) {
-  if (--by_peer_[it->second.peer] == 0) by_peer_.erase(it->second.peer);
-  return open_.erase(it);
-}
-
-bool Listener::admit(const std::string& peer) {
-  const auto room = [&] {
-    const auto local = by_peer_.find("");
-    const std::size_t sockets = local == by_peer_.end() ? 0 : local->second;
-    if (peer.empty()) return sockets < limits_.total;
-    const auto same = by_peer_.find(peer);
-    return open_.size() - sockets < limits_.total && (same == by_peer_.end() || same->second < limits_.per_peer);
-  };
-  if (room()) return true;
-  forget_closed();
-  return room();
 }
 
 }  // namespace relmap::rpc

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "proto/base/status.h"
+#include "server/rpc/connections.h"
 
 namespace relmap::rpc {
 
@@ -43,11 +43,6 @@ class ListeningSocket {
   std::string path_;  // removed with the socket; empty: TCP
 };
 
-struct ConnectionLimits {
-  std::size_t total = 1024;    // over TCP; as many again over the Unix socket
-  std::size_t per_peer = 256;  // from one address, over TCP
-};
-
 class Listener {
  public:
   // Gets a connection of its own, for which it is responsible from then on.
@@ -57,8 +52,8 @@ class Listener {
     Take take;
   };
 
-  // Starts the thread that accepts.
-  Listener(std::vector<Source> sources, const ConnectionLimits& limits);
+  // Starts the thread that accepts. `connections` must outlive it.
+  Listener(std::vector<Source> sources, Connections& connections);
   // Calls stop().
   ~Listener();
 
@@ -66,25 +61,15 @@ class Listener {
   void stop();
 
  private:
-  struct Open {
-    std::pair<dev_t, ino_t> file;
-    std::string peer;  // empty: over a Unix socket
-  };
-
   void run();
   void accept_from(const Source& source);
-  void forget_closed();
-  std::map<int, Open>::iterator forget(std::map<int, Open>::iterator it);
-  bool admit(const std::string& peer);
   bool tells();
   bool turn_away(int listening);
 
   std::vector<Source> sources_;  // constant while the thread runs
-  const ConnectionLimits limits_;
+  Connections& connections_;
   int wake_ = -1;
-  int spare_ = -1;                              // for turn_away()
-  std::map<int, Open> open_;                    // by descriptor
-  std::map<std::string, std::size_t> by_peer_;  // how many of them
+  int spare_ = -1;  // for turn_away()
   std::chrono::steady_clock::time_point told_{};
   std::thread thread_;
 };

@@ -89,7 +89,7 @@ class Daemon {
                     .or_throw()),
         core_(*mapper_, {"test", "b007b007b007", "/data", "", false, 4711, 0, {"/nowhere/backups"}}),
         sink_(*mapper_),
-        gateway_(core_.limits, mapper_->budget(), core_.metrics, everyone_) {
+        gateway_(core_.limits, mapper_->budget(), core_.metrics, everyone_, connections_) {
     intake::IngestServerOptions options;
     options.map = mapper_->identity();
     intake_ = std::make_unique<intake::IngestServer>(sink_, mapper_->budget(), BootId{4, 2}, std::move(options));
@@ -173,6 +173,7 @@ class Daemon {
   rpc::Core core_;
   ingest::MapperSink sink_;
   std::unique_ptr<intake::IngestServer> intake_;
+  rpc::Connections connections_{rpc::ConnectionLimits{}};
   rpc::Gateway gateway_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<grpc::Server> server_;

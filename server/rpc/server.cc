@@ -91,9 +91,11 @@ Status check_files(const TlsFiles& files) {
 
 struct RpcServer::Impl {
   // The mapper's budget outlives the server: the core holds both.
-  Impl(Core& core, const Gatekeeper& gatekeeper, AuditLog* audit)
-      : gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, audit) {}
+  Impl(Core& core, const Gatekeeper& gatekeeper, const ServerOptions& options)
+      : connections(options.connections),
+        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {}
 
+  Connections connections;
   Gateway gateway;
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;  // destroyed before the services
@@ -109,7 +111,7 @@ RpcServer::~RpcServer() { stop(std::chrono::milliseconds(0)); }
 Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper& gatekeeper,
                                                     const ServerOptions& options) {
   enable_plugins();
-  auto impl = std::make_unique<Impl>(core, gatekeeper, options.audit);
+  auto impl = std::make_unique<Impl>(core, gatekeeper, options);
   impl->services.push_back(make_map_service(core, impl->gateway));
   impl->services.push_back(make_ingest_service(core, impl->gateway));
   impl->services.push_back(make_admin_service(core, impl->gateway));
@@ -156,7 +158,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
   impl->server = builder.BuildAndStart();
   if (!impl->server) return Status(Reason::INTERNAL, "gRPC cannot start a server");
   impl->stopped = false;
-  impl->listener = std::make_unique<Listener>(std::move(sources), options.connections);
+  impl->listener = std::make_unique<Listener>(std::move(sources), impl->connections);
   return std::unique_ptr<RpcServer>(new RpcServer(std::move(impl)));
 }
 

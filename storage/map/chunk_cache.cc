@@ -65,6 +65,16 @@ std::shared_ptr<const Session> ChunkCache::session(const EngineSnapshot& snapsho
   return session;
 }
 
+void ChunkCache::hold_session(SessionNumber number) {
+  const MutexLock lock(mutex_);
+  ++held_[number];
+}
+
+void ChunkCache::let_go_session(SessionNumber number) {
+  const MutexLock lock(mutex_);
+  if (const auto held = held_.find(number); --held->second == 0) held_.erase(held);
+}
+
 std::shared_ptr<const FrameCold> ChunkCache::cold(const EngineSnapshot& snapshot, FrameId id) {
   const Key key{Part::kCold, id.session, id.index};
   if (auto cached = find(key, snapshot.commit_number()))
@@ -162,8 +172,15 @@ void ChunkCache::erase_locked(Lru::iterator entry) {
 }
 
 void ChunkCache::evict_locked() {
-  while (!lru_.empty() && budget_->used(Share::kCache) > budget_->allowance(Share::kCache))
-    erase_locked(std::prev(lru_.end()));
+  // What is held is looked at once and becomes the most recent, so that the next call need not pass it.
+  for (std::size_t left = lru_.size(); left > 0 && budget_->used(Share::kCache) > budget_->allowance(Share::kCache);
+       --left) {
+    const auto last = std::prev(lru_.end());
+    if (!last->key.part && last->through == kNewest && held_.contains(last->key.session))
+      lru_.splice(lru_.begin(), lru_, last);
+    else
+      erase_locked(last);
+  }
 }
 
 void ChunkCache::evict() {

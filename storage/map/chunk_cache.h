@@ -49,6 +49,9 @@ class ChunkCache {
   Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id, std::uint64_t slots);
   // Null if there is no such session.
   std::shared_ptr<const Session> session(const EngineSnapshot& snapshot, SessionNumber number);
+  // The newest record of the session stays in the cache, once it is there, until let_go_session() was called as often.
+  void hold_session(SessionNumber number);
+  void let_go_session(SessionNumber number);
   // Cold parts are cached frame by frame.
   std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
 
@@ -65,7 +68,7 @@ class ChunkCache {
   void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot, std::span<const Written<FrameWarm>> warm,
                  std::span<const std::shared_ptr<const Session>> sessions);
 
-  // Drops the least recently used entries until the cache keeps to its allowance.
+  // Drops the least recently used entries that are not held until the cache keeps to its allowance.
   void evict();
   void clear();
 
@@ -109,6 +112,7 @@ class ChunkCache {
   std::uint64_t current_ RELMAP_GUARDED_BY(mutex_);
   Lru lru_ RELMAP_GUARDED_BY(mutex_);
   Versions index_ RELMAP_GUARDED_BY(mutex_);
+  std::unordered_map<SessionNumber, std::size_t> held_ RELMAP_GUARDED_BY(mutex_);  // sessions, and how often
 };
 
 }  // namespace relmap::storage

@@ -108,6 +108,11 @@ std::shared_ptr<const Session> Map::Impl::session(SessionNumber number) const {
   return edited ? edited : cache->session(*snapshot, number);
 }
 
+std::shared_ptr<const void> Map::hold_session(SessionNumber number) const {
+  impl_->cache->hold_session(number);
+  return {nullptr, [cache = impl_->cache, number](const void*) { cache->let_go_session(number); }};
+}
+
 void Map::visit_skipped(SessionNumber session, std::uint32_t sequence, const SkippedVisit& visit) const {
   relmap::storage::visit_skipped(*impl_->snapshot, impl_->skipped, session, sequence, visit);
 }

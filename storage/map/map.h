@@ -76,6 +76,8 @@ class Map final : public EditableGraph {
   void watch_edits(EditWatcher watcher);
   // The newest published view. Any thread.
   std::shared_ptr<const MapView> view() const;
+  // Once the session's record was read or edited, views find it in memory as long as the result lives. Any thread.
+  std::shared_ptr<const void> hold_session(SessionNumber number) const;
 
   // Publishes, writes everything that is dirty together with state().applied_sequence, and trims the journal. If it
   // fails, everything stays dirty and can be committed again. A commit under way is finished first.

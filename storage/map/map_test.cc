@@ -142,6 +142,48 @@ TEST_F(MapTest, SessionsArePaged) {
   EXPECT_EQ(again->session(1300)->next_sequence, 0u);
 }
 
+// The intake asks for the records of its robots' sessions all the time, and must not wait for the disk.
+TEST_F(MapTest, ASessionThatIsHeldStaysInMemory) {
+  constexpr SessionNumber kSessions = 5000;
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
+  epoch = engine->acquire().value();
+  budget = std::make_shared<Budget>(std::size_t{2} << 20);
+  auto map = open();
+  for (SessionNumber number = 1; number <= kSessions; ++number) begin(*map, number);
+  ASSERT_TRUE(map->commit().ok());
+  const auto view = map->view();
+  auto held = map->hold_session(1);
+  auto again = map->hold_session(1);
+  (void)view->session(1);
+  const auto read_others = [&] {
+    for (SessionNumber number = 2; number <= kSessions; ++number) (void)view->session(number);
+  };
+  const auto is_in_memory = [&](const Graph& graph) {
+    faults->reads = 1;
+    const bool unread = [&] {
+      try {
+        return graph.session(1).has_value();
+      } catch (const StatusError&) {
+        return false;
+      }
+    }();
+    faults->reads = 0;
+    return unread;
+  };
+  read_others();
+  EXPECT_TRUE(is_in_memory(*view));
+  map->edit_session(1).next_sequence = 7;
+  ASSERT_TRUE(map->commit().ok());
+  again.reset();
+  read_others();
+  EXPECT_TRUE(is_in_memory(*map->view()));
+  EXPECT_EQ(map->view()->session(1)->next_sequence, 7u);
+  held.reset();
+  read_others();
+  EXPECT_FALSE(is_in_memory(*map->view()));
+}
+
 TEST_F(MapTest, OfADeletedSessionAlmostNothingIsLeft) {
   auto map = open();
   begin(*map, 1);

@@ -108,6 +108,7 @@ class MapperSink final : public intake::KeyframeSink {
   Status submit(storage::JournalRecord record, Done done) override {
     return mapper_.submit(std::move(record), std::move(done));
   }
+  std::shared_ptr<const void> hold_session(SessionNumber session) override { return mapper_.hold_session(session); }
   std::shared_ptr<const storage::Graph> view() const override { return mapper_.view(); }
   std::size_t free_bytes() const override { return std::size_t{1} << 20; }
 
@@ -244,8 +245,8 @@ class Run {
         resend = steady_clock::now() + milliseconds(100);
       }
       for (; sent < std::min<std::uint64_t>(from + 8, kFrames); ++sent)
-        (void)life.ingest().take_payload(uuid_, static_cast<std::uint32_t>(sent), crc32c(payloads_[sent]),
-                                         payloads_[sent]);
+        life.ingest().take_payload(uuid_, static_cast<std::uint32_t>(sent), crc32c(payloads_[sent]), payloads_[sent],
+                                   {});
       if (steady_clock::now() > deadline) return wrong("keyframes are not acknowledged any more");
       std::this_thread::sleep_for(milliseconds(1));
     }

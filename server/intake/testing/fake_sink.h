@@ -2,10 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <condition_variable>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +23,7 @@ namespace relmap::intake {
 class FakeGraph final : public storage::PartialGraph {
  public:
   std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
+    before_reading(id.session, false);
     const auto it = frames.find(id);
     return it == frames.end() ? nullptr : it->second;
   }
@@ -29,6 +33,7 @@ class FakeGraph final : public storage::PartialGraph {
     return all;
   }
   std::optional<storage::Session> session(SessionNumber number) const override {
+    before_reading(number, true);
     const auto it = by_number.find(number);
     return it == by_number.end() ? std::nullopt : std::optional(it->second);
   }
@@ -37,6 +42,7 @@ class FakeGraph final : public storage::PartialGraph {
       if (!visit(*it->second)) return;
   }
 
+  std::function<void(SessionNumber, bool record)> before_reading = [](SessionNumber, bool) {};
   std::map<FrameId, std::shared_ptr<const storage::FrameHot>> frames;
   std::map<SessionNumber, storage::Session> by_number;
   storage::SkippedTable settled;
@@ -83,10 +89,27 @@ class FakeSink final : public KeyframeSink {
     return {};
   }
 
+  std::shared_ptr<const void> hold_session(SessionNumber session) override {
+    const std::lock_guard lock(mutex_);
+    held_.insert(session);
+    return {nullptr, [this, session](const void*) {
+              const std::lock_guard let_go(mutex_);
+              held_.erase(held_.find(session));
+              if (!held_.contains(session)) in_memory_.erase(session);
+            }};
+  }
   std::shared_ptr<const storage::Graph> view() const override {
     const std::lock_guard lock(mutex_);
     if (lagging_) return lagging_;
-    return std::make_shared<FakeGraph>(graph_);
+    auto graph = std::make_shared<FakeGraph>(graph_);
+    graph->before_reading = [this](SessionNumber session, bool record) {
+      std::unique_lock reading(mutex_);
+      if (record && in_memory_.contains(session)) return;
+      if (session == hanging_) ++reading_;
+      readable_.wait(reading, [&] { return session != hanging_; });
+      if (record && held_.contains(session)) in_memory_.insert(session);
+    };
+    return graph;
   }
   std::size_t free_bytes() const override {
     const std::lock_guard lock(mutex_);
@@ -102,6 +125,18 @@ class FakeSink final : public KeyframeSink {
     const std::lock_guard lock(mutex_);
     queue_.clear();
     lagging_.reset();
+  }
+  // Reading what the map has of this session hangs until the next call; 0: of none.
+  void let_hang(SessionNumber session) {
+    const std::lock_guard lock(mutex_);
+    hanging_ = session;
+    reading_ = 0;
+    readable_.notify_all();
+  }
+  // How many readers hang.
+  int reading() const {
+    const std::lock_guard lock(mutex_);
+    return reading_;
   }
   // The view shows nothing newer until thaw_view().
   void freeze_view() {
@@ -219,6 +254,11 @@ class FakeSink final : public KeyframeSink {
   void fault(std::string what) { faults.push_back(std::move(what)); }
 
   mutable std::mutex mutex_;
+  mutable std::condition_variable readable_;
+  SessionNumber hanging_ = 0;
+  mutable int reading_ = 0;
+  std::multiset<SessionNumber> held_;
+  mutable std::set<SessionNumber> in_memory_;  // of these, those whose records were read
   FakeGraph graph_;
   std::shared_ptr<const FakeGraph> lagging_;
   std::deque<std::pair<storage::JournalRecord, Done>> queue_;
