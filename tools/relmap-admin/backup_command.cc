@@ -54,8 +54,9 @@ void add_backup(CLI::App& app, Action& action) {
   command->add_option("BACKUP", asked->second,
                       "folder to create; with --server an absolute path on the daemon's machine");
   command->footer(R"(
-The backup has everything that was acknowledged before the command began. It is a data folder that relmapd can open, and
-gets its name only when it is complete. On the file system of the map it shares files with the map, so that one bad
+The backup has everything that was acknowledged before the command began. It is a data folder that relmapd can open, to
+look at it; to go on in the map's place, restore it, so that robots learn of it and no session number is given out twice.
+It gets its name only when it is complete. On the file system of the map it shares files with the map, so that one bad
 sector damages both: put it on another disk, or copy it there.
 
   relmap-admin backup /var/lib/relmap /backup/map-monday
