@@ -59,7 +59,7 @@ class IngestServerTest : public testing::Test {
   const SessionUuid kNew = *SessionUuid::parse("99999999-2222-3333-4444-555555555555");
   std::uint8_t boot_ = 0;
   FakeSink sink_;
-  storage::Budget budget_{std::size_t{64} << 20};
+  storage::Budget budget_{std::size_t{1} << 30};
   std::unique_ptr<IngestServer> server_;
 };
 
