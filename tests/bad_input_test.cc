@@ -18,19 +18,14 @@
 #include "tests/support/hand_robot.h"
 #include "tests/support/map_stub.h"
 #include "tests/support/running_daemon.h"
-#include "tools/sim/points_world.h"
+#include "tests/support/small_world.h"
 
 namespace relmap::testing {
 namespace {
 
 using ::testing::HasSubstr;
 
-sim::PointsWorldOptions world_options() {
-  sim::PointsWorldOptions options;
-  options.frames = 60;
-  options.appearance = 60;
-  return options;
-}
+sim::PointsWorldOptions world_options() { return small_world(60, 1000, 60); }
 
 class BadInput : public ::testing::Test {
  protected:

@@ -5,11 +5,11 @@
 #include <random>
 #include <thread>
 
-#include "storage/maintenance/verify.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/stored_map.h"
+#include "tests/support/verify_findings.h"
 
 namespace relmap::testing {
 namespace {
@@ -45,13 +45,7 @@ class Crash : public ::testing::Test {
     storage::RocksDbOptions reading;
     reading.read_only = true;
     const auto engine = storage::open_rocksdb(data, reading).or_throw();
-    std::vector<std::string> wrong;
-    const auto found = [&](const storage::Finding& finding) {
-      wrong.push_back(finding.frame.to_string() + " " + finding.what);
-    };
-    ASSERT_TRUE(storage::verify(*engine->snapshot(), {}, found, {}).ok());
-    ASSERT_TRUE(storage::verify_journal(*engine, found, {}).ok());
-    EXPECT_THAT(wrong, ::testing::IsEmpty());
+    EXPECT_THAT(verify_findings(*engine), ::testing::IsEmpty());
   }
 
   void feed_and_kill(const Length& length, std::uint64_t seed) {
@@ -80,15 +74,10 @@ class Crash : public ::testing::Test {
     EXPECT_GT(status.closures_accepted, 0u);
     EXPECT_EQ(survivor.stop(), 0) << survivor.log();
 
+    verify_clean(options.data);
     const auto map = open_stored_map(options.data);
     EXPECT_EQ(map->state().keyframes, length.frames);
     EXPECT_THAT(settled_once_differences(*map, read_keyframes(drive + "/keyframes.bin")), ::testing::IsEmpty());
-    std::vector<std::string> wrong;
-    const auto found = [&](const storage::Finding& finding) {
-      wrong.push_back(finding.frame.to_string() + " " + finding.what);
-    };
-    ASSERT_TRUE(storage::verify(*map->view(), {}, found, {}).ok());
-    EXPECT_THAT(wrong, ::testing::IsEmpty());
   }
 
   const storage::TemporaryFolder folder_;

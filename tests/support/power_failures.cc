@@ -13,10 +13,10 @@
 #include "server/map/mapper.h"
 #include "server/place/testing/random_vocabulary.h"
 #include "storage/engine/memory_engine.h"
-#include "storage/maintenance/verify.h"
 #include "storage/testing/forwarding_engine.h"
 #include "tests/support/patience.h"
-#include "tools/sim/points_world.h"
+#include "tests/support/small_world.h"
+#include "tests/support/verify_findings.h"
 
 namespace relmap::testing {
 
@@ -27,16 +27,6 @@ using std::chrono::seconds;
 using std::chrono::steady_clock;
 
 constexpr std::uint32_t kFrames = 160, kLap = 70;
-
-sim::PointsWorldOptions world_options() {
-  sim::PointsWorldOptions options;
-  options.frames = kFrames;
-  options.frames_per_lap = kLap;
-  options.speed = 0.4;  // a lap takes longer than what place recognition leaves out
-  options.births = 16;
-  options.appearance = 120;
-  return options;
-}
 
 // Every record that became durable, over all lives. Thread-safe.
 class Journal {
@@ -165,7 +155,7 @@ class Life {
 class Run {
  public:
   Run(FailingDisk& disk, std::uint64_t seed, bool watch) : disk_(disk), watch_(watch), random_(seed) {
-    const sim::PointsWorld world(world_options());
+    const sim::PointsWorld world(small_world(kFrames, kLap, 120));
     uuid_ = world.options().uuid;
     for (std::uint32_t i = 0; i < world.size(); ++i) payloads_.push_back(encode_keyframe(world.keyframe(i)));
     result_.keyframes = kFrames;
@@ -225,12 +215,7 @@ class Run {
   }
 
   void verify_clean(const storage::Engine& engine) {
-    const auto found = [this](const storage::Finding& finding) {
-      wrong("verify: " + finding.frame.to_string() + " " + finding.what);
-    };
-    for (const auto& verified :
-         {storage::verify(*engine.snapshot(), {}, found, {}), storage::verify_journal(engine, found, {})})
-      if (!verified.ok()) wrong("verify: " + verified.status().to_string());
+    for (const std::string& finding : verify_findings(engine)) wrong(finding);
   }
 
   // As a robot does: what is not acknowledged is sent, and sent again.
