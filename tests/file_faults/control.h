@@ -29,18 +29,19 @@ struct FaultControl {
 };
 
 enum class OperationKind : std::uint32_t {
-  kOpen,       // fd, flags, path
-  kClose,      // fd
-  kDuplicate,  // fd, flags: the new descriptor
-  kWrite,      // fd, offset, bytes
-  kResize,     // fd, offset: the size
-  kResizeAt,   // path, offset: the size
-  kExtend,     // fd, offset: the size that the file has at least
-  kSync,       // fd
-  kRename,     // path, other, flags as of renameat2
-  kLink,       // path, other
-  kRemove,     // path: of a file or an empty folder
-  kMakeFolder  // path
+  kOpen,        // fd, flags, path
+  kClose,       // fd
+  kDuplicate,   // fd, flags: the new descriptor
+  kWrite,       // fd, offset, bytes
+  kResize,      // fd, offset: the size
+  kResizeAt,    // path, offset: the size
+  kExtend,      // fd, offset: the size that the file has at least
+  kSync,        // fd
+  kFailedSync,  // fd
+  kRename,      // path, other, flags as of renameat2; of files and folders, as all that follow
+  kLink,        // path, other
+  kRemove,      // path: of a file or an empty folder
+  kMakeFolder   // path
 };
 
 // A record of a trace; `path`, `other` and the bytes follow it. Paths are relative to the root.

@@ -43,6 +43,7 @@ DiskModel::NodePointer DiskModel::read(const std::string& path,
   const NodePointer made = node;
   made->folder = S_ISDIR(facts.st_mode);
   if (made->folder) {
+    folders_.push_back(made);
     for (const auto& entry : fs::directory_iterator(path))
       if (NodePointer child = read(entry.path().string(), known)) made->names[entry.path().filename().string()] = child;
     made->durable_names = made->names;
@@ -63,6 +64,12 @@ DiskModel::NodePointer DiskModel::find(const std::string& path) const {
     at = found->second;
   }
   return at;
+}
+
+DiskModel::NodePointer DiskModel::find_there(const std::string& path) const {
+  NodePointer node = find(path);
+  if (!node) throw std::runtime_error("there is no " + path);
+  return node;
 }
 
 std::pair<DiskModel::Node*, std::string> DiskModel::place(const std::string& path) const {
@@ -102,11 +109,8 @@ void DiskModel::apply(const FileOperation& operation) {
       return change(*open_file(operation.fd), {false, operation.offset, operation.bytes});
     case OperationKind::kResize:
       return change(*open_file(operation.fd), {true, operation.offset});
-    case OperationKind::kResizeAt: {
-      const NodePointer node = find(operation.path);
-      if (!node) throw std::runtime_error("there is no " + operation.path);
-      return change(*node, {true, operation.offset});
-    }
+    case OperationKind::kResizeAt:
+      return change(*find_there(operation.path), {true, operation.offset});
     case OperationKind::kExtend: {
       const NodePointer node = open_file(operation.fd);
       if (operation.offset > node->now.size) change(*node, {true, operation.offset});
@@ -114,25 +118,24 @@ void DiskModel::apply(const FileOperation& operation) {
     }
     case OperationKind::kSync:
       return sync(*open_file(operation.fd));
+    case OperationKind::kFailedSync:
+      return fail_sync(*open_file(operation.fd));
     case OperationKind::kRename: {
       const auto [from, from_name] = place(operation.path);
       const auto [to, to_name] = place(operation.other);
-      const NodePointer node = find(operation.path), replaced = find(operation.other);
-      // Sockets are names that the trace does not make.
-      if (!node) return;
+      const NodePointer node = find_there(operation.path);
       const bool exchange = (static_cast<unsigned>(operation.flags) & RENAME_EXCHANGE) != 0;
-      return rename({{to, to_name, node}, {from, from_name, exchange ? replaced : nullptr}});
+      return rename({{to, to_name, node}, {from, from_name, exchange ? find_there(operation.other) : nullptr}});
     }
     case OperationKind::kLink: {
       const auto [folder, name] = place(operation.other);
-      return rename({{folder, name, find(operation.path)}});
+      return rename({{folder, name, find_there(operation.path)}});
     }
-    case OperationKind::kRemove:
-      if (find(operation.path)) {
-        const auto [folder, name] = place(operation.path);
-        rename({{folder, name, nullptr}});
-      }
-      return;
+    case OperationKind::kRemove: {
+      (void)find_there(operation.path);
+      const auto [folder, name] = place(operation.path);
+      return rename({{folder, name, nullptr}});
+    }
     case OperationKind::kMakeFolder: {
       const auto made = std::make_shared<Node>();
       made->folder = true;
@@ -201,6 +204,13 @@ void DiskModel::sync(Node& node) {
         name.folder->durable_names.erase(name.name);
     return true;
   });
+}
+
+void DiskModel::fail_sync(Node& node) {
+  if (node.folder) return;
+  const bool a_part = std::bernoulli_distribution(0.5)(random_);
+  node.now = node.durable = remains(node, a_part ? Survives::kSome : Survives::kDurable, random_);
+  node.changes.clear();
 }
 
 DiskModel::Content DiskModel::remains(const Node& node, Survives survives, std::mt19937_64& random) {

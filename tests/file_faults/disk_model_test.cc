@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <stdio.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -53,6 +54,7 @@ class DiskModelTest : public ::testing::Test {
   }
   void resize(std::uint64_t size, int fd = 3) { disk().apply({OperationKind::kResize, fd, 0, {}, {}, size, {}}); }
   void sync(int fd = 3) { disk().apply({OperationKind::kSync, fd, 0, {}, {}, 0, {}}); }
+  void fail_sync(int fd = 3) { disk().apply({OperationKind::kFailedSync, fd, 0, {}, {}, 0, {}}); }
   void sync_folder(const std::string& path) {
     open(path, 9, 0);
     sync(9);
@@ -189,6 +191,49 @@ TEST_F(DiskModelTest, AnExchangeHappensWhollyOrNotAtAll) {
   sync_folder("");
   rename("a", "old", RENAME_EXCHANGE);
   EXPECT_EQ(possible(), (std::set<State>{{"old=old", "a/", "a/file="}, {"a=old", "old/", "old/file="}}));
+}
+
+TEST_F(DiskModelTest, ALaterNameIsNotDurableWithoutTheEarlierRename) {
+  make_folder("a");
+  sync_folder("");
+  rename("old", "a/old");
+  open("old");
+  sync();
+  sync_folder("");
+  EXPECT_THAT(after(Survives::kDurable), UnorderedElementsAre("a/", "a/old=old", "old="));
+}
+
+TEST_F(DiskModelTest, ASyncThatFailsDropsWhatItWasToWrite) {
+  open("old", 3, 0);
+  write(0, std::string(2048, 'x'));
+  fail_sync();
+  write(2048, "y");
+  sync();
+  const std::string left = *after(Survives::kDurable).begin();
+  EXPECT_EQ(left.size(), 4u + 2049) << "what follows is written where it belongs";
+  EXPECT_EQ(left.back(), 'y');
+  EXPECT_LT(std::count(left.begin(), left.end(), 'x'), 2048);
+  EXPECT_EQ(possible(), (std::set<State>{{left}}));
+}
+
+TEST_F(DiskModelTest, FoldersThatWereThereMayBeRemoved) {
+  fs::create_directories(folder_ / "start/a/b");
+  std::ofstream(folder_ / "start/a/b/file") << "abc";
+  rename("a/b/file", "file");
+  remove("a/b");
+  remove("a");
+  EXPECT_THAT(after(Survives::kDurable), UnorderedElementsAre("old=old", "a/", "a/b/", "a/b/file=abc"));
+  EXPECT_THAT(after(Survives::kEverything), UnorderedElementsAre("old=old", "file=abc"));
+  EXPECT_GT(possible().size(), 2u);
+}
+
+TEST_F(DiskModelTest, WhatIsNotThereIsNoOperation) {
+  EXPECT_THROW(rename("none", "other"), std::runtime_error);
+  EXPECT_THROW(remove("none"), std::runtime_error);
+  EXPECT_THROW(disk().apply({OperationKind::kLink, -1, 0, "none", "old", 0, {}}), std::runtime_error);
+  EXPECT_THROW(open("none", 3, 0), std::runtime_error);
+  EXPECT_THROW(sync(7), std::runtime_error);
+  EXPECT_THAT(after(Survives::kEverything), UnorderedElementsAre("old=old"));
 }
 
 TEST_F(DiskModelTest, AnOpenFileStaysTheSameWhateverItIsCalled) {

@@ -1,7 +1,8 @@
 // Put under a program with LD_PRELOAD: records what the program does to the files below a folder, or makes the n-th
 // operation fail or hang (control.h). Whatever writes by other ways than those here is not seen: streams of the C
-// library (RocksDB's own log, which nobody reads) are recorded as empty files, and writable shared maps end the
-// program.
+// library (RocksDB's own log, which nobody reads) are recorded as empty files, and what this library knows of and
+// cannot record (writable shared maps, symbolic links, direct system calls) ends the program. Only files and folders
+// are recorded, not sockets.
 #include <dirent.h>
 #include <dlfcn.h>
 #include <execinfo.h>
@@ -50,6 +51,7 @@ bool watched[kDescriptors];  // descriptors of files below the root
 std::string* root = nullptr;
 FaultControl* control = nullptr;
 int trace = -1;
+std::atomic<int> full{-1};  // a descriptor whose next write finds no room
 pthread_mutex_t mutex = PTHREAD_RECURSIVE_MUTEX_INITIALIZER_NP;
 std::uintptr_t program_begin = 0, program_end = 0;
 
@@ -135,7 +137,9 @@ std::string below_root(int folder, const char* given, bool follow) {
   std::string path = given;
   if (path.empty()) return kElsewhere;
   if (path.front() == '/') {
-    if (path.compare(0, root->size(), *root) != 0 && path.compare(0, 13, "/proc/self/fd") != 0) return kElsewhere;
+    // The same folder may be given by another name, so that the start of the name tells nothing but here.
+    const bool descriptor = path.compare(0, 13, "/proc/self/fd") == 0;
+    if (!descriptor && (path.compare(0, 6, "/proc/") == 0 || path.compare(0, 5, "/sys/") == 0)) return kElsewhere;
   } else {
     path =
         (folder == AT_FDCWD ? link_target("/proc/self/cwd") : link_target("/proc/self/fd/" + std::to_string(folder))) +
@@ -159,6 +163,17 @@ std::string below_root(int folder, const char* given, bool follow) {
   if (found == *root) return "";
   if (found.compare(0, root->size() + 1, *root + "/") != 0) return kElsewhere;
   return found.substr(root->size() + 1);
+}
+
+// What a name stands for: files and folders are recorded.
+enum class Named { kNothing, kRecorded, kOther };
+Named what_is(int folder, const char* path) {
+  struct stat facts {};
+  const int error = errno;
+  const bool known = ::fstatat(folder, path, &facts, AT_SYMLINK_NOFOLLOW) == 0;
+  errno = error;
+  if (!known) return Named::kNothing;
+  return S_ISREG(facts.st_mode) || S_ISDIR(facts.st_mode) ? Named::kRecorded : Named::kOther;
 }
 
 bool in_program(const void* address) {
@@ -230,6 +245,7 @@ __attribute__((constructor)) void begin() {
 int opened(int folder, const char* path, int flags, mode_t mode) {
   const InOrder order;
   const std::string below = below_root(folder, path, (flags & O_NOFOLLOW) == 0);
+  if (below != kElsewhere && (flags & O_TMPFILE) == O_TMPFILE) give_up("a file without a name");
   if (below != kElsewhere && faulty(FaultKind::kOpen)) return -1;
   const int fd = NEXT(openat)(folder, path, flags, mode);
   if (fd >= 0 && root != nullptr) {
@@ -287,9 +303,13 @@ int resized(int result, int fd, OperationKind kind, std::uint64_t size) {
 int renamed(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) {
   const InOrder order;
   const std::string a = below_root(from_folder, from, false), b = below_root(to_folder, to, false);
+  const Named moved = what_is(from_folder, from), replaced = what_is(to_folder, to);
   const int result = NEXT(renameat2)(from_folder, from, to_folder, to, flags);
   if (result == 0 && (a != kElsewhere) != (b != kElsewhere)) give_up("a rename across the root");
-  if (result == 0 && a != kElsewhere) record({OperationKind::kRename, -1, static_cast<int>(flags)}, a, b);
+  if (result == 0 && a != kElsewhere && replaced != Named::kNothing && replaced != moved)
+    give_up("a rename between what is recorded and what is not");
+  if (result == 0 && a != kElsewhere && moved == Named::kRecorded)
+    record({OperationKind::kRename, -1, static_cast<int>(flags)}, a, b);
   return result;
 }
 
@@ -297,7 +317,9 @@ int linked(int from_folder, const char* from, int to_folder, const char* to, int
   const InOrder order;
   const std::string a = below_root(from_folder, from, false), b = below_root(to_folder, to, false);
   const int result = NEXT(linkat)(from_folder, from, to_folder, to, flags);
-  if (result == 0 && a != kElsewhere && b != kElsewhere) record({OperationKind::kLink}, a, b);
+  if (result == 0 && b != kElsewhere && (a == kElsewhere || what_is(to_folder, to) != Named::kRecorded))
+    give_up("a link to what is not recorded");
+  if (result == 0 && b != kElsewhere) record({OperationKind::kLink}, a, b);
   return result;
 }
 
@@ -305,8 +327,9 @@ template <typename Remove>
 int removed(int folder, const char* path, const Remove& remove) {
   const InOrder order;
   const std::string below = below_root(folder, path, false);
+  const bool recorded = below != kElsewhere && what_is(folder, path) == Named::kRecorded;
   const int result = remove();
-  if (result == 0 && below != kElsewhere) record({OperationKind::kRemove}, below);
+  if (result == 0 && recorded) record({OperationKind::kRemove}, below);
   return result;
 }
 
@@ -322,9 +345,10 @@ template <typename Sync>
 int synced(int fd, const Sync& sync) {
   if (!is_watched(fd)) return sync();
   const InOrder order;
-  if (faulty(FaultKind::kSync)) return -1;
-  const int result = sync();
-  if (result == 0) record({OperationKind::kSync, fd});
+  // Whoever acknowledges something before its sync has returned has time to do so.
+  if (trace >= 0) ::usleep(5000);
+  const int result = faulty(FaultKind::kSync) ? -1 : sync();
+  record({result == 0 ? OperationKind::kSync : OperationKind::kFailedSync, fd});
   return result;
 }
 
@@ -333,6 +357,8 @@ auto closed(int fd, const Close& close) {
   if (!is_watched(fd)) return close();
   const InOrder order;
   watch(fd, false);
+  int closing = fd;
+  full.compare_exchange_strong(closing, -1);
   record({OperationKind::kClose, fd});
   return close();
 }
@@ -346,20 +372,94 @@ mode_t mode_of(int flags, va_list arguments) {
   const mode_t mode = mode_of(flags, arguments); \
   va_end(arguments)
 
+// A write to a full disk stores what there is room for, and the next one to the file fails. So half is written, or
+// copied, by `write`, which gets the number of bytes.
 template <typename Write>
-ssize_t watched_write(int fd, std::int64_t offset, const void* data, const Write& write) {
-  if (!is_watched(fd)) return write();
+ssize_t faulty_write(int fd, std::size_t size, const Write& write) {
+  if (int expected = fd; full.compare_exchange_strong(expected, -1)) {
+    errno = ENOSPC;
+    return -1;
+  }
+  if (!faulty(FaultKind::kWrite)) return write(size);
+  if (errno != ENOSPC || size < 2) return -1;
+  const ssize_t n = write(size / 2);
+  if (n > 0) full = fd;
+  return n;
+}
+
+template <typename Write>
+ssize_t watched_write(int fd, std::int64_t offset, const void* data, std::size_t size, const Write& write) {
+  if (!is_watched(fd)) return write(size);
   const InOrder order;
-  if (faulty(FaultKind::kWrite)) return -1;
-  const ssize_t n = write();
+  if (offset >= 0 && trace >= 0 && (::fcntl(fd, F_GETFL) & O_APPEND) != 0)
+    give_up("a write at an offset of a file that is appended to, which Linux appends");
+  const ssize_t n = faulty_write(fd, size, write);
   written(fd, offset, data, n);
   return n;
 }
-template <typename Write>
-ssize_t watched_gather(int fd, std::int64_t offset, const iovec* parts, int count, const Write& write) {
-  if (!is_watched(fd)) return write();
+// `gather` writes all parts, `write` the first bytes of what they hold.
+template <typename Gather, typename Write>
+ssize_t watched_gather(int fd, std::int64_t offset, const iovec* parts, int count, const Gather& gather,
+                       const Write& write) {
+  if (!is_watched(fd)) return gather();
   const std::string all = joined(parts, count);
-  return watched_write(fd, offset, all.data(), write);
+  return watched_write(fd, offset, all.data(), all.size(),
+                       [&](std::size_t size) { return size == all.size() ? gather() : write(all.data(), size); });
+}
+
+// A descriptor that stands for the same file as another.
+int duplicated(int fd, int copy) {
+  if (copy < 0 || copy == fd || root == nullptr) return copy;
+  const bool closes = is_watched(copy);
+  watch(copy, is_watched(fd));
+  if (is_watched(fd))
+    record({OperationKind::kDuplicate, fd, copy});
+  else if (closes)
+    record({OperationKind::kClose, copy});
+  return copy;
+}
+
+template <typename Control>
+int controlled(int fd, int command, const Control& control_it) {
+  if (command != F_DUPFD && command != F_DUPFD_CLOEXEC) return control_it();
+  const InOrder order;
+  return duplicated(fd, control_it());
+}
+
+// System calls that would change files below the root unseen: those that take a descriptor, and those that take a path
+// first or behind the descriptor of a folder.
+bool writes_to_descriptor(long number) {
+  switch (number) {
+    case SYS_write:
+    case SYS_pwrite64:
+    case SYS_writev:
+    case SYS_pwritev:
+    case SYS_pwritev2:
+    case SYS_ftruncate:
+    case SYS_fallocate:
+    case SYS_fsync:
+    case SYS_fdatasync:
+    case SYS_dup:
+    case SYS_dup3:
+    case SYS_close:
+    case SYS_sendfile:
+      return true;
+    default:
+      return false;
+  }
+}
+bool writes_to_path_in_folder(long number) {
+  switch (number) {
+    case SYS_openat:
+    case SYS_renameat:
+    case SYS_linkat:
+    case SYS_symlinkat:
+    case SYS_unlinkat:
+    case SYS_mkdirat:
+      return true;
+    default:
+      return false;
+  }
 }
 
 void* allocated(const void* caller) {
@@ -405,36 +505,38 @@ FILE* fopen(const char* path, const char* mode) { return opened_stream(NEXT(fope
 FILE* fopen64(const char* path, const char* mode) { return opened_stream(NEXT(fopen64), path, mode); }
 
 ssize_t write(int fd, const void* data, size_t size) {
-  return watched_write(fd, -1, data, [&] { return NEXT(write)(fd, data, size); });
+  return watched_write(fd, -1, data, size, [&](std::size_t n) { return NEXT(write)(fd, data, n); });
 }
 ssize_t pwrite(int fd, const void* data, size_t size, off_t offset) {
-  return watched_write(fd, offset, data, [&] { return NEXT(pwrite)(fd, data, size, offset); });
+  return watched_write(fd, offset, data, size, [&](std::size_t n) { return NEXT(pwrite)(fd, data, n, offset); });
 }
 ssize_t pwrite64(int fd, const void* data, size_t size, off64_t offset) {
-  return watched_write(fd, offset, data, [&] { return NEXT(pwrite64)(fd, data, size, offset); });
+  return watched_write(fd, offset, data, size, [&](std::size_t n) { return NEXT(pwrite64)(fd, data, n, offset); });
 }
 ssize_t writev(int fd, const iovec* parts, int count) {
-  return watched_gather(fd, -1, parts, count, [&] { return NEXT(writev)(fd, parts, count); });
+  return watched_gather(
+      fd, -1, parts, count, [&] { return NEXT(writev)(fd, parts, count); },
+      [&](const char* data, std::size_t n) { return NEXT(write)(fd, data, n); });
 }
 ssize_t pwritev(int fd, const iovec* parts, int count, off_t offset) {
-  return watched_gather(fd, offset, parts, count, [&] { return NEXT(pwritev)(fd, parts, count, offset); });
+  return watched_gather(
+      fd, offset, parts, count, [&] { return NEXT(pwritev)(fd, parts, count, offset); },
+      [&](const char* data, std::size_t n) { return NEXT(pwrite)(fd, data, n, offset); });
 }
-ssize_t pwritev64(int fd, const iovec* parts, int count, off64_t offset) {
-  return watched_gather(fd, offset, parts, count, [&] { return NEXT(pwritev64)(fd, parts, count, offset); });
-}
+ssize_t pwritev64(int fd, const iovec* parts, int count, off64_t offset) { return pwritev(fd, parts, count, offset); }
 ssize_t copy_file_range(int in, off64_t* in_offset, int out, off64_t* out_offset, size_t size, unsigned flags) {
   if (!is_watched(out)) return NEXT(copy_file_range)(in, in_offset, out, out_offset, size, flags);
   const InOrder order;
-  if (faulty(FaultKind::kWrite)) return -1;
-  const ssize_t n = NEXT(copy_file_range)(in, in_offset, out, out_offset, size, flags);
+  const ssize_t n = faulty_write(out, size, [&](std::size_t bytes) {
+    return NEXT(copy_file_range)(in, in_offset, out, out_offset, bytes, flags);
+  });
   copied(out, (out_offset != nullptr ? *out_offset : ::lseek(out, 0, SEEK_CUR)) - n, n);
   return n;
 }
 ssize_t sendfile(int out, int in, off_t* offset, size_t size) {
   if (!is_watched(out)) return NEXT(sendfile)(out, in, offset, size);
   const InOrder order;
-  if (faulty(FaultKind::kWrite)) return -1;
-  const ssize_t n = NEXT(sendfile)(out, in, offset, size);
+  const ssize_t n = faulty_write(out, size, [&](std::size_t bytes) { return NEXT(sendfile)(out, in, offset, bytes); });
   copied(out, ::lseek(out, 0, SEEK_CUR) - n, n);
   return n;
 }
@@ -459,10 +561,13 @@ int truncate64(const char* path, off64_t size) { return truncate(path, size); }
 int fallocate(int fd, int mode, off_t offset, off_t size) {
   if (!is_watched(fd)) return NEXT(fallocate)(fd, mode, offset, size);
   const InOrder order;
+  struct stat before {};
+  if (::fstat(fd, &before) != 0) give_up("a file cannot be looked at");
   const int result = NEXT(fallocate)(fd, mode, offset, size);
   if (result == 0 && (mode & ~FALLOC_FL_KEEP_SIZE) != 0 && (mode & FALLOC_FL_PUNCH_HOLE) == 0)
     give_up("a kind of fallocate that is not known");
-  // A hole is punched only into what lies behind the end of a file, by RocksDB.
+  // RocksDB punches holes only into what lies behind the end of a file.
+  if (result == 0 && (mode & FALLOC_FL_PUNCH_HOLE) != 0 && offset < before.st_size) give_up("a hole within a file");
   if ((mode & FALLOC_FL_KEEP_SIZE) != 0) return result;
   return resized(result, fd, OperationKind::kExtend, static_cast<std::uint64_t>(offset + size));
 }
@@ -519,31 +624,44 @@ int closedir(DIR* folder) {
 }
 int dup(int fd) {
   const InOrder order;
-  const int copy = NEXT(dup)(fd);
-  if (copy >= 0 && is_watched(fd)) {
-    watch(copy, true);
-    record({OperationKind::kDuplicate, fd, copy});
-  }
-  return copy;
+  return duplicated(fd, NEXT(dup)(fd));
 }
-
 int dup2(int fd, int copy) {
   const InOrder order;
-  const int result = NEXT(dup2)(fd, copy);
-  if (result >= 0 && fd != copy && root != nullptr && (is_watched(fd) || is_watched(copy))) {
-    watch(copy, is_watched(fd));
-    if (is_watched(fd))
-      record({OperationKind::kDuplicate, fd, copy});
-    else
-      record({OperationKind::kClose, copy});
-  }
-  return result;
+  return duplicated(fd, NEXT(dup2)(fd, copy));
 }
+int dup3(int fd, int copy, int flags) {
+  const InOrder order;
+  return duplicated(fd, NEXT(dup3)(fd, copy, flags));
+}
+int fcntl(int fd, int command, ...) {
+  va_list arguments;
+  va_start(arguments, command);
+  void* const argument = va_arg(arguments, void*);
+  va_end(arguments);
+  return controlled(fd, command, [&] { return NEXT(fcntl)(fd, command, argument); });
+}
+int fcntl64(int fd, int command, ...) {
+  va_list arguments;
+  va_start(arguments, command);
+  void* const argument = va_arg(arguments, void*);
+  va_end(arguments);
+  return controlled(fd, command, [&] { return NEXT(fcntl64)(fd, command, argument); });
+}
+
+int symlinkat(const char* target, int folder, const char* path) {
+  if (below_root(folder, path, false) != kElsewhere) give_up("a symbolic link");
+  return NEXT(symlinkat)(target, folder, path);
+}
+int symlink(const char* target, const char* path) { return symlinkat(target, AT_FDCWD, path); }
 
 void* mmap(void* address, size_t size, int protection, int flags, int fd, off_t offset) {
   if (is_watched(fd) && (flags & MAP_SHARED) != 0 && (protection & PROT_WRITE) != 0)
     give_up("a writable shared map, whose writes cannot be seen");
   return NEXT(mmap)(address, size, protection, flags, fd, offset);
+}
+void* mmap64(void* address, size_t size, int protection, int flags, int fd, off64_t offset) {
+  return mmap(address, size, protection, flags, fd, offset);
 }
 
 long syscall(long number, ...) {
@@ -567,6 +685,12 @@ long syscall(long number, ...) {
       record({OperationKind::kOpen, static_cast<int>(fd), static_cast<int>(flags)}, below);
     return fd;
   }
+  const int first = static_cast<int>(a[0]);
+  if ((writes_to_descriptor(number) && is_watched(first)) ||
+      (number == SYS_copy_file_range && is_watched(static_cast<int>(a[2]))) ||
+      (writes_to_path_in_folder(number) &&
+       below_root(first, text(number == SYS_symlinkat ? a[2] : a[1]), true) != kElsewhere))
+    give_up("a direct system call");
   return NEXT(syscall)(number, a[0], a[1], a[2], a[3], a[4], a[5]);
 }
 

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -30,13 +31,14 @@ class Interposer : public ::testing::Test {
 };
 
 TEST_F(Interposer, WhatItRecordsMakesTheSameFilesAgain) {
+  fs::create_symlink("there", folder_ / "disk/link");  // of which nothing is recorded
   const FileFaults faults(folder_ / "disk", folder_ / "notes", Recording::kOn);
   DiskModel disk(folder_ / "disk");
   const Finished run =
       shell(faults,
             "mkdir -p a/b && echo one > a/b/file && echo two >> a/b/file && ln a/b/file a/second && "
             "mv a/b there/c && truncate -s 5 a/second && cp a/second copy && sync copy && rm a/second && "
-            "mkdir gone && rmdir gone && ln -s there link && echo three > link/../link/linked && rm link");
+            "mkdir gone && rmdir gone && echo three > link/../link/linked && rm link");
   ASSERT_EQ(run.exit_code, 0) << run.standard_error;
   const auto operations = faults.operations();
   EXPECT_EQ(operations.size(), faults.recorded());
@@ -60,11 +62,39 @@ TEST_F(Interposer, TheNthOperationFailsOnce) {
   EXPECT_EQ(faults.count(FaultKind::kOpen), 3u);
 
   FileFaults writes(folder_ / "disk", folder_ / "notes", Recording::kOff);
-  writes.fail(FaultKind::kWrite, 1, ENOSPC);
-  EXPECT_THAT(shell(writes, "cp one four").standard_error, HasSubstr("No space left"));
-  FileFaults syncs(folder_ / "disk", folder_ / "notes", Recording::kOff);
+  writes.fail(FaultKind::kWrite, 1, EIO);
+  EXPECT_THAT(shell(writes, "cp one four").standard_error, HasSubstr("Input/output error"));
+  FileFaults syncs(folder_ / "disk", folder_ / "notes", Recording::kOn);
   syncs.fail(FaultKind::kSync, 1, EIO);
   EXPECT_THAT(shell(syncs, "sync one").standard_error, HasSubstr("Input/output error"));
+  const auto operations = syncs.operations();
+  EXPECT_EQ(std::count_if(operations.begin(), operations.end(),
+                          [](const FileOperation& one) { return one.kind == OperationKind::kFailedSync; }),
+            1);
+}
+
+TEST_F(Interposer, AFullDiskTakesAPartOfAWriteAndNothingOfTheNext) {
+  FileFaults faults(folder_ / "disk", folder_ / "notes", Recording::kOn);
+  faults.fail(FaultKind::kWrite, 1, ENOSPC);
+  EXPECT_THAT(shell(faults, "dd if=/dev/zero of=file bs=1000 count=1").standard_error, HasSubstr("No space left"));
+  EXPECT_EQ(fs::file_size(folder_ / "disk/file"), 500u);
+  std::size_t bytes = 0;
+  for (const FileOperation& operation : faults.operations()) bytes += operation.bytes.size();
+  EXPECT_EQ(bytes, 500u);
+}
+
+TEST_F(Interposer, WhatCannotBeRecordedEndsTheProgram) {
+  const FileFaults faults(folder_ / "disk", folder_ / "notes", Recording::kOn);
+  EXPECT_EQ(shell(faults, "ln -s there link").exit_code, 99);
+  EXPECT_EQ(shell(faults, "ln -s there ../link").exit_code, 0);
+}
+
+TEST_F(Interposer, AnotherNameOfTheFolderIsTheSameFolder) {
+  fs::create_directory_symlink(folder_ / "disk", folder_ / "alias");
+  const FileFaults faults(folder_ / "disk", folder_ / "notes", Recording::kOn);
+  EXPECT_EQ(shell(faults, "echo one > " + (folder_ / "alias/one") + " && rm " + (folder_ / "alias/one")).exit_code, 0);
+  EXPECT_EQ(faults.operations().size(), faults.recorded());
+  EXPECT_GE(faults.recorded(), 4u) << "open, write, close, remove";
 }
 
 TEST_F(Interposer, TheNthOperationHangs) {

@@ -59,9 +59,13 @@ SweepResult fail_power_during(DiskModel disk, const std::vector<FileOperation>& 
     ++done;
     if (done * moments / result.operations == chosen) continue;  // the last operation is always among them
     ++chosen;
+    // What follows without changing the disk makes no difference to it: an end that was reached, or an acknowledgement
+    // that was given after a file was closed, counts.
+    std::size_t through = i + 1;
+    while (through < operations.size() && !changes_disk(operations[through])) ++through;
     for (int seed = 0; seed <= how.seeds; ++seed) {
       const Folder folder;
-      const LeftDisk left{folder.path() + "/disk", i + 1, result.states};
+      const LeftDisk left{folder.path() + "/disk", through, through == operations.size(), result.states};
       const std::uint64_t chance = done * 1000 + static_cast<std::uint64_t>(seed);
       try {
         disk.lay_out(left.root, seed == 0 ? Survives::kDurable : Survives::kSome, chance);

@@ -19,7 +19,8 @@ struct Thoroughness {
 // A disk as a power failure left it.
 struct LeftDisk {
   std::string root;
-  std::uint64_t operations = 0;  // done before the failure
+  std::uint64_t operations = 0;  // of the trace, done before the failure
+  bool finished = false;         // these were all
   std::uint64_t number = 0;      // of this state, from 0
 };
 

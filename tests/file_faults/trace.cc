@@ -45,8 +45,8 @@ bool changes_disk(const FileOperation& operation) {
 }
 
 std::string to_string(const FileOperation& operation) {
-  constexpr std::array kNames{"open",   "close", "duplicate", "write", "resize", "resize",
-                              "extend", "sync",  "rename",    "link",  "remove", "make folder"};
+  constexpr std::array kNames{"open", "close",       "duplicate", "write", "resize", "resize",     "extend",
+                              "sync", "failed sync", "rename",    "link",  "remove", "make folder"};
   std::string text = kNames.at(static_cast<std::size_t>(operation.kind));
   if (operation.fd >= 0) text += " " + std::to_string(operation.fd);
   if (!operation.path.empty()) text += " " + operation.path;
