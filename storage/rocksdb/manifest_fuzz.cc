@@ -25,6 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     put_log_record(w, record);
   }
   must(bytes <= log.size() && read_log(w.bytes()) == records);
+  must(length_without_torn_end(log) <= log.size());
+  must(length_without_torn_end(w.bytes()) == w.size());
 
   std::vector<BlobFile> blobs;
   for (std::size_t i = 0; i < data[0] % 4u; ++i) {

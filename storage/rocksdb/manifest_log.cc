@@ -13,6 +13,24 @@ namespace {
 // 3 middle, 4 last).
 constexpr std::size_t kLogBlock = 32768, kPieceHeader = 7;
 
+// Of a type and what follows it, as RocksDB masks it.
+std::uint32_t piece_crc(ByteSpan typed) {
+  const std::uint32_t crc = crc32c(typed);
+  return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
+}
+
+// Whether some sector has nothing but zeros in these bytes of a file.
+bool lacks_a_sector(ByteSpan file, std::size_t begin) {
+  constexpr std::size_t kSector = 512;
+  while (begin < file.size()) {
+    const std::size_t end = std::min(file.size(), (begin / kSector + 1) * kSector);
+    const ByteSpan part = file.subspan(begin, end - begin);
+    if (std::all_of(part.begin(), part.end(), [](std::uint8_t byte) { return byte == 0; })) return true;
+    begin = end;
+  }
+  return false;
+}
+
 // The edit of a MANIFEST that adds a blob file.
 Bytes blob_addition(const BlobFile& blob) {
   constexpr std::uint64_t kTag = 400, kFamilyTag = 200;
@@ -58,6 +76,26 @@ std::vector<Bytes> read_log(ByteSpan log) {
   return records;
 }
 
+std::size_t length_without_torn_end(ByteSpan log) {
+  std::size_t whole = 0;
+  for (std::size_t at = 0; at + kPieceHeader <= log.size();) {
+    if (kLogBlock - at % kLogBlock < kPieceHeader) {
+      at += kLogBlock - at % kLogBlock;
+      continue;
+    }
+    ByteReader r(log.subspan(at));
+    const auto crc = r.get<std::uint32_t>();
+    const auto length = r.get<std::uint16_t>();
+    const std::size_t end = at + kPieceHeader + length;
+    if (end > log.size()) break;  // cut off, which RocksDB takes for an end
+    const ByteSpan typed = log.subspan(at + kPieceHeader - 1, std::size_t{1} + length);
+    if (piece_crc(typed) != crc) return end == log.size() && lacks_a_sector(log, at) ? whole : log.size();
+    if (typed[0] == 1 || typed[0] == 4) whole = end;
+    at = end;
+  }
+  return log.size();
+}
+
 void put_log_record(ByteWriter& w, ByteSpan record) {
   for (bool first = true, last = false; !last; first = false) {
     std::size_t left = kLogBlock - w.size() % kLogBlock;
@@ -70,8 +108,7 @@ void put_log_record(ByteWriter& w, ByteSpan record) {
     last = record.empty();
     Bytes typed{static_cast<std::uint8_t>(first ? (last ? 1 : 2) : (last ? 4 : 3))};
     typed.insert(typed.end(), piece.begin(), piece.end());
-    const std::uint32_t crc = crc32c(typed);
-    w.put(((crc >> 15) | (crc << 17)) + 0xa282ead8u);  // as RocksDB masks it
+    w.put(piece_crc(typed));
     w.put(static_cast<std::uint16_t>(piece.size()));
     w.put_bytes(typed);
   }

@@ -1,4 +1,5 @@
-// The log in which RocksDB lists the files of a store (MANIFEST), as far as salvage has to read and change it.
+// The log in which RocksDB lists the files of a store (MANIFEST), as far as salvage and a start after a power failure
+// have to read and change it.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,10 @@ namespace relmap::storage {
 // The records of a log, up to the first byte that cannot be one. Checksums are not compared: salvage reads logs that
 // RocksDB has just written.
 std::vector<Bytes> read_log(ByteSpan log);
+// The length of a log without its last record, if that is torn: if its checksum is wrong, it is the last, and some
+// sector of 512 bytes holds nothing but zeros of it, as one that a power failure kept from being written. Otherwise the
+// length of the log: what a flipped bit spoils is no torn end.
+std::size_t length_without_torn_end(ByteSpan log);
 // Appends a record to a log that begins with `w`.
 void put_log_record(ByteWriter& w, ByteSpan record);
 

@@ -2,9 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
+#include "storage/rocksdb/manifest_log.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 
@@ -115,6 +118,44 @@ TEST_F(RocksDbDamage, WithoutItsCurrentOrManifestTheMapIsRefusedByNameAndNothing
   flip(folder_ / ("data/map/" + manifest), 20);
   EXPECT_EQ(files(".sst").size(), tables);
   EXPECT_EQ(lost(*open().or_throw()), 0);
+}
+
+TEST_F(RocksDbDamage, AListOfFilesWithATornEndIsNoLossAndOneWithAFlippedBitThereIsDamaged) {
+  std::string name;
+  std::ifstream(folder_ / "data/map/CURRENT") >> name;
+  std::ostringstream before;
+  before << std::ifstream(folder_ / ("data/map/" + name), std::ios::binary).rdbuf();
+  const std::size_t begin = before.str().size();
+  ByteWriter w;
+  w.put_bytes(as_bytes(before.str()));
+  put_log_record(w, Bytes(700, 7));  // as of a flush whose sync has not returned
+  const Bytes whole = w.take();
+  fs::rename(folder_ / "data", folder_ / "kept");
+  const auto open_with = [&](const Bytes& manifest) {
+    fs::remove_all(folder_ / "data");
+    fs::copy(folder_ / "kept", folder_ / "data", fs::copy_options::recursive);
+    std::ofstream(folder_ / ("data/map/" + name), std::ios::binary)
+        .write(reinterpret_cast<const char*>(manifest.data()), static_cast<std::streamsize>(manifest.size()));
+    return open();
+  };
+
+  EXPECT_EQ(length_without_torn_end(whole), whole.size());
+  Bytes flipped = whole;
+  flipped[whole.size() - 100] ^= 1;
+  EXPECT_EQ(length_without_torn_end(flipped), whole.size());
+  const auto damaged = open_with(flipped);
+  EXPECT_TRUE(!damaged.ok() || (*damaged)->acquire().reason() == Reason::DATA_LOSS);
+
+  // Each sector of the record may be the one that was not written.
+  for (std::size_t at = begin; at < whole.size(); at = (at / 512 + 1) * 512) {
+    Bytes torn = whole;
+    const std::size_t end = std::min(whole.size(), (at / 512 + 1) * 512);
+    std::fill(torn.begin() + static_cast<std::ptrdiff_t>(at), torn.begin() + static_cast<std::ptrdiff_t>(end), 0);
+    const auto engine = open_with(torn);
+    ASSERT_TRUE(engine.ok()) << at << ": " << engine.status().to_string();
+    EXPECT_TRUE((*engine)->acquire().ok()) << at;
+    EXPECT_EQ(lost(**engine), 0);
+  }
 }
 
 TEST_F(RocksDbDamage, ALogThatTheJournalCoversIsNoLossAndOneThatItDoesNotIsNamed) {

@@ -348,9 +348,9 @@ Status check_current(const std::string& directory) {
   return {};
 }
 
-// Whether the journal goes on from where RocksDB's log can be read to. Of a commit that was being written when the
-// power failed any part may be there, which looks like damage; but nobody was told of it, and the journal has its
-// records.
+// Whether the journal goes on from where RocksDB's log and its list of files can be read to. Of what was being written
+// to them when the power failed any part may be there, which looks like damage; but nobody was told of a commit in it,
+// and the journal has its records. RocksDB removes a log only after the list says durably what took its place.
 bool journal_goes_on(const rocksdb::Options& options, const std::string& directory,
                      const std::shared_ptr<FileSystem>& files) {
   std::unique_ptr<MapDatabase> map;
@@ -408,7 +408,9 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
   if (opened.reason() == Reason::DISK_FULL && database->space && database->space->give_up_reserve()) opened = open();
   if (opened.reason() == Reason::DATA_LOSS) {
     settings.wal_recovery_mode = rocksdb::WALRecoveryMode::kPointInTimeRecovery;
+    *database->settings.forgive_torn_manifest = true;
     if (options.read_only || journal_goes_on(settings, directory, files)) opened = open();
+    *database->settings.forgive_torn_manifest = false;
   }
   if (!opened.ok()) return opened;
   const auto root = read_root(database->db());

@@ -3,6 +3,7 @@
 
 #include <rocksdb/options.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -14,6 +15,7 @@ struct RocksDbSettings {
   std::shared_ptr<rocksdb::Env> env;  // must outlive what the options hold
   std::shared_ptr<rocksdb::Cache> cache;
   rocksdb::Options options;
+  std::shared_ptr<std::atomic<bool>> forgive_torn_manifest;  // see torn_manifest.h
 };
 RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOptions& options);
 
