@@ -1,25 +1,26 @@
 // The n-th open, write, sync or allocation of relmapd fails or hangs, while a robot sends a drive, an operator labels a
-// frame and has the map committed, and readers ask. Readers are answered meanwhile; the daemon goes on, or ends with a
-// reason; the next start has everything that was acknowledged.
+// frame and has the map committed and compacted, and readers ask. Readers are answered meanwhile; the daemon goes on,
+// or ends with a reason; the next start has everything that was acknowledged.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <filesystem>
 #include <future>
 #include <regex>
 #include <thread>
 
 #include "proto/base/crc32c.h"
-#include "storage/maintenance/verify.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/file_faults/traced_program.h"
 #include "tests/support/hand_robot.h"
 #include "tests/support/running_daemon.h"
+#include "tests/support/small_world.h"
 #include "tests/support/stored_map.h"
-#include "tools/sim/points_world.h"
+#include "tests/support/verify_findings.h"
 
 namespace relmap::testing {
 namespace {
@@ -33,15 +34,7 @@ using std::chrono::steady_clock;
 constexpr std::uint32_t kFrames = 24, kLabelled = 3;
 constexpr const char* kLabel = "dock";
 
-sim::PointsWorldOptions world_options() {
-  sim::PointsWorldOptions options;
-  options.frames = kFrames;
-  options.frames_per_lap = 16;
-  options.speed = 0.4;
-  options.births = 16;
-  options.appearance = 80;
-  return options;
-}
+constexpr std::array kKindNames{"open", "write", "sync", "allocation"};
 
 struct Fault {
   FaultKind kind = FaultKind::kOpen;
@@ -50,20 +43,22 @@ struct Fault {
   milliseconds hang{0};
 
   std::string to_string() const {
-    constexpr std::array kNames{"open", "write", "sync", "allocation"};
-    return std::string(kNames.at(static_cast<std::size_t>(kind))) + " " + std::to_string(n) +
+    return std::string(kKindNames.at(static_cast<std::size_t>(kind))) + " " + std::to_string(n) +
            (error == 0 ? " hangs" : std::string(" fails: ") + std::strerror(error));
   }
 };
 
 struct Course {
+  Fault fault;
   bool hit = false;
+  bool hit_at_work = false;        // while the daemon served and readers asked
   bool ended = false;              // by itself
   std::uint32_t acknowledged = 0;  // keyframes
   std::uint64_t reads = 0;         // answered with what was asked for
   std::uint64_t meanwhile = 0;     // of them while an operation hung
   milliseconds slowest{0};
-  std::array<std::uint64_t, kFaultKinds> counts{};
+  milliseconds took{0};  // the whole run
+  std::array<std::uint64_t, kFaultKinds> counts{}, before_work{}, after_work{};
   std::string last_words;
   std::vector<std::string> wrong;
 };
@@ -71,53 +66,75 @@ struct Course {
 // Asks again and again until it is told to stop.
 class Reader {
  public:
-  Reader(const RunningDaemon& daemon, const FileFaults& faults, milliseconds pause)
-      : client_(daemon.client()), faults_(faults), pause_(pause), thread_([this] { ask(); }) {}
+  Reader(client::Client& client, const FileFaults& faults, milliseconds pause)
+      : client_(client), faults_(faults), pause_(pause), thread_([this] { ask(); }) {}
   ~Reader() { stop(); }
   void stop() {
     going_ = false;
     if (thread_.joinable()) thread_.join();
   }
   std::uint64_t answers() const { return answers_; }
-  std::uint64_t meanwhile() const { return meanwhile_; }  // from before to after, an operation hung
+  std::uint64_t meanwhile() const { return meanwhile_; }  // answers during the whole of which an operation hung
   milliseconds slowest() const { return milliseconds(slowest_ms_); }
+  // Answers that are neither what was asked for, nor that there is no such thing yet, nor that nobody answers. After
+  // stop().
+  const std::vector<std::string>& refusals() const { return refusals_; }
+  std::uint64_t unreachable() const { return unreachable_; }  // nobody answered
 
  private:
+  static bool is_answered(Reason reason) { return reason == Reason::OK || reason == Reason::NEW_PLACE; }
+  static bool is_expected(Reason reason) {
+    switch (reason) {
+      case Reason::UNREACHABLE:
+      case Reason::DEADLINE:
+      case Reason::NO_SUCH_SESSION:
+      case Reason::NO_SUCH_FRAME:
+        return true;
+      default:
+        return false;
+    }
+  }
   void timed(const std::function<Status()>& question) {
     const auto start = steady_clock::now();
     const bool hung = faults_.hanging();
     const Status answer = question();
     const auto took = std::chrono::duration_cast<milliseconds>(steady_clock::now() - start);
-    if (answer.ok()) ++answers_;
-    if (answer.ok() && hung && faults_.hanging()) ++meanwhile_;
-    if (answer.reason() != Reason::UNREACHABLE)  // it has ended
+    if (is_answered(answer.reason())) {
+      ++answers_;
+      if (hung && faults_.hanging()) ++meanwhile_;
+    } else if (!is_expected(answer.reason())) {
+      refusals_.push_back(answer.to_string());
+    }
+    if (answer.reason() == Reason::UNREACHABLE)
+      ++unreachable_;
+    else
       slowest_ms_ = std::max<std::int64_t>(slowest_ms_, took.count());
   }
   void ask() {
     while (going_) {
-      timed([&] { return client_->status().status(); });
-      timed([&] { return client_->find_route({.from = FrameId{1, 0}, .to = FrameId{1, 4}}).status(); });
-      timed([&] {
-        return client_->localise({.left = "", .right = "", .camera = {}, .frame = FrameId{1, 2}}).status();
-      });
+      timed([&] { return client_.status().status(); });
+      timed([&] { return client_.find_route({.from = FrameId{1, 0}, .to = FrameId{1, 4}}).status(); });
+      timed([&] { return client_.localise({.left = "", .right = "", .camera = {}, .frame = FrameId{1, 2}}).status(); });
       std::this_thread::sleep_for(pause_);
     }
   }
 
-  const std::unique_ptr<client::Client> client_;
+  client::Client& client_;
   const FileFaults& faults_;
   const milliseconds pause_;
   std::atomic<bool> going_{true};
-  std::atomic<std::uint64_t> answers_{0}, meanwhile_{0};
+  std::atomic<std::uint64_t> answers_{0}, meanwhile_{0}, unreachable_{0};
   std::atomic<std::int64_t> slowest_ms_{0};
+  std::vector<std::string> refusals_;
   std::thread thread_;
 };
 
 class FaultyRun {
  public:
-  explicit FaultyRun(const Fault& fault) : fault_(fault) {}
+  explicit FaultyRun(const Fault& fault) : fault_(fault) { course_.fault = fault; }
 
   Course everything() {
+    const auto start = steady_clock::now();
     try {
       options_.data = folder_ / "disk/map";
       options_.lcm = random_lcm_url();
@@ -127,6 +144,7 @@ class FaultyRun {
     } catch (const std::exception& error) {
       wrong(error.what());
     }
+    course_.took = std::chrono::duration_cast<milliseconds>(steady_clock::now() - start);
     return course_;
   }
 
@@ -140,7 +158,10 @@ class FaultyRun {
     const auto deadline = steady_clock::now() + kPatience;
     while (daemon.process().running() && !daemon.serving() && steady_clock::now() < deadline)
       std::this_thread::sleep_for(milliseconds(5));
-    if (daemon.serving() && daemon.process().running()) work(daemon, faults);
+    if (daemon.serving())
+      work(daemon, faults);
+    else if (daemon.process().running())
+      wrong("the daemon neither serves nor ends: " + daemon.log());
     if (!daemon.process().running()) {
       course_.ended = true;
       expect_a_reason(daemon, daemon.process().wait(milliseconds(0)).value_or(-1));
@@ -148,25 +169,58 @@ class FaultyRun {
       expect_a_reason(daemon, code);
     }
     course_.hit = faults.hit();
-    for (std::size_t kind = 0; kind < kFaultKinds; ++kind)
-      course_.counts[kind] = faults.count(static_cast<FaultKind>(kind));
+    course_.counts = counts(faults);
+  }
+
+  static std::array<std::uint64_t, kFaultKinds> counts(const FileFaults& faults) {
+    std::array<std::uint64_t, kFaultKinds> all{};
+    for (std::size_t kind = 0; kind < kFaultKinds; ++kind) all[kind] = faults.count(static_cast<FaultKind>(kind));
+    return all;
+  }
+
+  // Null: the daemon ends. Whoever it lets in must be answered.
+  std::unique_ptr<client::Client> connect(RunningDaemon& daemon) {
+    auto client = client::Client::connect(options_.data);
+    if (client.ok()) return std::move(*client);
+    if (!daemon.process().wait(kPatience)) wrong("nobody can connect: " + client.status().to_string());
+    return nullptr;
   }
 
   // What a robot, an operator and readers do. Whatever ends the daemon ends this.
   void work(RunningDaemon& daemon, const FileFaults& faults) {
-    const auto client = client::Client::connect(options_.data);
-    if (!client.ok()) return;
+    const auto client = connect(daemon), readers_client = client ? connect(daemon) : nullptr;
+    if (!readers_client) return;
+    course_.before_work = counts(faults);
+    const bool early = faults.hit();
     HandRobot robot(options_.lcm, world_.options().uuid);
-    Reader reader(daemon, faults, std::max(milliseconds(10), fault_.hang / 80));
-    for (std::uint32_t i = 0; i < kFrames && settle(robot, daemon, **client, i); ++i) {
-      if (i == kFrames / 2) labelled_ = (*client)->set_label(FrameId{1, kLabelled}, kLabel).ok();
-      if (i == kFrames * 2 / 3) (void)(*client)->commit();
+    Reader reader(*readers_client, faults, std::max(milliseconds(10), fault_.hang / 80));
+    for (std::uint32_t i = 0; i < kFrames && settle(robot, daemon, *client, i); ++i) {
+      if (i == kFrames / 2) labelled_ = client->set_label(FrameId{1, kLabelled}, kLabel).ok();
+      if (i == kFrames * 2 / 3) (void)client->commit();
+      if (i == kFrames * 5 / 6) (void)client->compact([](const auto&) { return true; });  // opens and writes many files
     }
-    if (course_.acknowledged == kFrames) (void)(*client)->wait_idle();
+    const bool served = course_.acknowledged == kFrames && client->wait_idle().ok();
+    course_.hit_at_work = faults.hit() && !early;
+    while (faults.hanging() && daemon.process().running()) std::this_thread::sleep_for(milliseconds(5));
     reader.stop();
+    course_.after_work = counts(faults);
     course_.reads = reader.answers();
     course_.meanwhile = reader.meanwhile();
     course_.slowest = reader.slowest();
+    if (served && reader.unreachable() > 0) wrong("readers lost a daemon that goes on");
+    judge(reader);
+  }
+
+  void judge(const Reader& reader) {
+    // Memory may run out where a question is answered, and a file that answers it may not open: once.
+    const bool may_refuse = fault_.kind == FaultKind::kAllocation || fault_.kind == FaultKind::kOpen;
+    if (reader.refusals().size() > (may_refuse && fault_.error != 0 ? 1 : 0))
+      wrong(std::to_string(reader.refusals().size()) +
+            " answers to readers, the first of them: " + reader.refusals().front());
+    if (fault_.hang.count() == 0 || !course_.hit_at_work) return;
+    if (course_.meanwhile == 0) wrong("no reader was answered meanwhile");
+    if (course_.slowest > fault_.hang / 2)
+      wrong("a reader waited for " + std::to_string(course_.slowest.count()) + " ms");
   }
 
   // False: the daemon has ended, or takes nothing in until it is started again.
@@ -197,8 +251,14 @@ class FaultyRun {
     const std::string log = daemon.log();
     course_.last_words = "exit code " + std::to_string(code) + ": " +
                          log.substr(std::min(log.size(), log.size() - std::min<std::size_t>(log.size(), 400)));
-    static const std::regex kReason(R"(\[(error|critical)\][^\n]* ?[A-Z_]{5,}: [^\n]+)");
-    if (!std::regex_search(log, kReason)) wrong("ended without a reason: " + course_.last_words);
+    static const std::regex kReason(R"(\[(error|critical)\][^\n]* ?([A-Z_]{5,}): [^\n]+)");
+    bool reason = false, internal = false;
+    for (std::sregex_iterator found(log.begin(), log.end(), kReason); found != std::sregex_iterator(); ++found)
+      ((*found)[2] == "INTERNAL" ? internal : reason) = true;
+    // gRPC and protobuf do not survive that memory runs out in what they call: the daemon aborts, and says so.
+    const bool aborted = fault_.kind == FaultKind::kAllocation && code == 128 + SIGABRT && internal;
+    if ((code < 0 || code >= 128) && !aborted) wrong("crashed, or does not stop: " + course_.last_words);
+    if (!reason && !aborted) wrong("ended without a reason: " + course_.last_words);
   }
 
   void without_it() {
@@ -222,18 +282,19 @@ class FaultyRun {
     if (daemon.stop() != 0) wrong("the next daemon: " + daemon.log());
     std::vector<Keyframe> keyframes;
     for (std::uint32_t i = 0; i < kFrames; ++i) keyframes.push_back(world_.keyframe(i));
-    const auto map = open_stored_map(options_.data);
-    for (const std::string& difference : settled_once_differences(*map, keyframes)) wrong(difference);
-    storage::verify(*map->view(), {},
-                    [&](const storage::Finding& f) { wrong("verify: " + f.frame.to_string() + " " + f.what); }, {})
-        .or_throw();
+    for (const std::string& difference : settled_once_differences(*open_stored_map(options_.data), keyframes))
+      wrong(difference);
+    storage::RocksDbOptions reading;
+    reading.read_only = true;
+    for (const std::string& finding : verify_findings(*storage::open_rocksdb(options_.data, reading).or_throw()))
+      wrong(finding);
   }
 
   void wrong(const std::string& what) { course_.wrong.push_back(fault_.to_string() + ": " + what); }
 
   const Fault fault_;
   const storage::TemporaryFolder folder_;
-  const sim::PointsWorld world_{world_options()};
+  const sim::PointsWorld world_{small_world(kFrames, 16, 80)};
   DaemonOptions options_;
   bool labelled_ = false;
   Course course_;
@@ -241,28 +302,43 @@ class FaultyRun {
 
 class NthFailure : public ::testing::Test {
  protected:
-  // How often the daemon does each in a run without a fault.
-  std::uint64_t total(FaultKind kind) {
+  // A run without a fault, which tells how often the daemon does what.
+  static const Course& without() {
     static const Course kWithout = FaultyRun({}).everything();
     EXPECT_THAT(kWithout.wrong, ::testing::IsEmpty());
     EXPECT_EQ(kWithout.acknowledged, kFrames);
-    return kWithout.counts[static_cast<std::size_t>(kind)];
+    EXPECT_GT(kWithout.reads, 0u);
+    static const bool kTold = [] {
+      for (std::size_t kind = 0; kind < kFaultKinds; ++kind)
+        std::printf("%s: %llu, %llu of them before the daemon serves, %llu after its work\n", kKindNames.at(kind),
+                    static_cast<unsigned long long>(kWithout.counts[kind]),
+                    static_cast<unsigned long long>(kWithout.before_work[kind]),
+                    static_cast<unsigned long long>(kWithout.counts[kind] - kWithout.after_work[kind]));
+      return true;
+    }();
+    (void)kTold;
+    return kWithout;
   }
 
-  // `number` of the operations of this kind, evenly spread; 0: every one. The first and the last are among those that
-  // fail, but not among those that hang: nobody reads before the start or after the end.
-  std::vector<Fault> faults(FaultKind kind, std::uint64_t number, int error, milliseconds hang = {}) {
-    const std::uint64_t all = total(kind);
-    if (number == 0 || number > all) number = all;
+  // `number` of the operations of this kind, evenly spread, the first and the last among them; 0: every one. Of those
+  // that hang, if not every one, such as are done while the daemon serves, since nobody reads before or after.
+  static std::vector<Fault> faults(FaultKind kind, std::uint64_t number, int error, milliseconds hang = {}) {
+    const auto at = static_cast<std::size_t>(kind);
+    const bool at_work = hang.count() > 0 && number > 0;
+    const std::uint64_t first = at_work ? without().before_work[at] + 1 : 1;
+    const std::uint64_t last = at_work ? without().after_work[at] : without().counts[at];
+    EXPECT_GT(last, first);
+    if (number == 0 || number > last - first + 1) number = last - first + 1;
     std::vector<Fault> chosen;
-    for (std::uint64_t i = 0; i < number; ++i)
-      chosen.push_back({kind,
-                        1 + (hang.count() > 0 ? (2 * i + 1) * all / (2 * number)
-                                              : i * (all - 1) / std::max<std::uint64_t>(number - 1, 1)),
-                        error, hang});
+    for (std::uint64_t i = 0; i < number; ++i) {
+      // In the middles of equal parts where no two runs are the same and all are to be hit.
+      const std::uint64_t n = at_work ? (2 * i + 1) * (last - first) / (2 * number)
+                                      : i * (last - first) / std::max<std::uint64_t>(number - 1, 1);
+      chosen.push_back({kind, first + n, error, hang});
+    }
     return chosen;
   }
-  std::vector<Fault> hangs(std::uint64_t number, milliseconds hang) {
+  static std::vector<Fault> hangs(std::uint64_t number, milliseconds hang) {
     std::vector<Fault> chosen;
     for (const FaultKind kind : {FaultKind::kOpen, FaultKind::kWrite, FaultKind::kSync})
       for (const Fault& fault : faults(kind, number, 0, hang)) chosen.push_back(fault);
@@ -270,8 +346,7 @@ class NthFailure : public ::testing::Test {
   }
 
   // So many runs at a time.
-  void run(const std::vector<Fault>& all, std::size_t at_once = 1) {
-    const milliseconds hang = all.front().hang;
+  static void run(const std::vector<Fault>& all, std::size_t at_once = 1) {
     std::atomic<std::size_t> next{0};
     std::vector<std::future<std::vector<Course>>> workers;
     for (std::size_t worker = 0; worker < at_once; ++worker)
@@ -280,34 +355,43 @@ class NthFailure : public ::testing::Test {
         for (std::size_t i; (i = next++) < all.size();) courses.push_back(FaultyRun(all[i]).everything());
         return courses;
       }));
-    std::size_t hit = 0, ended = 0, read_only = 0;
+    std::size_t hit = 0, at_work = 0, ended = 0, read_only = 0;
     std::uint64_t reads = 0, meanwhile = 0;
-    milliseconds slowest{0};
+    milliseconds slowest{0}, longest{0};
+    Fault longest_with;
     for (auto& worker : workers)
       for (const Course& course : worker.get()) {
+        EXPECT_THAT(course.wrong, ::testing::IsEmpty());
+        expect_hit(course);
         hit += course.hit;
+        at_work += course.hit_at_work;
         ended += course.ended;
         read_only += !course.ended && course.acknowledged < kFrames;
         reads += course.reads;
         meanwhile += course.meanwhile;
         slowest = std::max(slowest, course.slowest);
-        EXPECT_THAT(course.wrong, ::testing::IsEmpty());
+        if (course.took > longest) longest = course.took, longest_with = course.fault;
       }
     std::printf(
-        "%zu faults, %zu hit, %zu ended, %zu read only, %llu reads answered, %llu of them meanwhile, the slowest "
-        "in %lld ms\n",
-        all.size(), hit, ended, read_only, static_cast<unsigned long long>(reads),
-        static_cast<unsigned long long>(meanwhile), static_cast<long long>(slowest.count()));
-    EXPECT_GE(hit * 2, all.size());
+        "%zu faults, %zu hit, %zu of them at work, %zu ended, %zu read only, %llu reads answered, %llu of them "
+        "meanwhile, the slowest in %lld ms; %s took longest, %lld ms\n",
+        all.size(), hit, at_work, ended, read_only, static_cast<unsigned long long>(reads),
+        static_cast<unsigned long long>(meanwhile), static_cast<long long>(slowest.count()),
+        longest_with.to_string().c_str(), static_cast<long long>(longest.count()));
     EXPECT_GT(reads, 0u);
-    if (hang.count() > 0) {
-      EXPECT_LT(slowest, hang / 2);
-      EXPECT_GT(meanwhile, all.size());
-    }
+    EXPECT_GT(at_work, 0u);
+  }
+
+  // No two runs do the same number of operations, since the journal's thread syncs together what has come in, and
+  // commits go by time. So the last ones may not be reached, and nothing but them.
+  static void expect_hit(const Course& course) {
+    const auto at = static_cast<std::size_t>(course.fault.kind);
+    EXPECT_EQ(course.hit, course.counts[at] >= course.fault.n) << course.fault.to_string();
+    EXPECT_TRUE(course.hit || course.fault.n > without().counts[at] * 2 / 3) << course.fault.to_string();
   }
 };
 
-TEST_F(NthFailure, Open) { run(faults(FaultKind::kOpen, 4, EMFILE)); }
+TEST_F(NthFailure, Open) { run(faults(FaultKind::kOpen, 5, EMFILE)); }
 TEST_F(NthFailure, Write) { run(faults(FaultKind::kWrite, 4, EIO)); }
 TEST_F(NthFailure, WriteOnAFullDisk) { run(faults(FaultKind::kWrite, 3, ENOSPC)); }
 TEST_F(NthFailure, Sync) { run(faults(FaultKind::kSync, 4, EIO)); }
