@@ -1,6 +1,6 @@
-// The n-th open, write, sync or allocation of relmapd fails or hangs, while a robot sends a drive, an operator labels a
-// frame and has the map committed and compacted, and readers ask. Readers are answered meanwhile; the daemon goes on,
-// or ends with a reason; the next start has everything that was acknowledged.
+// The n-th open, write, sync or allocation of relmapd fails or hangs, while two robots send drives, an operator labels
+// a frame, proposes an edge, has the map committed and compacted and a session deleted, and readers ask. Readers are
+// answered meanwhile; the daemon goes on, or ends with a reason; the next start has everything that was acknowledged.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,9 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using std::chrono::steady_clock;
 
-constexpr std::uint32_t kFrames = 24, kLabelled = 3;
+constexpr std::uint32_t kFrames = 24, kLap = 16, kLabelled = 3;
+constexpr std::uint32_t kOtherFrames = 6;  // of the session that is deleted
+constexpr SessionNumber kOther = 2;
 constexpr const char* kLabel = "dock";
 
 constexpr std::array kKindNames{"open", "write", "sync", "allocation"};
@@ -60,6 +62,7 @@ struct Course {
   milliseconds took{0};  // the whole run
   std::array<std::uint64_t, kFaultKinds> counts{}, before_work{}, after_work{};
   std::string last_words;
+  std::vector<std::string> undone;  // of the operator's work
   std::vector<std::string> wrong;
 };
 
@@ -192,12 +195,18 @@ class FaultyRun {
     if (!readers_client) return;
     course_.before_work = counts(faults);
     const bool early = faults.hit();
-    HandRobot robot(options_.lcm, world_.options().uuid);
+    HandRobot robot(options_.lcm, world_.options().uuid), other_robot(options_.lcm, other_.options().uuid);
     Reader reader(*readers_client, faults, std::max(milliseconds(10), fault_.hang / 80));
     for (std::uint32_t i = 0; i < kFrames && settle(robot, daemon, *client, i); ++i) {
-      if (i == kFrames / 2) labelled_ = client->set_label(FrameId{1, kLabelled}, kLabel).ok();
-      if (i == kFrames * 2 / 3) (void)client->commit();
-      if (i == kFrames * 5 / 6) (void)client->compact([](const auto&) { return true; });  // opens and writes many files
+      if (i == 0)
+        for (std::uint32_t other = 0; other < kOtherFrames; ++other)
+          if (!settle(other_robot, daemon, *client, other_, other)) break;
+      if (i == kFrames / 2) labelled_ = done(client->set_label(FrameId{1, kLabelled}, kLabel).status());
+      if (i == kFrames * 2 / 3) done(client->commit().status());
+      if (i == kFrames * 3 / 4) propose(*client);
+      if (i == kFrames * 5 / 6)
+        done(client->compact([](const auto&) { return true; }).status());  // opens and writes many files
+      if (i == kFrames * 11 / 12) deleted_ = done(delete_other(*client));
     }
     const bool served = course_.acknowledged == kFrames && client->wait_idle().ok();
     course_.hit_at_work = faults.hit() && !early;
@@ -223,18 +232,32 @@ class FaultyRun {
       wrong("a reader waited for " + std::to_string(course_.slowest.count()) + " ms");
   }
 
+  bool done(const Status& work) {
+    if (!work.ok()) course_.undone.push_back(work.to_string());
+    return work.ok();
+  }
+
+  // Where the place is the same, the daemon has found a closure already: WRONG_STATE, after the geometry was done.
+  void propose(client::Client& client) {
+    const Status proposed = client.propose_edge(FrameId{1, 2}, FrameId{kOther, 2}).status();
+    if (proposed.reason() != Reason::WRONG_STATE) done(proposed);
+  }
+
   // False: the daemon has ended, or takes nothing in until it is started again.
   bool settle(HandRobot& robot, RunningDaemon& daemon, client::Client& client, std::uint32_t sequence) {
-    const Bytes payload = encode_keyframe(world_.keyframe(sequence));
+    if (!settle(robot, daemon, client, world_, sequence)) return false;
+    course_.acknowledged = sequence + 1;
+    return true;
+  }
+  bool settle(HandRobot& robot, RunningDaemon& daemon, client::Client& client, const sim::PointsWorld& world,
+              std::uint32_t sequence) {
+    const Bytes payload = encode_keyframe(world.keyframe(sequence));
     const auto deadline = steady_clock::now() + kPatience;
     for (int attempt = 1; steady_clock::now() < deadline; ++attempt) {
       robot.say_payload(sequence, payload);
       for (int i = 0; i < 20; ++i) {
         const auto ack = robot.acknowledgement();
-        if (ack && ack->next_sequence > sequence) {
-          course_.acknowledged = sequence + 1;
-          return true;
-        }
+        if (ack && ack->next_sequence > sequence) return true;
         std::this_thread::sleep_for(milliseconds(5));
       }
       if (!daemon.process().running()) return false;
@@ -267,9 +290,13 @@ class FaultyRun {
     throw_if(client->wait_idle());
     const client::DaemonStatus found = client->status().or_throw();
     if (!found.storage.ok()) wrong("after the next start: " + found.storage.to_string());
-    if (found.frames < course_.acknowledged)
-      wrong(std::to_string(course_.acknowledged) + " keyframes were acknowledged, " + std::to_string(found.frames) +
+    if (const std::uint64_t frames = frames_of(*client, 1); frames < course_.acknowledged)
+      wrong(std::to_string(course_.acknowledged) + " keyframes were acknowledged, " + std::to_string(frames) +
             " are there");
+    if (frames_of(*client, kOther) > 0) {
+      if (deleted_) wrong("the deleted session is back");
+      throw_if(delete_other(*client));
+    }
     HandRobot robot(options_.lcm, world_.options().uuid);
     for (std::uint32_t i = 0; i < kFrames; ++i)
       if (!settle(robot, daemon, *client, i)) return wrong("the next start takes nothing in: " + course_.last_words);
@@ -290,13 +317,30 @@ class FaultyRun {
       wrong(finding);
   }
 
+  static std::optional<client::Session> find_session(client::Client& client, SessionNumber number) {
+    const auto sessions = client.sessions();
+    if (sessions.ok())
+      for (const client::Session& session : *sessions)
+        if (session.number == number) return session;
+    return std::nullopt;
+  }
+  static std::uint64_t frames_of(client::Client& client, SessionNumber number) {
+    const auto session = find_session(client, number);
+    return session ? session->frames : 0;
+  }
+  static Status delete_other(client::Client& client) {
+    const auto session = find_session(client, kOther);
+    if (!session) return Status(Reason::NO_SUCH_SESSION, "");
+    return client.delete_session(kOther, session->uuid, [](const auto&) { return true; });
+  }
+
   void wrong(const std::string& what) { course_.wrong.push_back(fault_.to_string() + ": " + what); }
 
   const Fault fault_;
   const storage::TemporaryFolder folder_;
-  const sim::PointsWorld world_{small_world(kFrames, 16, 80)};
+  const sim::PointsWorld world_{small_world(kFrames, kLap, 80)}, other_{small_world(kOtherFrames, kLap, 80, 2)};
   DaemonOptions options_;
-  bool labelled_ = false;
+  bool labelled_ = false, deleted_ = false;
   Course course_;
 };
 
@@ -307,6 +351,7 @@ class NthFailure : public ::testing::Test {
     static const Course kWithout = FaultyRun({}).everything();
     EXPECT_THAT(kWithout.wrong, ::testing::IsEmpty());
     EXPECT_EQ(kWithout.acknowledged, kFrames);
+    EXPECT_THAT(kWithout.undone, ::testing::IsEmpty());
     EXPECT_GT(kWithout.reads, 0u);
     static const bool kTold = [] {
       for (std::size_t kind = 0; kind < kFaultKinds; ++kind)

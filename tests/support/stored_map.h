@@ -16,8 +16,8 @@ std::unique_ptr<storage::Map> open_stored_map(const std::string& folder);
 // The keyframes of a file that relmap-sim or relmap-frontend wrote. Throws StatusError.
 std::vector<Keyframe> read_keyframes(const std::string& file);
 
-// How the single session of the map differs from these keyframes, apart from its uuid and name: each line names a frame
-// that is missing, differs, or is there twice. Empty if every keyframe is there once.
+// How the single session of the map, beside deleted ones, differs from these keyframes, apart from its uuid and name:
+// each line names a frame that is missing, differs, or is there twice. Empty if every keyframe is there once.
 std::vector<std::string> settled_once_differences(const storage::Graph& graph, const std::vector<Keyframe>& keyframes);
 
 }  // namespace relmap::testing
