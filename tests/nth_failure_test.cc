@@ -33,7 +33,6 @@ using std::chrono::steady_clock;
 
 constexpr std::uint32_t kFrames = 24, kLap = 16, kLabelled = 3;
 constexpr std::uint32_t kOtherFrames = 6;  // of the session that is deleted
-constexpr SessionNumber kOther = 2;
 constexpr const char* kLabel = "dock";
 
 constexpr std::array kKindNames{"open", "write", "sync", "allocation"};
@@ -201,7 +200,7 @@ class FaultyRun {
       if (i == 0)
         for (std::uint32_t other = 0; other < kOtherFrames; ++other)
           if (!settle(other_robot, daemon, *client, other_, other)) break;
-      if (i == kFrames / 2) labelled_ = done(client->set_label(FrameId{1, kLabelled}, kLabel).status());
+      if (i == kFrames / 2) label(*client);
       if (i == kFrames * 2 / 3) done(client->commit().status());
       if (i == kFrames * 3 / 4) propose(*client);
       if (i == kFrames * 5 / 6)
@@ -237,9 +236,16 @@ class FaultyRun {
     return work.ok();
   }
 
+  // After a fault the sessions may have other numbers than in the order in which they began.
+  void label(client::Client& client) {
+    const auto own = find_session(client, world_);
+    labelled_ = own && done(client.set_label(FrameId{own->number, kLabelled}, kLabel).status());
+  }
   // Where the place is the same, the daemon has found a closure already: WRONG_STATE, after the geometry was done.
   void propose(client::Client& client) {
-    const Status proposed = client.propose_edge(FrameId{1, 2}, FrameId{kOther, 2}).status();
+    const auto own = find_session(client, world_), other = find_session(client, other_);
+    if (!own || !other) return;
+    const Status proposed = client.propose_edge(FrameId{own->number, 2}, FrameId{other->number, 2}).status();
     if (proposed.reason() != Reason::WRONG_STATE) done(proposed);
   }
 
@@ -290,10 +296,10 @@ class FaultyRun {
     throw_if(client->wait_idle());
     const client::DaemonStatus found = client->status().or_throw();
     if (!found.storage.ok()) wrong("after the next start: " + found.storage.to_string());
-    if (const std::uint64_t frames = frames_of(*client, 1); frames < course_.acknowledged)
+    if (const std::uint64_t frames = frames_of(*client, world_); frames < course_.acknowledged)
       wrong(std::to_string(course_.acknowledged) + " keyframes were acknowledged, " + std::to_string(frames) +
             " are there");
-    if (frames_of(*client, kOther) > 0) {
+    if (frames_of(*client, other_) > 0) {
       if (deleted_) wrong("the deleted session is back");
       throw_if(delete_other(*client));
     }
@@ -317,21 +323,21 @@ class FaultyRun {
       wrong(finding);
   }
 
-  static std::optional<client::Session> find_session(client::Client& client, SessionNumber number) {
+  static std::optional<client::Session> find_session(client::Client& client, const sim::PointsWorld& world) {
     const auto sessions = client.sessions();
     if (sessions.ok())
       for (const client::Session& session : *sessions)
-        if (session.number == number) return session;
+        if (session.name == world.options().session) return session;
     return std::nullopt;
   }
-  static std::uint64_t frames_of(client::Client& client, SessionNumber number) {
-    const auto session = find_session(client, number);
+  static std::uint64_t frames_of(client::Client& client, const sim::PointsWorld& world) {
+    const auto session = find_session(client, world);
     return session ? session->frames : 0;
   }
-  static Status delete_other(client::Client& client) {
-    const auto session = find_session(client, kOther);
+  Status delete_other(client::Client& client) const {
+    const auto session = find_session(client, other_);
     if (!session) return Status(Reason::NO_SUCH_SESSION, "");
-    return client.delete_session(kOther, session->uuid, [](const auto&) { return true; });
+    return client.delete_session(session->number, session->uuid, [](const auto&) { return true; });
   }
 
   void wrong(const std::string& what) { course_.wrong.push_back(fault_.to_string() + ": " + what); }
