@@ -3,23 +3,22 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <mutex>
-#include <random>
+#include <numeric>
 #include <string>
 #include <thread>
-#include <unordered_set>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "frontend/publishing/lcm/lcm_transport.h"
 #include "frontend/publishing/publisher.h"
-#include "proto/base/clock.h"
-#include "proto/base/crc32c.h"
 #include "proto/base/hex.h"
 #include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
@@ -27,6 +26,7 @@
 #include "proto/wire/lcm_messages.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/intake/testing/fake_sink.h"
+#include "tests/support/lcm_attacker.h"
 #include "tests/support/patience.h"
 #include "tests/support/running_daemon.h"
 
@@ -36,178 +36,30 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr const char* kChannels[] = {kKeyframeChannel, kGapChannel,  kEndChannel, kHelloChannel,
-                                     kAckChannel,      kPoseChannel, kMapChannel};
-
-// Hears everything and knows no key, or only its own.
-class Attacker {
+// A robot's link, which counts what comes on the channels that its transport hears.
+class CountingLink {
  public:
-  Attacker(const std::string& url, const SessionUuid& session, std::uint64_t seed) : session_(session), random_(seed) {
+  CountingLink(const std::string& url, const access::RobotKey& key) {
+    transport_ = std::make_unique<publishing::LcmTransport>(
+        [this](const char* channel, const Bytes& datagram) { link_->publish(channel, datagram); }, /*local=*/true,
+        publishing::LcmTransportOptions{key});
     LcmLink::Handlers handlers;
-    for (const char* channel : kChannels)
-      handlers.emplace_back(channel, [this, channel](ByteSpan datagram) { record(channel, datagram); });
+    for (const char* channel : publishing::LcmTransport::heard_channels())
+      handlers.emplace_back(channel, [this, channel, to = transport_.get()](ByteSpan datagram) {
+        ++heard_;
+        to->hear(channel, datagram);
+      });
     link_ = LcmLink::open(url, std::move(handlers)).or_throw();
   }
-  ~Attacker() { link_->stop(); }
 
-  // A robot of the fleet that turned against the others: what it sends is sealed by its own key, too.
-  void use(const access::RobotKey& own) { own_.emplace(own, 1); }
-
-  void attack(std::size_t messages) {
-    for (std::size_t i = 0; i < messages; ++i) {
-      forge();
-      if (i % 200 == 199) std::this_thread::sleep_for(milliseconds(1));  // LCM's queues hold a thousand messages
-    }
-  }
-
-  std::size_t heard() const {
-    const std::lock_guard lock(mutex_);
-    return heard_.size();
-  }
+  // For the publisher, which is to be destroyed after stop() and before this object.
+  std::unique_ptr<publishing::LcmTransport> take_transport() { return std::move(transport_); }
+  void stop() { link_->stop(); }
+  std::size_t heard() const { return heard_; }
 
  private:
-  struct Heard {
-    const char* channel;
-    Bytes datagram;
-  };
-
-  void record(const char* channel, ByteSpan datagram) {
-    const std::lock_guard lock(mutex_);
-    if (own_ && std::string_view(channel) == kMapChannel) meet(datagram);
-    if (const auto own = sent_.find(crc32c(datagram)); own != sent_.end()) {  // LCM hears what it sends itself
-      sent_.erase(own);
-      return;
-    }
-    Heard heard{channel, {datagram.begin(), datagram.end()}};
-    if (heard_.size() < kKept)
-      heard_.push_back(std::move(heard));
-    else
-      heard_[random_() % kKept] = std::move(heard);
-  }
-
-  // Is welcomed by the daemon, as any robot of the fleet.
-  void meet(ByteSpan datagram) {
-    const auto opened = own_->open(kMapChannel, datagram);
-    const auto daemon = opened ? decode_lcm_map(opened->message) : Result<DaemonIdentity>(Reason::CORRUPT, "");
-    if (daemon.ok() && own_->heard(daemon->boot, opened->seal, steady_clock::now()))
-      (void)own_->welcome(*daemon, steady_clock::now());
-  }
-
-  void publish(const char* channel, const Bytes& datagram) {
-    {
-      const std::lock_guard lock(mutex_);
-      sent_.insert(crc32c(datagram));
-    }
-    link_->publish(channel, datagram);
-  }
-
-  std::uint32_t some() { return static_cast<std::uint32_t>(random_()); }
-
-  // What it heard last of a channel, or of any.
-  Heard heard_of(const char* channel) {
-    const std::lock_guard lock(mutex_);
-    for (int tries = 0; !heard_.empty() && tries < 50; ++tries)
-      if (const Heard& one = heard_[random_() % heard_.size()]; !channel || one.channel == std::string_view(channel))
-        return one;
-    return {channel ? channel : kGapChannel, Bytes(access::kSealBytes)};
-  }
-
-  // Sends the message without a seal, with one of another message, with a damaged one, or with its own.
-  void send(const char* channel, Bytes message) {
-    const Heard other = heard_of(random_() % 2 ? channel : nullptr);
-    switch (random_() % 4) {
-      case 0:
-        break;
-      case 3: {
-        const std::lock_guard lock(mutex_);
-        if (own_ && own_->ready(steady_clock::now())) {
-          own_->seal(channel, message);
-          break;
-        }
-        [[fallthrough]];
-      }
-      default:
-        message.insert(message.end(), other.datagram.end() - access::kSealBytes, other.datagram.end());
-        if (random_() % 2) message.back() ^= static_cast<std::uint8_t>(1 + random_() % 255);
-    }
-    publish(channel, message);
-  }
-
-  Keyframe forged_keyframe(std::uint32_t sequence) {
-    Keyframe k = sample_keyframe();
-    k.session.uuid = session_;
-    k.sequence = sequence;
-    k.time_us = now_us() + 3'000'000'000'000'000;  // in a century
-    k.tracks.clear();
-    return k;
-  }
-
-  void forge() {
-    switch (random_() % 9) {
-      case 0:
-        return send(kGapChannel, encode_lcm(Gap{session_, some() % 50, some() % 400 + 50, Reason::DROPPED_BY_ROBOT}));
-      case 1:
-        return send(kEndChannel, encode_lcm(SessionEnd{session_, some() % 400}));
-      case 2: {  // whole keyframes
-        const std::uint32_t sequence = some() % 400;
-        const Bytes payload = encode_keyframe(forged_keyframe(sequence));
-        return send(kKeyframeChannel, encode_lcm(cut_part(session_, sequence, payload, crc32c(payload), 60000, 0)));
-      }
-      case 3: {  // garbage under a right envelope
-        const Heard part = heard_of(kKeyframeChannel);
-        if (part.datagram.size() <= access::kSealBytes) return;
-        const auto message = ByteSpan(part.datagram).first(part.datagram.size() - access::kSealBytes);
-        auto changed = decode_lcm_part(message);
-        if (!changed.ok() || changed->data.empty()) return;
-        changed->data[random_() % changed->data.size()] ^= 1;
-        changed->part_crc = part_checksum(*changed);
-        return send(kKeyframeChannel, encode_lcm(*changed));
-      }
-      case 4: {  // an acknowledgement that settles everything, or forgets everything
-        Acknowledgement ack;
-        ack.session = session_;
-        ack.boot = boot();
-        ack.next_sequence = random_() % 2 ? 0 : std::uint64_t{1} << 32;
-        ack.credits = some() % 2 ? 0 : 64;
-        if (random_() % 2) ack.refused.push_back({kWholeSession, 0, Reason::SESSION_DELETED});
-        return send(kAckChannel, encode_lcm(ack));
-      }
-      case 5: {
-        PoseNews news;
-        news.session = session_;
-        news.boot = boot();
-        news.kind = random_() % 2 ? PoseNews::Kind::kEnded : PoseNews::Kind::kSlowDown;
-        news.rate_hz = 0.1;
-        return send(kPoseChannel, encode_lcm(news));
-      }
-      case 6: {
-        DaemonIdentity other{boot(), {}};
-        other.map.uuid = SessionUuid::random();
-        return send(kMapChannel, encode_lcm(other));
-      }
-      case 7:
-        return send(kHelloChannel, encode_lcm(Hello{session_}));
-      default: {  // again, as it was heard, or on another channel
-        const Heard again = heard_of(nullptr);
-        publish(random_() % 4 ? again.channel : kChannels[random_() % std::size(kChannels)], again.datagram);
-      }
-    }
-  }
-
-  // Of the daemon, which tells it to everybody.
-  BootId boot() {
-    const Heard map = heard_of(kMapChannel);
-    const auto daemon = decode_lcm_map(map.datagram);
-    return daemon.ok() ? daemon->boot : BootId{};
-  }
-
-  static constexpr std::size_t kKept = 4000;
-  const SessionUuid session_;
-  mutable std::mutex mutex_;
-  std::mt19937_64 random_;
-  std::vector<Heard> heard_;
-  std::optional<publishing::SealedDaemon> own_;
-  std::unordered_multiset<std::uint32_t> sent_;  // checksums of what it has sent and not heard yet
+  std::atomic<std::size_t> heard_ = 0;
+  std::unique_ptr<publishing::LcmTransport> transport_;
   std::unique_ptr<LcmLink> link_;
 };
 
@@ -240,6 +92,7 @@ class LcmForgery : public ::testing::Test {
   }
   void kill_daemon() {
     ingest_.reset();
+    add(refused_before_, server_->stats());
     server_.reset();
     sink_.crash();
   }
@@ -253,35 +106,52 @@ class LcmForgery : public ::testing::Test {
     return k;
   }
 
-  // Publishes `count` keyframes with two restarts of the daemon on the way, and the attack as long as that takes.
+  // Publishes `count` keyframes with two restarts of the daemon on the way, during an attack of so many messages, of
+  // which the daemon has refused so large a share that it cannot have missed them, and the robot heard as many.
   void run(std::size_t messages, std::uint32_t count, bool insider) {
+    // Of an attack, four ninths are what robots say, and as much what the daemon says. LCM loses some of it.
+    const std::size_t refused = messages / 5, heard = messages / 5;
     header_ = sample_keyframe().session;
     header_.robot = "cart";
     header_.uuid = SessionUuid::random();
     start_daemon();
     publishing::PublisherOptions options;
     options.spool = (folder_ / "spool").string();
-    auto transport = publishing::LcmTransport::open(url_, {cart_}).or_throw();
-    const auto publisher = publishing::Publisher::start(options, header_, std::move(transport)).or_throw();
+    CountingLink robot(url_, cart_);
+    const auto publisher = publishing::Publisher::start(options, header_, robot.take_transport()).or_throw();
     std::mutex mutex;
     std::vector<PoseNews> news;
     publisher->hear([&](const PoseNews& one) {
       const std::lock_guard lock(mutex);
       news.push_back(one);
     });
-    Attacker attacker(url_, header_.uuid, 1);
+    // A robot of the fleet may claim a session as soon as it has heard of it, so the robot that it is of comes first.
+    if (insider) {
+      EXPECT_TRUE(publisher->push(keyframe(0)).ok());
+      while (publisher->progress().unsettled > 0) std::this_thread::sleep_for(milliseconds(1));
+    }
+    LcmAttacker attacker(url_, {header_.uuid}, 1);
     if (insider) attacker.use(thief_);
     std::atomic<bool> attacked = false;
     std::thread attack([&] {
-      attacker.attack(messages);
-      attacked = true;
-    });
-    for (std::uint32_t s = 0; s < count; ++s) {
-      EXPECT_TRUE(publisher->push(keyframe(s)).ok());
-      if (s % (count / 3) != count / 6) {
-        std::this_thread::sleep_for(milliseconds(2));
-        continue;
+      while (!attacked) {
+        for (int i = 0; i < 200; ++i) attacker.forge();
+        std::this_thread::sleep_for(milliseconds(1));  // LCM's queues hold a thousand messages
       }
+    });
+    // How much of the attack is over; keyframes are published all the while.
+    const auto share = [&] {
+      const auto of = [](std::size_t part, std::size_t whole) {
+        return static_cast<double>(part) / static_cast<double>(whole);
+      };
+      return std::min({of(attacker.sent(), messages), of(sum(refused_by_daemon()), refused), of(robot.heard(), heard)});
+    };
+    const auto until = steady_clock::now() + 2 * kPatience;
+    for (std::uint32_t s = insider ? 1 : 0; s < count; ++s) {
+      while (share() < static_cast<double>(s) / count && steady_clock::now() < until)
+        std::this_thread::sleep_for(milliseconds(2));
+      EXPECT_TRUE(publisher->push(keyframe(s)).ok());
+      if (s % (count / 3) != count / 6) continue;
       kill_daemon();
       // Nobody is there who could settle anything: the spool keeps what is not settled. What the daemon said last may
       // still be on its way.
@@ -293,33 +163,59 @@ class LcmForgery : public ::testing::Test {
       while (settles()) {
       }
       for (std::uint32_t more = 0; more < 5; ++more) EXPECT_TRUE(publisher->push(keyframe(++s)).ok());
+      const std::size_t said = attacker.sent();
       std::this_thread::sleep_for(milliseconds(300));
       EXPECT_GE(publisher->progress().unsettled, unsettled + 5) << "a forged acknowledgement has emptied the spool";
+      EXPECT_GT(attacker.sent(), said) << "the attack does not go on while the daemon is dead";
       start_daemon();
     }
+    while (share() < 1 && steady_clock::now() < until) std::this_thread::sleep_for(milliseconds(2));
     const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + kPatience);
     EXPECT_TRUE(summary.all_settled()) << summary.unsettled << " are not settled; " << publisher->trouble().to_string()
-                                       << "; the daemon has refused" << refused_by_daemon();
-    while (!attacked) std::this_thread::sleep_for(milliseconds(10));
-    attack.join();
+                                       << "; the daemon has refused" << text_of(refused_by_daemon());
     EXPECT_TRUE(publisher->end_session(steady_clock::now() + kPatience));
+    attacked = true;
+    attack.join();
     EXPECT_EQ(summary.settled, count);
     EXPECT_EQ(summary.gaps, 0u);
     EXPECT_TRUE(summary.refused.empty());
     EXPECT_TRUE(summary.session.ok()) << summary.session.to_string();
+    std::printf("sent %zu, of these sealed by a robot %zu; the daemon refused%s; the robot heard %zu\n",
+                attacker.sent(), attacker.sealed(), text_of(refused_by_daemon()).c_str(), robot.heard());
+    EXPECT_GE(attacker.sent(), messages);
+    EXPECT_GE(sum(refused_by_daemon()), refused) << "the attack has not arrived";
+    EXPECT_GE(robot.heard(), heard) << "the attack has not arrived";
     EXPECT_GT(attacker.heard(), 100u) << "the attacker heard nothing that it could use";
+    const auto of_reason = [&](Reason reason) { return refused_by_daemon()[intake::index_of(reason)]; };
+    EXPECT_GT(of_reason(Reason::UNAUTHENTICATED), 0u);
+    EXPECT_GT(of_reason(Reason::REPLAYED), 0u) << "nothing was sent again as it was heard";
+    if (insider) {
+      EXPECT_GT(of_reason(Reason::NOT_ALLOWED), messages / 50) << "nobody takes the attacker for a robot of the fleet";
+    }
     publisher->hear({});
     for (const PoseNews& one : news) EXPECT_NE(one.kind, PoseNews::Kind::kSlowDown);
+    robot.stop();
     kill_daemon();
     check_journal(count);
   }
 
-  std::string refused_by_daemon() const {
+  static void add(intake::ReasonCounts& counts, const intake::IngestStats& stats) {
+    for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += stats.messages_refused[i] + stats.parts_refused[i];
+  }
+  // Over all its lives.
+  intake::ReasonCounts refused_by_daemon() const {
+    intake::ReasonCounts counts = refused_before_;
+    if (server_) add(counts, server_->stats());
+    return counts;
+  }
+  static std::size_t sum(const intake::ReasonCounts& counts) {
+    return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
+  }
+  static std::string text_of(const intake::ReasonCounts& counts) {
     std::string text;
-    const intake::IngestStats stats = server_->stats();
-    for (std::size_t i = 0; i < stats.messages_refused.size(); ++i)
-      if (const auto count = stats.messages_refused[i] + stats.parts_refused[i]; count > 0)
-        text += " " + std::string(reason_name(static_cast<Reason>(i))) + " " + std::to_string(count);
+    for (std::size_t i = 0; i < counts.size(); ++i)
+      if (counts[i] > 0)
+        text += " " + std::string(reason_name(static_cast<Reason>(i))) + " " + std::to_string(counts[i]);
     return text;
   }
 
@@ -349,6 +245,7 @@ class LcmForgery : public ::testing::Test {
   MapIdentity map_{SessionUuid::random(), 1};
   intake::FakeSink sink_;
   storage::Budget budget_{std::size_t{256} << 20};
+  intake::ReasonCounts refused_before_{};  // by daemons that have been killed
   std::unique_ptr<intake::IngestServer> server_;
   std::unique_ptr<ingest::LcmIngest> ingest_;
 };
