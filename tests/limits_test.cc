@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <thread>
@@ -41,20 +43,28 @@ class LimitsTest : public ::testing::Test {
     ASSERT_EQ(streamed.exit_code, 0) << streamed.standard_error;
     ASSERT_TRUE(client_->wait_idle().ok());
   }
-  std::vector<RawHttp2> connect(std::size_t count, std::uint32_t window) const {
+  // From the address at which our own client over TCP stands, unless from another one.
+  std::vector<RawHttp2> connect(std::size_t count, std::uint32_t window, const std::string& from = "") const {
     std::vector<RawHttp2> all;
     for (std::size_t i = 0; i < count; ++i) {
-      RawHttp2 one(daemon_->address());
+      RawHttp2 one(daemon_->address(), from);
       if (one.connected()) one.begin(window);
       all.push_back(std::move(one));
     }
     return all;
   }
-  void expect_answers(int times) const {
+  void expect_answers(int times) const { expect_answers(*client_, times); }
+  static void expect_answers(client::Client& client, int times) {
     for (int i = 0; i < times; ++i) {
-      const auto status = client_->status();
+      const auto status = client.status();
       ASSERT_TRUE(status.ok()) << status.status().to_string();
     }
+  }
+  static std::ptrdiff_t running(std::vector<RawHttp2>& calls) {
+    return std::count_if(calls.begin(), calls.end(), [](RawHttp2& one) { return !one.ended(); });
+  }
+  static std::ptrdiff_t open(std::vector<RawHttp2>& connections) {
+    return std::count_if(connections.begin(), connections.end(), [](RawHttp2& one) { return !one.closed(); });
   }
   template <typename Condition>
   static bool eventually(Condition condition) {
@@ -89,23 +99,35 @@ TEST_F(LimitsTest, OneCallersCallsLeaveRoomForOthers) {
   drive();
   auto stalled = connect(100, 0);
   for (RawHttp2& one : stalled) one.call(kExport, kGraph);
+  EXPECT_TRUE(eventually([&] { return running(stalled) == 10; })) << running(stalled) << " calls are running";
   expect_answers(20);
   const auto same_address = client::Client::connect(daemon_->address());
   ASSERT_TRUE(eventually([&] { return (*same_address)->sessions().reason() == Reason::BUDGET_EXCEEDED; }));
   EXPECT_THAT((*same_address)->sessions().status().message(), HasSubstr("10 calls of ipv4:127.0.0.1 are running"));
   expect_answers(5);
+  EXPECT_EQ(running(stalled), 10) << "the answers came since the others had gone";
   stalled.clear();
   EXPECT_TRUE(eventually([&] { return (*same_address)->sessions().ok(); }));
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 
 TEST_F(LimitsTest, RequestsThatNeverArriveAndIdleConnectionsKeepNobodyOut) {
-  serve("");
-  auto halves = connect(100, 65535);
+  serve("rpc: {max_connections: 400, max_connections_per_peer: 200}\n");
+  auto halves = connect(100, 65535, "127.0.0.2");
   for (RawHttp2& one : halves) one.call(kStatus, std::string(20, 'x'), 10);
-  const auto idle = connect(400, 65535);
+  auto idle = connect(400, 65535, "127.0.0.3");
+  const auto over_tcp = client::Client::connect(daemon_->address()).or_throw();
+  expect_answers(*over_tcp, 20);
   expect_answers(20);
-  EXPECT_TRUE(eventually([&] { return daemon_->log().find("make room for others") != std::string::npos; }));
+  EXPECT_EQ(running(halves), 100) << "the answers came since the others had gone";
+  EXPECT_TRUE(eventually([&] { return open(idle) == 200; })) << open(idle) << " are open";
+  // Who comes later is answered as well, and where an address has as many as it may have, the oldest makes room.
+  EXPECT_TRUE(client::Client::connect(daemon_->address()).or_throw()->status().ok());
+  auto more = connect(1, 65535, "127.0.0.3");
+  EXPECT_TRUE(eventually([&] { return open(idle) == 199; })) << open(idle) << " are open";
+  EXPECT_FALSE(more[0].closed());
+  EXPECT_EQ(running(halves), 100) << "those of another address";
+  EXPECT_THAT(daemon_->log(), HasSubstr("make room for others"));
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 
@@ -120,6 +142,41 @@ TEST_F(LimitsTest, ConnectionsOverWhichNobodyCallsAreClosed) {
   for (RawHttp2& one : halves) EXPECT_TRUE(eventually([&] { return one.ended(); }));
   EXPECT_FALSE(running.front().ended());
   expect_answers(1);
+  EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
+}
+
+// More calls of WaitIdle than there are threads, and than may run at once otherwise, while keyframes come in.
+TEST_F(LimitsTest, WhoWaitsUntilAllIsDoneHoldsUpNeitherQuestionsNorEdits) {
+  serve("rpc: {threads: 2, max_concurrent: 4}\n");
+  drive();
+  record_simulation(folder_ / "long", {"--seed", "2", "--pairs", "100", "--laps", "0.5"});
+  Process robot({built_program("relmap-frontend"), folder_ / "long", "--robot", "barrow", "--server", folder_ / "map",
+                 "--spool", "none", "--quiet"},
+                {});
+  constexpr int kWaits = 16;
+  std::atomic<bool> done = false;
+  std::atomic<int> inside = 0, most = 0, refused = 0;
+  std::vector<std::thread> waits;
+  for (int i = 0; i < kWaits; ++i)
+    waits.emplace_back([&] {
+      const auto client = client::Client::connect(folder_ / "map").or_throw();
+      while (!done) {
+        most = std::max<int>(most, ++inside);
+        refused += client->wait_idle().reason() == Reason::BUDGET_EXCEEDED;
+        --inside;
+      }
+    });
+  EXPECT_TRUE(eventually([&] { return most == kWaits; })) << most << " wait at once";
+  for (int i = 0; i < 20; ++i) {
+    expect_answers(5);
+    const auto labels = client_->set_label({1, 0}, "label " + std::to_string(i));
+    EXPECT_TRUE(labels.ok()) << labels.status().to_string();
+    EXPECT_TRUE(client_->sessions().ok());
+  }
+  done = true;
+  for (std::thread& wait : waits) wait.join();
+  EXPECT_EQ(refused, 0) << "they have a limit of their own";
+  EXPECT_EQ(robot.wait(kPatience), 0);
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 

@@ -33,14 +33,21 @@ std::string field(const std::string& name, const std::string& value) {
 
 }  // namespace
 
-RawHttp2::RawHttp2(const std::string& address) {
+RawHttp2::RawHttp2(const std::string& address, const std::string& from) {
   const std::size_t colon = address.rfind(':');
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(address.substr(colon + 1))));
-  inet_pton(AF_INET, address.substr(0, colon).c_str(), &to.sin_addr);
+  const auto numeric = [](const std::string& host, int port) {
+    sockaddr_in socket_address{};
+    socket_address.sin_family = AF_INET;
+    socket_address.sin_port = htons(static_cast<std::uint16_t>(port));
+    inet_pton(AF_INET, host.c_str(), &socket_address.sin_addr);
+    return socket_address;
+  };
+  const sockaddr_in to = numeric(address.substr(0, colon), std::stoi(address.substr(colon + 1)));
+  const sockaddr_in own = numeric(from.empty() ? "0.0.0.0" : from, 0);
   fd_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd_ >= 0 && connect(fd_, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
+  if (fd_ < 0) return;
+  if (bind(fd_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0 ||
+      connect(fd_, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
     close(fd_);
     fd_ = -1;
   }
@@ -50,7 +57,8 @@ RawHttp2::RawHttp2(RawHttp2&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
       stream_(other.stream_),
       heard_(std::move(other.heard_)),
-      ended_(other.ended_) {}
+      ended_(other.ended_),
+      closed_(other.closed_) {}
 
 RawHttp2::~RawHttp2() {
   if (fd_ >= 0) close(fd_);
@@ -79,11 +87,11 @@ void RawHttp2::frame(std::uint8_t type, std::uint8_t flags, std::uint32_t stream
   (void)!send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
 }
 
-bool RawHttp2::ended() {
+void RawHttp2::hear() {
   std::array<char, 65536> buffer{};
   for (;;) {
     const ssize_t size = recv(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT);
-    if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR)) ended_ = true;
+    if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR)) closed_ = ended_ = true;
     if (size <= 0) break;
     heard_.append(buffer.data(), static_cast<std::size_t>(size));
   }
@@ -95,7 +103,16 @@ bool RawHttp2::ended() {
     if (last && byte(8) == (stream_ & 0xff)) ended_ = true;
     heard_.erase(0, kFrameHeader + size);
   }
+}
+
+bool RawHttp2::ended() {
+  hear();
   return ended_;
+}
+
+bool RawHttp2::closed() {
+  hear();
+  return closed_;
 }
 
 }  // namespace relmap::testing
