@@ -79,6 +79,21 @@ TEST_F(RocksDbFaults, BelowTheLowWaterMarkNothingIsTakenInAndCommitsGoOn) {
   EXPECT_TRUE(commit(2).ok());
 }
 
+TEST_F(RocksDbFaults, ALogOfRocksDbThatCannotBeWrittenToEndsNothing) {
+  const auto faults = std::make_shared<DiskFaults>();
+  faults->write = Reason::DISK_FULL;
+  RocksDbOptions options;
+  options.map_files = std::make_shared<FaultyMapFiles>(faults, "/LOG");
+  engine_ = open_rocksdb(folder_ / "data", options).or_throw();
+  epoch_ = engine_->acquire().or_throw();
+  ASSERT_TRUE(append().ok());
+  EXPECT_TRUE(commit(1).ok());
+  expect_committed(1);
+  (void)open_rocksdb(folder_ / "other").or_throw();
+  const auto size = [&](const std::string& data) { return std::filesystem::file_size(folder_ / (data + "/map/LOG")); };
+  EXPECT_LT(size("data") * 3, size("other") * 2) << "of each line that fails half is written";
+}
+
 TEST_F(RocksDbFaults, ACommitThatFindsTheDiskFullTakesTheReserve) {
   open();
   ASSERT_TRUE(append().ok());

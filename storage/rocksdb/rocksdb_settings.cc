@@ -13,6 +13,7 @@
 
 #include "storage/rocksdb/durable_manifest.h"
 #include "storage/rocksdb/gradual_deletion.h"
+#include "storage/rocksdb/lossy_info_log.h"
 #include "storage/rocksdb/retryable_files.h"
 #include "storage/rocksdb/torn_manifest.h"
 
@@ -76,8 +77,8 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   o.use_direct_io_for_flush_and_compaction = direct;
   auto files = wanted.map_files ? wanted.map_files : gradual_deletion(rocksdb::FileSystem::Default());
   settings.forgive_torn_manifest = std::make_shared<std::atomic<bool>>(false);
-  settings.env = rocksdb::NewCompositeEnv(
-      retryable_files(torn_manifest(durable_manifest(std::move(files)), settings.forgive_torn_manifest)));
+  settings.env = rocksdb::NewCompositeEnv(lossy_info_log(
+      retryable_files(torn_manifest(durable_manifest(std::move(files)), settings.forgive_torn_manifest))));
   o.env = settings.env.get();
   o.max_bgerror_resume_count = 0;        // the engine's commits resume
   o.avoid_flush_during_shutdown = true;  // what was put beside the log is in the log too
