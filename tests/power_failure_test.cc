@@ -45,8 +45,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 constexpr std::uint32_t kLap = 25;
-// Of a start that makes a map, before the daemon serves; a few may belong to what follows.
-constexpr std::uint64_t kSyncsOfAStart = 20;
 
 sim::PointsWorldOptions drive(std::uint32_t frames, std::uint8_t number) {
   return small_world(frames, kLap, 100, number);
@@ -228,7 +226,7 @@ std::uint64_t acknowledged(const std::vector<Told>& told, std::uint64_t operatio
 struct FirstStart {
   Trace trace;
   std::vector<Told> told;
-  std::uint64_t syncs = 0;
+  std::uint64_t syncs = 0, syncs_before_serving = 0;
 };
 
 // Sends a keyframe until it is acknowledged. Looks so often that what is recorded until then is what the
@@ -262,6 +260,7 @@ FirstStart record_first_start(const std::string& disk, const std::string& notes,
   options.lcm = random_lcm_url();
   options.environment = faults.environment();
   RunningDaemon daemon(options);
+  start.syncs_before_serving = faults.count(FaultKind::kSync);
   {
     const auto client = daemon.client();
     HandRobot robot(options.lcm, world.options().uuid);
@@ -331,11 +330,12 @@ void PowerFailure::first_start(const Thoroughness& how) {
 // later, the power fails. `number` of the syncs, evenly spread; 0: every one.
 void PowerFailure::failed_syncs(int number, const Thoroughness& how) {
   const sim::PointsWorld world(drive(24, 1));
-  const std::uint64_t all = record_first_start(disk_, folder_ / "notes", world).syncs;
-  ASSERT_GT(all, kSyncsOfAStart + 10);
-  const auto last = all * 3 / 4;  // no two runs are the same
-  const std::uint64_t step = number == 0 ? 1 : std::max<std::uint64_t>(1, (last - kSyncsOfAStart) / number);
-  for (std::uint64_t n = kSyncsOfAStart + 1; n <= last; n += step) {
+  const FirstStart without = record_first_start(disk_, folder_ / "notes", world);
+  const std::uint64_t first = without.syncs_before_serving + 1;
+  const std::uint64_t last = without.syncs * 3 / 4;  // no two runs are the same
+  ASSERT_GT(last, first + 5);
+  const std::uint64_t step = number == 0 ? 1 : (last - first) / static_cast<std::uint64_t>(number - 1);
+  for (std::uint64_t n = first; n <= last; n += step) {
     SCOPED_TRACE("sync " + std::to_string(n));
     FirstStart start =
         record_first_start(folder_ / ("disk-" + std::to_string(n)), folder_ / ("notes-" + std::to_string(n)), world, n);
