@@ -228,6 +228,7 @@ LookupQueue::End LookupQueue::look_up_and_journal(const Pushed& pushed) {
 LookupQueue::End LookupQueue::journal(const Pushed& pushed, const std::vector<storage::JournalRecord>& found) {
   if (found.empty()) return End::kDone;
   struct Outcome {
+    explicit Outcome(std::size_t records) : left(records) {}
     std::atomic<std::size_t> left;
     std::atomic<bool> durable = true;
   };

@@ -163,16 +163,16 @@ CityRobot::CityRobot(const CityWorld& world, const CityDriveOptions& drive, Sess
 
 SE3 CityRobot::bobbing(std::uint32_t i) const {
   const double s = drive_.metres_driven(i);
-  return SE3(so3_exp({kPitch * std::sin(1.3 * s), 0, 0}), {0, -kHeight * std::sin(0.7 * s), 0});
+  return SE3{so3_exp({kPitch * std::sin(1.3 * s), 0, 0}), {0, -kHeight * std::sin(0.7 * s), 0}};
 }
 
 SE3 CityRobot::T_cabin_frame(std::uint32_t i) const {
-  return SE3(Matrix3::Identity(), {0, 0, drive_.at(i).in_cabin}) * bobbing(i);
+  return SE3{Matrix3::Identity(), {0, 0, drive_.at(i).in_cabin}} * bobbing(i);
 }
 
 SE3 CityRobot::T_world_frame(std::uint32_t i) const {
   const PlanePose pose = drive_.at(i).pose;
-  return SE3(so3_exp({0, pose.yaw, 0}), {pose.x, 0, pose.z}) * bobbing(i);
+  return SE3{so3_exp({0, pose.yaw, 0}), {pose.x, 0, pose.z}} * bobbing(i);
 }
 
 Vector6 CityRobot::noise_of_step(std::uint32_t i) const {
