@@ -1,34 +1,25 @@
 // Any bytes as the files of a robot's spool: it opens or says by name why not; what it holds can be read, and goes on.
-// The first byte chooses the file: an even one means segments, of which each further byte begins a record (below). The
-// checksums of what they hold are right, so that what is behind them is reached.
-#include <cstdlib>
+// The first byte, modulo their number, chooses the file. The records of segments and the session are written with
+// checksums that are right, so that what is behind them is reached; both also come as they are.
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "frontend/publishing/disk_spool.h"
 #include "proto/base/crc32c.h"
+#include "proto/base/testing/fuzzing.h"
 #include "storage/testing/temporary_folder.h"
 
 namespace {
 
 using namespace relmap;
+using fuzzing::must;
+using fuzzing::write_file;
 namespace fs = std::filesystem;
 
 enum File : std::uint8_t { kSegments, kSegmentAsItIs, kSession, kSessionAsItIs, kMap, kRecording, kNames, kFiles };
 
 constexpr char kDrive[] = "kitti /drive --every 1";
 constexpr std::uint8_t kNextSegment = 255;  // in place of the length of a record
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
-
-void write(const std::string& path, ByteSpan bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  must(out.flush().good());
-}
 
 SessionHeader session() {
   SessionHeader header;
@@ -48,46 +39,41 @@ void write_segments(const std::string& folder, ByteReader in) {
     while (in.remaining() > 0) {
       const auto length = in.get<std::uint8_t>();
       if (length == kNextSegment) break;
-      const ByteSpan record = in.get_bytes(std::min<std::size_t>(length, in.remaining()));
+      const ByteSpan record = fuzzing::take_up_to(in, length);
       w.put(static_cast<std::uint32_t>(record.size()));
       w.put(crc32c(record));
       w.put_bytes(record);
     }
     const std::string digits = std::to_string(number);
-    write(folder + "/" + std::string(10 - digits.size(), '0') + digits + ".seg", w.bytes());
+    write_file(folder + "/" + std::string(10 - digits.size(), '0') + digits + ".seg", w.bytes());
   }
 }
 
-void write_file(const std::string& folder, unsigned file, ByteSpan bytes) {
+void write_chosen(const std::string& folder, unsigned file, ByteSpan bytes) {
   switch (file) {
     case kSegments:
       return write_segments(folder, ByteReader(bytes));
     case kSegmentAsItIs:
-      return write(folder + "/0000000000.seg", bytes);
+      return write_file(folder + "/0000000000.seg", bytes);
     case kSession: {
       ByteWriter w;
       w.put_bytes(bytes);
       w.put(crc32c(bytes));
-      return write(folder + "/session", w.bytes());
+      return write_file(folder + "/session", w.bytes());
     }
     case kSessionAsItIs:
-      return write(folder + "/session", bytes);
+      return write_file(folder + "/session", bytes);
     case kMap:
-      return write(folder + "/map", bytes);
+      return write_file(folder + "/map", bytes);
     case kRecording:
-      return write(folder + "/recording", bytes);
+      return write_file(folder + "/recording", bytes);
     default: {  // a file of another name, as of a segment
       std::string name;
       for (const std::uint8_t byte : bytes.first(std::min<std::size_t>(bytes.size(), 10)))
         name += static_cast<char>('0' + byte % 10);
-      return write(folder + "/" + name + ".seg", {});
+      return write_file(folder + "/" + name + ".seg", {});
     }
   }
-}
-
-bool is_named(Reason reason) {
-  return reason == Reason::CORRUPT || reason == Reason::UNKNOWN_FORMAT_VERSION ||
-         reason == Reason::CALIBRATION_CHANGED || reason == Reason::INVALID_ARGUMENT;
 }
 
 void read_all(const publishing::DiskSpool& spool) {
@@ -109,14 +95,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     must(sound.ok() && (*sound)->append(0, as_bytes("a keyframe"), crc32c(as_bytes("a keyframe"))).ok());
     must((*sound)->set_map({Uuid{{7}}, 3}).ok());
   }
-  write_file(folder, data[0] % kFiles, {data + 1, size - 1});
+  write_chosen(folder, data[0] % kFiles, {data + 1, size - 1});
   std::size_t keyframes = 0, gaps = 0;
   MapIdentity map;
   std::uint32_t next = 1;
   {
     const auto spool = publishing::DiskSpool::open(folder, session(), kDrive);
     if (!spool.ok()) {
-      must(is_named(spool.reason()));
+      must(fuzzing::is_one_of(spool.reason(), {Reason::CORRUPT, Reason::UNKNOWN_FORMAT_VERSION,
+                                               Reason::CALIBRATION_CHANGED, Reason::INVALID_ARGUMENT}));
       return 0;
     }
     must((*spool)->damaged_bytes() <= (*spool)->disk_bytes());

@@ -1,8 +1,8 @@
 // Any bytes as what map format 1 wrote: what is read of them is written in today's format as a migration does, and can
 // be read again. The first byte chooses the kind of record; sessions and state are tried as they are, and sealed.
 #include <cmath>
-#include <cstdlib>
 
+#include "proto/base/testing/fuzzing.h"
 #include "storage/format/frame_codec.h"
 #include "storage/format/sealed.h"
 #include "storage/format/state_codec.h"
@@ -13,12 +13,9 @@ namespace {
 
 using namespace relmap;
 using namespace relmap::storage;
+using fuzzing::must;
 
 constexpr FrameId kId{3, 577};
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
 
 void migrate_session(ByteSpan bytes) {
   const auto record = format1::decode_session(bytes);

@@ -1,20 +1,12 @@
 // Any bytes as RocksDB's list of files: they are read as records that can be written and read again, and blob files
 // can be added to them. The first byte says how many; what describes them is taken from the end.
-#include <cstdlib>
-
+#include "proto/base/testing/fuzzing.h"
 #include "storage/rocksdb/manifest_log.h"
-
-namespace {
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
-
-}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace relmap;
   using namespace relmap::storage;
+  using fuzzing::must;
   if (size == 0) return 0;
   const ByteSpan log(data + 1, size - 1);
   const std::vector<Bytes> records = read_log(log);

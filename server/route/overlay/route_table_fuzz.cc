@@ -1,13 +1,12 @@
 // A table of cells, and the cells, of a small map with any changes: either they are not taken, or searches end with a
 // route or a reason. The first byte chooses whether the rest is the table as it is, changes to it, or changes to the
 // cells. After changes the checksums are right, so that what is behind them is reached.
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "proto/base/crc32c.h"
+#include "proto/base/testing/fuzzing.h"
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/overlay_table.h"
 #include "server/route/testing/drawn_map.h"
@@ -18,25 +17,11 @@ namespace {
 
 using namespace relmap;
 using namespace relmap::route;
+using fuzzing::must;
 
 constexpr std::uint64_t kCommit = 5;
 constexpr std::size_t kTableHeader = 16;
 const std::vector<RouteWeights> kMetrics{kByDistance, kByTime};
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
-
-Bytes read(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  return {text.begin(), text.end()};
-}
-void write(const std::string& path, ByteSpan bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  must(out.flush().good());
-}
 
 // Twenty drives of three frames around a block, every second of them in one direction only, joined by closures.
 class SmallTown {
@@ -55,8 +40,8 @@ class SmallTown {
     overlay.build(map);
     while (overlay.make_next()) continue;
     must(write_table(folder_path(), kCommit, overlay, std::vector<storage::ChunkId>{{2, 0}}).ok());
-    table = read(table_path());
-    cells = read(cells_path());
+    table = fuzzing::read_file(table_path());
+    cells = fuzzing::read_file(cells_path());
     find_parts();
   }
   std::string folder_path() const { return folder / ""; }
@@ -130,8 +115,8 @@ void write_changed(const SmallTown& town, unsigned kind, ByteReader in) {
       std::memcpy(cells.data() + part.offset - 4, &crc, sizeof crc);
     }
   }
-  write(town.table_path(), table);
-  write(town.cells_path(), cells);
+  fuzzing::write_file(town.table_path(), table);
+  fuzzing::write_file(town.cells_path(), cells);
 }
 
 // Whatever the cells are, an answer or a reason.
