@@ -1,17 +1,17 @@
 // Any text as an inertial recording: what is read is finite and by rising time.
-#include <cstdint>
-#include <cstdlib>
-
-#include "frontend/capture/imu_file.h"
+#include "frontend/capture/imu_csv.h"
+#include "proto/base/testing/fuzzing.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const auto samples = relmap::capture::parse_imu_csv({reinterpret_cast<const char*>(data), size});
+  using namespace relmap;
+  using fuzzing::must;
+  const auto samples = capture::parse_imu_csv(fuzzing::text_of({data, size}));
   if (!samples.ok()) return 0;
-  if (samples->empty()) std::abort();
+  must(!samples->empty());
   for (std::size_t i = 0; i < samples->size(); ++i) {
-    const relmap::ImuSample& sample = (*samples)[i];
-    if (!sample.gyro.allFinite() || !sample.acceleration.allFinite()) std::abort();
-    if (sample.time_us < 0 || (i > 0 && sample.time_us <= (*samples)[i - 1].time_us)) std::abort();
+    const ImuSample& sample = (*samples)[i];
+    must(sample.gyro.allFinite() && sample.acceleration.allFinite() && sample.time_us >= 0);
+    must(i == 0 || sample.time_us > (*samples)[i - 1].time_us);
   }
   return 0;
 }

@@ -2,25 +2,17 @@
 #pragma once
 
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "proto/base/status.h"
 #include "proto/calibration/imu.h"
 
 namespace relmap::capture {
 
-// Parses lines "nanoseconds, gyro x, y, z (rad/s), acceleration x, y, z (m/s^2)"; # begins a comment. Relative times
-// (below 10^9 s) are treated as those of pictures (capture_time.h). CORRUPT if a line is malformed; NOT_FINITE;
-// TIME_BACKWARDS if a line is not later than the one before by at least a microsecond; BAD_SIZE if there is no sample.
-// The message has the line.
-Result<std::vector<ImuSample>> parse_imu_csv(std::string_view text);
-
 // Reads `path`: such a file, or a folder with data.csv or imu.csv, or a folder in which find_imu() finds one. The
 // unit's calibration (proto/calibration/imu_calibration.h) must be beside it, under the same name or as sensor.yaml,
 // since it says how the axes are oriented. `T_body_camera` is StereoCalibration::T_body_left of the same body. Samples
 // are moved to the cameras' clock. NO_SUCH_FILE, IO_ERROR, and the reasons of parse_imu_calibration() and
-// parse_imu_csv(); the message names the file.
+// parse_imu_csv() (imu_csv.h); the message names the file.
 Result<ImuRecording> read_imu(const std::string& path, const SE3& T_body_camera);
 
 // The inertial recording of a data set's folder: mav0/imu0, imu0 or imu.csv; empty if there is none.

@@ -142,6 +142,24 @@ Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
   return pictures;
 }
 
+Result<std::vector<TimedPicture>> list_timed_pictures(const fs::path& folder) {
+  const auto files = list_pictures(folder);
+  if (!files.ok()) return files.status();
+  std::vector<TimedPicture> pictures;
+  for (const fs::path& file : *files) {
+    const auto time = time_from_nanoseconds(file.stem().string());
+    if (!time) return {Reason::CORRUPT, file.string() + ": its name is no time in nanoseconds"};
+    pictures.push_back({file, *time});
+  }
+  // Names with different numbers of digits do not sort by time.
+  std::sort(pictures.begin(), pictures.end(),
+            [](const TimedPicture& a, const TimedPicture& b) { return a.time_us < b.time_us; });
+  for (std::size_t i = 1; i < pictures.size(); ++i)
+    if (pictures[i].time_us == pictures[i - 1].time_us)
+      return {Reason::TIME_BACKWARDS, pictures[i].path.string() + " is not later than the one before"};
+  return pictures;
+}
+
 std::string PassedOver::describe() const {
   std::string text;
   if (!folders.empty()) text = counted_text(folders.size(), "folder") + " (" + first_names(folders) + ")";

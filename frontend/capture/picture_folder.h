@@ -19,6 +19,15 @@ struct PicturePair {
 // in it; UNSUPPORTED if it has only pictures of other formats (.tiff, .bmp, .heic and the like).
 Result<std::vector<std::filesystem::path>> list_pictures(const std::filesystem::path& folder);
 
+struct TimedPicture {
+  std::filesystem::path path;
+  std::int64_t time_us = 0;
+};
+
+// Lists pictures of a folder whose names are nanoseconds. The reasons of list_pictures(); CORRUPT if a name is no time;
+// TIME_BACKWARDS.
+Result<std::vector<TimedPicture>> list_timed_pictures(const std::filesystem::path& folder);
+
 // Names of what a folder has besides pictures and is not read: folders, and files of other formats. Hidden ones
 // (.name), calibrations and times do not count.
 struct PassedOver {

@@ -18,10 +18,6 @@ std::optional<std::int64_t> time_of(std::string_view stamp, TimeUnit unit) {
   return unit == TimeUnit::kSeconds ? time_from_seconds(stamp) : time_from_nanoseconds(stamp);
 }
 
-Status backwards(const std::string& where) {
-  return {Reason::TIME_BACKWARDS, where + " is not later than the one before"};
-}
-
 }  // namespace
 
 Result<std::vector<TimedPicture>> parse_picture_list(std::string_view text, TimeUnit unit, const fs::path& folder) {
@@ -33,7 +29,8 @@ Result<std::vector<TimedPicture>> parse_picture_list(std::string_view text, Time
     if (name.starts_with(',')) name = trimmed(name.substr(1));
     const auto time = time_of(line.substr(0, stamp_end), unit);
     if (!time || name.empty()) return {Reason::CORRUPT, lines.where() + " is no time and file name"};
-    if (!pictures.empty() && *time <= pictures.back().time_us) return backwards(lines.where());
+    if (!pictures.empty() && *time <= pictures.back().time_us)
+      return {Reason::TIME_BACKWARDS, lines.where() + " is not later than the one before"};
     pictures.push_back({folder / name, *time});
   }
   if (pictures.empty()) return {Reason::BAD_SIZE, "names no picture"};
@@ -45,23 +42,6 @@ Result<std::vector<TimedPicture>> read_picture_list(const fs::path& file, TimeUn
   if (!text.ok()) return text.status();
   auto pictures = parse_picture_list(*text, unit, folder);
   if (!pictures.ok()) return {pictures.reason(), file.string() + ": " + pictures.status().message()};
-  return pictures;
-}
-
-Result<std::vector<TimedPicture>> list_timed_pictures(const fs::path& folder) {
-  const auto files = list_pictures(folder);
-  if (!files.ok()) return files.status();
-  std::vector<TimedPicture> pictures;
-  for (const fs::path& file : *files) {
-    const auto time = time_from_nanoseconds(file.stem().string());
-    if (!time) return {Reason::CORRUPT, file.string() + ": its name is no time in nanoseconds"};
-    pictures.push_back({file, *time});
-  }
-  // Names with different numbers of digits do not sort by time.
-  std::sort(pictures.begin(), pictures.end(),
-            [](const TimedPicture& a, const TimedPicture& b) { return a.time_us < b.time_us; });
-  for (std::size_t i = 1; i < pictures.size(); ++i)
-    if (pictures[i].time_us == pictures[i - 1].time_us) return backwards(pictures[i].path.string());
   return pictures;
 }
 

@@ -1,5 +1,4 @@
-// Reads the times of pictures from a list (EuRoC's data.csv, TUM's rgb.txt) or from their names, and pairs them by
-// time.
+// Reads the times of pictures from a list (EuRoC's data.csv, TUM's rgb.txt), and pairs pictures by time.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +12,6 @@
 
 namespace relmap::capture {
 
-struct TimedPicture {
-  std::filesystem::path path;
-  std::int64_t time_us = 0;
-};
-
 enum class TimeUnit { kSeconds, kNanoseconds };
 
 // Parses lines of a time stamp and a file name relative to `folder`, separated by white space or a comma; # begins a
@@ -29,10 +23,6 @@ Result<std::vector<TimedPicture>> parse_picture_list(std::string_view text, Time
 // The same for a file, which the message names. NO_SUCH_FILE, and the reasons above.
 Result<std::vector<TimedPicture>> read_picture_list(const std::filesystem::path& file, TimeUnit unit,
                                                     const std::filesystem::path& folder);
-
-// Lists pictures of a folder whose names are nanoseconds. The reasons of list_pictures(); CORRUPT if a name is no time;
-// TIME_BACKWARDS.
-Result<std::vector<TimedPicture>> list_timed_pictures(const std::filesystem::path& folder);
 
 inline constexpr std::int64_t kSameMomentUs = 1000;
 
