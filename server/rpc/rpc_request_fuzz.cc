@@ -1,20 +1,20 @@
 // Requests of all methods of the three services, to a small map in memory, over gRPC without a socket. The bytes choose
-// up to four calls, and of each its method and its request: any bytes, or a message whose fields are set one by one,
-// to values that mean something in this map as well as to any. Every answer comes in time, a refusal has a reason, what
-// only reads changes nothing, and a map that was edited is sound.
+// up to four calls, and of each its method and its request: any bytes, a message as it is, or one whose fields are set
+// one by one, to values that mean something in this map as well as to any. Every answer comes in time, a refusal has a
+// reason, what only reads changes nothing, and a map that was edited is sound.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 #include <spdlog/spdlog.h>
 
-#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "proto/base/testing/fuzzing.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
@@ -32,6 +32,7 @@
 namespace {
 
 using namespace relmap;
+using fuzzing::must;
 namespace pb = google::protobuf;
 
 constexpr std::size_t kCalls = 4;                    // of one input
@@ -40,13 +41,7 @@ constexpr std::size_t kRepeats = 200;                // of one field
 constexpr auto kPatience = std::chrono::minutes(5);  // with sanitizers, on a busy machine
 constexpr std::size_t kBudget = std::size_t{256} << 20;
 
-void must(bool holds, const std::string& what = "") {
-  if (holds) return;
-  std::fprintf(stderr, "%s\n", what.c_str());
-  std::abort();
-}
-
-// The map that each input begins with, so that inputs do not depend on each other.
+// The map that a daemon begins with. A daemon serves input after input until one has changed the map.
 class SmallMap {
  public:
   SmallMap() {
@@ -190,8 +185,24 @@ class Requests {
   bool more() const { return in_.remaining() > 0; }
   std::uint8_t byte() { return in_.get<std::uint8_t>(); }
   std::string bytes() {
-    const ByteSpan some = in_.get_bytes(std::min<std::size_t>(byte(), in_.remaining()));
+    const ByteSpan some = fuzzing::take_up_to(in_, byte());
     return {some.begin(), some.end()};
+  }
+
+  // A whole message, with two bytes of length before it. In place of a text "?" and of a mark of 1 it has what an
+  // earlier answer said.
+  void read(pb::Message& message) {
+    const std::string_view some = fuzzing::text_of(fuzzing::take_up_to(in_, in_.get<std::uint16_t>()));
+    if (!message.ParsePartialFromArray(some.data(), static_cast<int>(some.size()))) message.Clear();
+    const pb::Descriptor& type = *message.GetDescriptor();
+    const pb::Reflection& to = *message.GetReflection();
+    for (int i = 0; i < type.field_count(); ++i) {
+      const pb::FieldDescriptor& field = *type.field(i);
+      if (field.is_repeated()) continue;
+      if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_STRING && to.GetString(message, &field) == "?")
+        to.SetString(&message, &field, heard_);
+      if (field.name() == "shown" && to.GetUInt64(message, &field) == 1) to.SetUInt64(&message, &field, shown_);
+    }
   }
 
   // What an earlier answer said may be asked for again: tokens, and what was shown.
@@ -446,13 +457,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::uint8_t how = requests.byte();
     std::vector<std::string> messages;
     for (int count = method.client_streaming() ? how / 2 % 8 : 1; count > 0; --count) {
-      if (how % 2 == 1) {
+      if (how % 2 == 1 && how < 128) {
         messages.push_back(requests.bytes());
         continue;
       }
       const std::unique_ptr<pb::Message> request(
           pb::MessageFactory::generated_factory()->GetPrototype(method.input_type())->New());
-      requests.fill(*request);
+      if (how % 2 == 1)
+        requests.read(*request);
+      else
+        requests.fill(*request);
       messages.push_back(request->SerializePartialAsString());
     }
     may_change = may_change || edits(method);

@@ -1,13 +1,13 @@
 // Any changes to the files of a small map's store, and any of them missing: what can be saved is, in a store that can
 // be read, or there is a reason why not; the damaged store stays as it is. Each change is a byte that chooses the file,
 // and a patch; with the highest bit the file is removed instead.
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "proto/base/testing/fuzzing.h"
 #include "storage/format/chunk_codec.h"
 #include "storage/format/frame_codec.h"
 #include "storage/format/keys.h"
@@ -22,15 +22,12 @@ namespace {
 
 using namespace relmap;
 using namespace relmap::storage;
+using fuzzing::must;
 namespace fs = std::filesystem;
 
 constexpr std::size_t kChanges = 8;
 constexpr std::uint32_t kChunks = 2, kFrames = 3;  // chunks of a session, frames of a chunk
 constexpr std::size_t kPicture = 5000;             // larger than what RocksDB keeps in tables
-
-void must(bool holds) {
-  if (!holds) std::abort();
-}
 
 using Files = std::map<std::string, Bytes>;
 
@@ -39,9 +36,7 @@ Files files_in(const std::string& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename();
     if (!entry.is_regular_file() || name == "LOCK" || name.starts_with("LOG")) continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
-    files[name] = {text.begin(), text.end()};
+    files[name] = fuzzing::read_file(entry.path());
   }
   return files;
 }
@@ -49,11 +44,7 @@ Files files_in(const std::string& folder) {
 void write(const std::string& folder, const Files& files) {
   fs::remove_all(folder);
   fs::create_directories(folder);
-  for (const auto& [name, bytes] : files) {
-    std::ofstream out(folder + "/" + name, std::ios::binary);
-    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    must(out.flush().good());
-  }
+  for (const auto& [name, bytes] : files) fuzzing::write_file(folder + "/" + name, bytes);
 }
 
 // A chunk with a few frames, in containers as they stand when it is open or closed; the cold parts become blobs.
@@ -117,11 +108,28 @@ Files make_store(const std::string& data) {
   return files_in(data + "/map");
 }
 
+// Everything in the store of `data` can be read.
+std::set<std::string> keys_in(const std::string& data) {
+  RocksDbOptions options;
+  options.cache_bytes = std::size_t{8} << 20;
+  options.read_only = true;
+  const auto engine = open_rocksdb(data, options);
+  must(engine.ok(), engine.status().to_string());
+  std::set<std::string> keys;
+  const Status scanned = (*engine)->snapshot()->scan("", [&](std::string_view key, ByteSpan) {
+    must(keys.insert(std::string(key)).second);
+    return true;
+  });
+  must(scanned.ok(), scanned.to_string());
+  return keys;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const TemporaryFolder kFolder;
   static const Files kSound = make_store(kFolder / "sound");
+  static const std::set<std::string> kKeys = keys_in(kFolder / "sound");
   Files files = kSound;
   ByteReader in({data, size});
   for (std::size_t i = 0; i < kChanges && in.remaining() > 0 && !files.empty(); ++i) {
@@ -132,10 +140,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     else
       patch(file->second, in);
   }
-  const std::string map = kFolder / "damaged/map", work = kFolder / "work", copy = kFolder / "copy";
+  const std::string map = kFolder / "damaged/map", work = kFolder / "work", copy = kFolder / "saved/map";
   write(map, files);
   fs::remove_all(work);
   fs::remove_all(copy);
+  fs::create_directories(kFolder / "saved");
+  for (const char* folder : {"damaged", "saved"}) {  // the rest of a data folder, which salvage leaves alone
+    fs::create_directories(kFolder / (std::string(folder) + "/journal"));
+    fs::copy_file(kFolder / "sound/FORMAT", kFolder / (std::string(folder) + "/FORMAT"),
+                  fs::copy_options::skip_existing);
+  }
   const auto saved = salvage_store(map, work, copy, {}, {});
   must(files_in(map) == files);
   if (!saved.ok()) {
@@ -143,7 +157,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   must(!saved->sound || saved->lost == 0);
-  const auto head = read_store_head(saved->sound ? map : copy);
-  must(head.ok());
+  must(read_store_head(saved->sound ? map : copy).ok());
+  const auto keys = keys_in(kFolder / (saved->sound ? "damaged" : "saved"));
+  must(std::includes(kKeys.begin(), kKeys.end(), keys.begin(), keys.end()));
+  must(saved->sound || keys.size() <= saved->copied);
   return 0;
 }

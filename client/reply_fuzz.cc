@@ -1,0 +1,136 @@
+// Any bytes as the replies of a daemon, which the client takes for what they say: it ends with values or CORRUPT. And
+// what the client asks can be read. The first byte chooses the message.
+#include <utility>
+
+#include "client/replies.h"
+#include "proto/base/testing/fuzzing.h"
+#include "relmap/v1/map.pb.h"
+#include "relmap/v1/status.pb.h"
+
+namespace {
+
+using namespace relmap;
+using namespace relmap::client;
+using fuzzing::must;
+
+template <typename Value>
+void check(const Result<Value>& read) {
+  must(read.ok() || (read.reason() == Reason::CORRUPT && !read.status().message().empty()));
+}
+
+template <typename Message, typename Value>
+void read_as(ByteSpan bytes, Result<Value> (*read)(const Message&)) {
+  Message message;
+  if (message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) check(read(message));
+}
+template <typename Message, typename Value>
+void read_as(ByteSpan bytes, Value (*read)(const Message&)) {
+  Message message;
+  if (message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) (void)read(message);
+}
+
+View view_of(ByteReader& in) {
+  View view;
+  const auto left = fuzzing::take_up_to(in, 3), right = fuzzing::take_up_to(in, 3);
+  view.left = fuzzing::text_of(left);
+  view.right = fuzzing::text_of(right);
+  const auto which = in.get<std::uint8_t>();
+  switch (which % 5) {
+    case 0:
+      view.frame = FrameId{which, in.get<std::uint32_t>()};
+      break;
+    case 1:
+      view.camera = StereoCamera{in.get<double>(), 320, 240, 0.1, 640, 480};
+      break;
+    case 2:
+      view.camera = StereoCalibration{};
+      break;
+    case 3:
+      view.camera = SessionNumber{which};
+      break;
+    default:
+      break;
+  }
+  return view;
+}
+
+RouteEnd end_of(ByteReader& in) {
+  switch (in.get<std::uint8_t>() % 4) {
+    case 0:
+      return FrameId{in.get<std::uint32_t>(), in.get<std::uint32_t>()};
+    case 1:
+      return std::string(fuzzing::text_of(fuzzing::take_up_to(in, 5)));
+    case 2:
+      return view_of(in);
+    default:
+      return Robot{"cart"};
+  }
+}
+
+void ask(ByteReader in) {
+  RouteRequest asked{end_of(in), end_of(in)};
+  const auto how = in.get<std::uint8_t>();
+  if ((how & 1u) != 0) asked.weights = RouteWeights{in.get<double>(), in.get<double>(), 0, 0};
+  if ((how & 2u) != 0) asked.or_from = {end_of(in)};
+  if ((how & 4u) != 0) asked.or_to = {end_of(in)};
+  asked.filter = {{how}, {FrameId{how, 1}}, {"hall"}, how, (how & 8u) != 0, (how & 16u) != 0, (how & 32u) != 0};
+  const v1::FindRouteRequest request = route_message(asked);
+  v1::FindRouteRequest read;
+  must(read.ParseFromString(request.SerializePartialAsString()));
+  must(read.or_from_size() == static_cast<int>(asked.or_from.size()) &&
+       read.has_weights() == asked.weights.has_value());
+  must(read.filter().no_long_loops() != asked.filter.long_loops);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const ByteSpan bytes(data + 1, size - 1);
+  switch (data[0] % 13) {
+    case 0:
+      read_as(bytes, read_edge);
+      break;
+    case 1:
+      read_as(bytes, read_effect);
+      break;
+    case 2:
+      read_as(bytes, read_exported);
+      break;
+    case 3:
+      read_as(bytes, read_frame);
+      break;
+    case 4:
+      read_as(bytes, read_session);
+      break;
+    case 5:
+      read_as(bytes, read_localisation);
+      break;
+    case 6:
+      read_as(bytes, read_matches);
+      break;
+    case 7: {
+      v1::RouteSummary message;
+      Route route;
+      if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) break;
+      const Status read = read_route_summary(message, route);
+      must(read.ok() || read.reason() == Reason::CORRUPT);
+      break;
+    }
+    case 8:
+      read_as(bytes, read_route_step);
+      break;
+    case 9:
+      read_as(bytes, read_transform);
+      break;
+    case 10:
+      read_as(bytes, read_status);
+      break;
+    case 11:
+      read_as(bytes, read_robot);
+      break;
+    default:
+      ask(ByteReader(bytes));
+  }
+  return 0;
+}
