@@ -1,9 +1,9 @@
-// Writes the inputs from which fuzzers of binary files and of requests start: sound ones, and ones with one fault each.
-// Each run writes the same. The rest of tests/corpus was found by fuzzing (tools/fuzz --keep).
+// Writes the inputs from which fuzzers of binary files and messages start: sound ones, and ones with one fault each.
+// Each run writes the same. The other inputs of tests/corpus are texts that were written by hand, what fuzzing has
+// found (tools/fuzz --keep), and what once caused a failure.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <numeric>
 #include <random>
@@ -22,39 +22,15 @@
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/paths.h"
+#include "tests/write_corpus.h"
 
 namespace {
 
 using namespace relmap;
+using fuzzing::read_file;
+using testing::Corpus;
+using testing::cut;
 namespace fs = std::filesystem;
-
-// The inputs of one fuzzer.
-class Corpus {
- public:
-  Corpus(const std::string& root, const std::string& fuzzer) : folder_(root + "/" + fuzzer) {
-    fs::create_directories(folder_);
-  }
-  // `first` are the bytes by which the fuzzer chooses what the rest is.
-  void add(const std::string& name, std::initializer_list<int> first, ByteSpan rest = {}) const {
-    std::ofstream out(folder_ + "/" + name, std::ios::binary);
-    for (const int byte : first) out.put(static_cast<char>(byte));
-    out.write(reinterpret_cast<const char*>(rest.data()), static_cast<std::streamsize>(rest.size()));
-    if (!out.flush()) std::abort();
-  }
-
- private:
-  const std::string folder_;
-};
-
-Bytes read(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  return {text.begin(), text.end()};
-}
-Bytes cut(Bytes bytes, std::size_t off) {
-  bytes.resize(bytes.size() - std::min(off, bytes.size()));
-  return bytes;
-}
 
 // The records of a spool's segments as spool_fuzz reads them: each behind a byte with its length.
 class SpoolRecords {
@@ -120,7 +96,7 @@ void write_spool(const std::string& root) {
     const auto opened = publishing::DiskSpool::open(spool, header, "kitti /drive --every 1");
     throw_if(opened.ok() ? (*opened)->append(0, as_bytes("a keyframe"), crc32c(as_bytes("a keyframe")))
                          : opened.status());
-    const Bytes session = read(spool + "/session"), segment = read(spool + "/0000000000.seg");
+    const Bytes session = read_file(spool + "/session"), segment = read_file(spool + "/0000000000.seg");
     corpus.add("session" + name, {kSessionAsItIs}, session);
     corpus.add("session_cut" + name, {kSessionAsItIs}, cut(session, 3));
     corpus.add("session_body" + name, {kSession}, cut(session, 4));
@@ -201,6 +177,20 @@ void write_places(const std::string& root) {
   Bytes damaged = sound;
   damaged.back() ^= 1;
   corpus.add("damaged", {kAsItIs}, damaged);
+
+  const Corpus blocks(root, "place_block_fuzz");
+  blocks.add("small", {}, small);
+  blocks.add("small_cut", {}, cut(small, 1));
+  blocks.add("small_and_more", {}, block(1, 0, 70));
+  std::vector<place::PlaceWords> places;  // two runs of frames, and common words
+  for (std::uint32_t i = 0; i < 40; ++i) places.push_back({{i < 20 ? 3u : 4u, 7 + i}, {1, 2, 10 + i, 299}});
+  const Bytes two_runs = place::encode_place_block(model, nullptr, places);
+  blocks.add("two_runs", {}, two_runs);
+  for (std::size_t at = 0; at < std::min<std::size_t>(two_runs.size(), 200); at += 4) {
+    Bytes changed = two_runs;
+    changed[at] ^= 0x81;
+    blocks.add("changed_at_" + std::to_string(at), {}, changed);
+  }
 }
 
 void write_routes(const std::string& root) {
@@ -327,8 +317,11 @@ int main(int argc, char** argv) try {
     std::fprintf(stderr, "usage: write_corpus FOLDER\n");
     return 2;
   }
-  for (const auto write :
-       {write_spool, write_places, write_routes, write_manifest, write_salvage, write_format1, write_requests})
+  for (const auto write : {write_spool, write_places, write_routes, write_manifest, write_salvage, write_format1,
+                           write_requests, testing::write_journal_segments, testing::write_journal_records,
+                           testing::write_chunks, testing::write_raw_logs, testing::write_keyframe_logs,
+                           testing::write_keyframe_files, testing::write_keyframes, testing::write_ingest_parts,
+                           testing::write_lcm_messages, testing::write_known_requests, testing::write_replies})
     write(argv[1]);
   return 0;
 } catch (const std::exception& error) {
