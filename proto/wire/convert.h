@@ -1,7 +1,7 @@
-// FOR ADAPTERS ONLY: the one header of relmap that shows generated code. Include it from .cc files (server/ingest,
-// server/rpc, frontend/publishing, client), never from a public header.
+// FOR ADAPTERS ONLY: the one header of relmap that shows generated code of protobuf. Include it from .cc files
+// (server/ingest, server/rpc, frontend/publishing, client), never from a public header.
 //
-// Converts the types of proto/ to and from protobuf and LCM. Only the form of what comes from outside is checked here
+// Converts the types of proto/ to and from protobuf. Only the form of what comes from outside is checked here
 // (sizes, finite numbers, unit quaternions); its users check what it means.
 #pragma once
 
@@ -14,13 +14,12 @@
 #include "proto/base/status.h"
 #include "proto/calibration/calibration.h"
 #include "proto/geometry/camera.h"
+#include "proto/geometry/canonical_rotation.h"
 #include "proto/geometry/covariance.h"
 #include "proto/geometry/geometry.h"
 #include "proto/keyframe/keyframe.h"
 #include "relmap/v1/common.pb.h"
 #include "relmap/v1/reason.pb.h"
-#include "relmap_lcm/keyframe_part_t.hpp"
-#include "relmap_lcm/pose_t.hpp"
 
 namespace relmap {
 
@@ -44,8 +43,8 @@ Result<SessionUuid> uuid_from_wire(std::string_view bytes);
 v1::Vector3 to_wire(const Vector3& v);
 v1::Transform to_wire(const SE3& T);
 v1::Covariance to_wire(const Matrix6& covariance);
-Result<Vector3> from_wire(const v1::Vector3& v);
 Result<SE3> from_wire(const v1::Transform& T);
+Result<SE3> transform_of(const QuaternionWxyz& q, const Vector3& t);
 Result<Matrix6> from_wire(const v1::Covariance& covariance);
 
 // ---- Cameras. IMPLAUSIBLE_CALIBRATION.
@@ -57,17 +56,5 @@ Result<StereoCalibration> from_wire(const v1::RawStereo& raw);
 // ---- Appearance. BAD_SIZE, NOT_FINITE.
 v1::FeatureSet to_wire(std::span<const AppearanceFeature> features);
 Result<std::vector<AppearanceFeature>> from_wire(const v1::FeatureSet& features);
-
-// ---- LCM.
-void uuid_to_lcm(const SessionUuid& uuid, std::uint8_t (&bytes)[16]);
-SessionUuid uuid_from_lcm(const std::uint8_t (&bytes)[16]);
-
-// The geometry of a pose_t.
-void put_pose(const SE3& T_frame_keyframe, const Matrix6& covariance, relmap_lcm::pose_t& message);
-struct PoseFromWire {
-  SE3 T_frame_keyframe;
-  Matrix6 covariance;
-};
-Result<PoseFromWire> get_pose(const relmap_lcm::pose_t& message);
 
 }  // namespace relmap

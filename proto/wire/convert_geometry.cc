@@ -9,13 +9,6 @@ namespace relmap {
 
 namespace {
 
-Result<SE3> make_transform(const QuaternionWxyz& q, const Vector3& t) {
-  const SE3 T{rotation_of(q), t};
-  if (!T.R.allFinite() || !T.t.allFinite()) return {Reason::NOT_FINITE, "transform is not finite"};
-  if (!is_rotation(T.R)) return {Reason::BAD_ROTATION, "quaternion is not of unit length"};
-  return T;
-}
-
 v1::RawCamera raw_to_wire(const RawCamera& c) {
   v1::RawCamera wire;
   wire.set_fx(c.fx);
@@ -65,16 +58,17 @@ v1::Covariance to_wire(const Matrix6& covariance) {
   return wire;
 }
 
-Result<Vector3> from_wire(const v1::Vector3& v) {
-  const Vector3 vector(v.x(), v.y(), v.z());
-  if (!vector.allFinite()) return {Reason::NOT_FINITE, "vector is not finite"};
-  return vector;
+Result<SE3> transform_of(const QuaternionWxyz& q, const Vector3& t) {
+  const SE3 T{rotation_of(q), t};
+  if (!T.R.allFinite() || !T.t.allFinite()) return {Reason::NOT_FINITE, "transform is not finite"};
+  if (!is_rotation(T.R)) return {Reason::BAD_ROTATION, "quaternion is not of unit length"};
+  return T;
 }
 
 Result<SE3> from_wire(const v1::Transform& T) {
   const v1::Quaternion& q = T.rotation();
   const v1::Vector3& t = T.translation();
-  return make_transform({q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()});
+  return transform_of({q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()});
 }
 
 Result<Matrix6> from_wire(const v1::Covariance& covariance) {
@@ -131,25 +125,6 @@ Result<StereoCalibration> from_wire(const v1::RawStereo& raw) {
     return {Reason::IMPLAUSIBLE_CALIBRATION, "the calibration does not say how large the pictures are"};
   if (Status s = calibration.check_plausible(); !s.ok()) return s;
   return calibration;
-}
-
-void put_pose(const SE3& T, const Matrix6& covariance, relmap_lcm::pose_t& message) {
-  const QuaternionWxyz q = canonical_quaternion(T.R);
-  std::copy(q.begin(), q.end(), message.rotation);
-  std::copy(T.t.data(), T.t.data() + 3, message.translation);
-  const UpperTriangle values = upper_triangle(covariance);
-  std::copy(values.begin(), values.end(), message.covariance);
-}
-
-Result<PoseFromWire> get_pose(const relmap_lcm::pose_t& m) {
-  const auto T = make_transform({m.rotation[0], m.rotation[1], m.rotation[2], m.rotation[3]},
-                                {m.translation[0], m.translation[1], m.translation[2]});
-  if (!T.ok()) return T.status();
-  UpperTriangle values;
-  std::copy(std::begin(m.covariance), std::end(m.covariance), values.begin());
-  const Matrix6 covariance = from_upper_triangle(values);
-  if (Status s = check_covariance(covariance); !s.ok()) return s;
-  return PoseFromWire{*T, covariance};
 }
 
 }  // namespace relmap

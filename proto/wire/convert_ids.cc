@@ -55,14 +55,4 @@ Result<SessionUuid> uuid_from_wire(std::string_view bytes) {
   return uuid;
 }
 
-void uuid_to_lcm(const SessionUuid& uuid, std::uint8_t (&bytes)[16]) {
-  std::copy(uuid.bytes.begin(), uuid.bytes.end(), bytes);
-}
-
-SessionUuid uuid_from_lcm(const std::uint8_t (&bytes)[16]) {
-  SessionUuid uuid;
-  std::copy(std::begin(bytes), std::end(bytes), uuid.bytes.begin());
-  return uuid;
-}
-
 }  // namespace relmap

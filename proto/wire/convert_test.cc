@@ -9,6 +9,7 @@
 #include "proto/base/crc32c.h"
 #include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
+#include "proto/wire/convert_lcm.h"
 
 namespace relmap {
 namespace {

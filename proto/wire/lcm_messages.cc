@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "proto/wire/channels.h"
-#include "proto/wire/convert.h"
+#include "proto/wire/convert_lcm.h"
 #include "relmap_lcm/acknowledgement_t.hpp"
 #include "relmap_lcm/gap_t.hpp"
 #include "relmap_lcm/hello_t.hpp"
