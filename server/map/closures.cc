@@ -48,11 +48,14 @@ bool store_claim(storage::EditableGraph& map, FrameId frame, std::size_t index, 
   if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
   const LandmarkId self = warm->observations[index].landmark;
   if (target.valid() && (self == target || !taken_in_before(map, target.base, self.base))) return false;
-  const auto& claims = map.hot(self.base)->landmarks[self.slot].claims;
-  const bool known = std::any_of(claims.begin(), claims.end(), [&](const storage::AliasClaim& claim) {
-    return claim.target == target && claim.closure == closure;
-  });
-  if (known || claims.size() >= kMaxClaims) return false;
+  {
+    const auto base = map.hot(self.base);  // nobody else may hold the frame
+    const auto& claims = base->landmarks[self.slot].claims;
+    const bool known = std::any_of(claims.begin(), claims.end(), [&](const storage::AliasClaim& claim) {
+      return claim.target == target && claim.closure == closure;
+    });
+    if (known || claims.size() >= kMaxClaims) return false;
+  }
   map.edit_hot(self.base).landmarks[self.slot].claims.push_back({target, closure});
   return true;
 }
@@ -62,7 +65,8 @@ using Landmarks = std::unordered_set<LandmarkId>;
 // What the frame's observations mean.
 Landmarks meanings_seen(const storage::Graph& graph, FrameId frame) {
   Landmarks seen;
-  for (const storage::Observation& observation : graph.warm(frame)->observations)
+  const auto warm = graph.warm(frame);
+  for (const storage::Observation& observation : warm->observations)
     seen.insert(storage::meaning_of(graph, observation.landmark).landmark);
   return seen;
 }

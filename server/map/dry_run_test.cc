@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/map/testing/two_laps.h"
+#include "storage/graph/forwarding_graph.h"
 
 namespace relmap::map {
 namespace {
@@ -12,6 +13,21 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 class DryRuns : public TwoLaps {};
+
+// Reads frames anew each time, as a map does whose frames are in no cache: only the caller holds them.
+class UncachedGraph final : public storage::ForwardingGraph<storage::Graph> {
+ public:
+  explicit UncachedGraph(const storage::Graph& graph) : ForwardingGraph(graph) {}
+
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
+    const auto frame = ForwardingGraph::hot(id);
+    return frame ? std::make_shared<const storage::FrameHot>(*frame) : nullptr;
+  }
+  std::shared_ptr<const storage::FrameWarm> warm(FrameId id) const override {
+    const auto frame = ForwardingGraph::warm(id);
+    return frame ? std::make_shared<const storage::FrameWarm>(*frame) : nullptr;
+  }
+};
 
 // That the changes of single edits are those of the edit itself is tested with each edit (edge_edit_test.cc).
 TEST_F(DryRuns, AProposalAndItsAcceptanceAreReportedAsOneChange) {
@@ -62,6 +78,17 @@ TEST_F(DryRuns, TheMarkOfARemovalIsThatOfTheMap) {
   EXPECT_EQ(run.removal(edit_record(id, EdgeAction::kRemove)), removal_mark(drive_.map(), id));
   EXPECT_EQ(run.removal(edit_record(id, EdgeAction::kRemoveAlone)), 0U) << "it takes out nothing else";
   EXPECT_EQ(run.removal(edit_record({{kDriveSession, 62}, 99}, EdgeAction::kRemove)), 0U) << "there is no such edge";
+}
+
+TEST_F(DryRuns, FramesAreHeldWhileTheyAreRead) {
+  const UncachedGraph uncached(drive_.map());
+  const auto proposal = *true_closure(drive_.map(), world_, 62, kLap);
+  DryRun run(uncached, drive_.map().state()), cached(drive_.map(), drive_.map().state());
+  const EdgeId id = cached.propose(proposal);
+  EXPECT_EQ(run.propose(proposal), id);
+  for (DryRun* one : {&run, &cached}) ASSERT_TRUE(one->edit(edit_record(id, EdgeAction::kAccept)).ok());
+  EXPECT_EQ(run.changes(), cached.changes());
+  EXPECT_THAT(derived_differences(run.outcome()), IsEmpty());
 }
 
 TEST_F(DryRuns, WhatProceedRefusesIsThrown) {

@@ -116,12 +116,14 @@ std::vector<storage::Edge> put_out_by(const storage::Graph& graph, const storage
   std::set<EdgeId> seen{decided.id};
   for (const place::PlacedFrame& near :
        place::along_odometry(graph, decided.b, ConsistencyRules().reach, ConsistencyRules().reach,
-                             [](const storage::Edge& step) { return std::optional<storage::Edge>(step); }))
-    for (const storage::Edge& edge : graph.hot(near.frame)->edges) {
+                             [](const storage::Edge& step) { return std::optional<storage::Edge>(step); })) {
+    const auto hot = graph.hot(near.frame);
+    for (const storage::Edge& edge : hot->edges) {
       if (!by_it(edge) || seen.contains(edge.id)) continue;
       for (storage::Edge& member : joined_set(graph, edge.id, by_it))  // with those of add_left_alone()
         if (seen.insert(member.id).second) found.push_back(std::move(member));
     }
+  }
   return found;
 }
 

@@ -36,9 +36,11 @@ std::optional<storage::Edge> closure_of_record(const storage::Graph& graph, Fram
     });
   };
   for (const FrameId end : {a, b})
-    for (const place::PlacedFrame& near : place::along_odometry(graph, end, place::kViewReach, place::kViewReach))
-      for (const storage::Edge& edge : graph.hot(near.frame)->edges)
+    for (const place::PlacedFrame& near : place::along_odometry(graph, end, place::kViewReach, place::kViewReach)) {
+      const auto hot = graph.hot(near.frame);
+      for (const storage::Edge& edge : hot->edges)
         if (is_it(edge)) return edge;
+    }
   return std::nullopt;
 }
 

@@ -216,7 +216,8 @@ class Mender {
       tell(Reason::DATA_LOSS, id, std::to_string(dropped) + " observations of what is lost were dropped");
       std::erase_if(map_.edit_warm(id).observations, bad);
     }
-    for (const Observation& z : map_.warm(id)->observations) {
+    const auto mended = map_.warm(id);
+    for (const Observation& z : mended->observations) {
       if (!z.origin.valid()) continue;
       const auto& bound = closure(z.origin)->bound_frames;
       if (std::binary_search(bound.begin(), bound.end(), id)) continue;
@@ -227,7 +228,8 @@ class Mender {
   }
 
   void count_closures(FrameId id) {
-    for (const Edge& edge : map_.hot(id)->edges)
+    const auto hot = map_.hot(id);
+    for (const Edge& edge : hot->edges)
       if (edge.kind == EdgeKind::kLoop) ++closures_[static_cast<std::size_t>(edge.state) - 1];
   }
   void mend_state() {

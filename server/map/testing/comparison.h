@@ -38,7 +38,8 @@ inline std::vector<std::string> structural_differences(const storage::Graph& a, 
                std::to_string(other->edges.front().support));
     const auto seen = [&](const storage::Graph& graph) {
       std::vector<LandmarkId> landmarks;
-      for (const storage::Observation& o : graph.warm(id)->observations)
+      const auto warm = graph.warm(id);
+      for (const storage::Observation& o : warm->observations)
         if (storage::closure_holds(graph, o.origin)) landmarks.push_back(storage::resolve(graph, o.landmark));
       return landmarks;
     };
