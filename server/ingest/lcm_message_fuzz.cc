@@ -1,9 +1,11 @@
-// Any bytes as each message that comes over LCM: as they are, as a datagram on each side, and in the exchange of a
-// robot and a daemon that seal what they send. The first byte chooses the message, the second one how far the exchange
-// goes (Flag), the third one the seconds until the daemon takes what the robot has sealed, and the fourth one the time
-// that it is then, by which keys expire.
+// Any bytes as each message that comes over LCM and as the secret of a fleet: as they are, as a datagram on each side,
+// and in the exchange of a robot and a daemon that seal what they send. The first byte chooses the message, the second
+// one how far the exchange goes (Flag), the third one the seconds until the daemon takes what the robot has sealed, and
+// the fourth one the time that it is then, by which keys expire.
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <string>
 #include <utility>
 
 #include "frontend/publishing/lcm/sealed_daemon.h"
@@ -12,6 +14,7 @@
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 #include "server/ingest/sealed_robots.h"
+#include "storage/testing/temporary_folder.h"
 
 namespace {
 
@@ -189,6 +192,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   status.version = fuzzing::text_of(ByteSpan(message).first(std::min<std::size_t>(message.size(), 20)));
   status.sessions = message.size();
   must(encode_lcm(status).size() > status.version.size());
+
+  static const storage::TemporaryFolder kFolder;
+  const std::string secret = kFolder / "key";
+  fuzzing::write_file(secret, message);
+  std::filesystem::permissions(secret, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+  const auto line = fuzzing::text_of(message).substr(0, fuzzing::text_of(message).find('\n'));
+  must(access::read_secret(secret).ok() == access::key_of_hex(line).has_value());
 
   Exchange exchange;
   exchange.robots.use(access_list(false));

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "proto/base/testing/fuzzing.h"
+#include "proto/calibration/calibration_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
@@ -39,12 +40,25 @@ constexpr std::size_t kCalls = 4;                    // of one input
 constexpr int kFields = 24, kDepth = 4;              // of one message
 constexpr std::size_t kRepeats = 200;                // of one field
 constexpr auto kPatience = std::chrono::minutes(5);  // with sanitizers, on a busy machine
+constexpr std::uint32_t kAgain = 5;                  // frames of session 3
 constexpr std::size_t kBudget = std::size_t{256} << 20;
 
 // The map that a daemon begins with. A daemon serves input after input until one has changed the map.
 class SmallMap {
  public:
   SmallMap() {
+    // Session 3 drives the beginning of the circuit again while nothing is recognised, so that closures to session 1
+    // can be proposed.
+    map::MapperOptions unrecognised;
+    unrecognised.closures = false;
+    map_.restart(unrecognised);
+    sim::PointsWorldOptions again = rpc::ServedMap::circuit_options();
+    again.frames = kAgain;
+    again.noise_seed = 3;
+    again.uuid.bytes[15] = 3;
+    again.session = "again";
+    map_.take_in(sim::PointsWorld(again));
+    map_.settle();
     map_.mapper->commit(std::chrono::steady_clock::now() + kPatience).or_throw();
     const storage::Engine& engine = map_.mapper->engine();
     throw_if(engine.snapshot()->scan("", [&](std::string_view key, ByteSpan value) {
@@ -58,7 +72,7 @@ class SmallMap {
   std::shared_ptr<storage::Engine> copy() const {
     auto engine = storage::make_memory_engine();
     const std::uint64_t epoch = engine->acquire().or_throw();
-    (void)engine->allocate_session(epoch, 1).or_throw();  // the two of the map
+    (void)engine->allocate_session(epoch, 2).or_throw();  // the three of the map
     throw_if(engine->commit(epoch, applied_, puts_, {}));
     const std::vector<Bytes> applied(applied_);
     (void)engine->append(epoch, applied).or_throw();
@@ -82,13 +96,23 @@ class Daemon {
       : mapper_(map::Mapper::open(map.copy(), std::make_shared<storage::Budget>(kBudget),
                                   place::random_vocabulary(rpc::ServedMap::kWords, 60, 1), {})
                     .or_throw()),
-        core_(*mapper_, {"test", "b007b007b007", "/data", "", false, 4711, 0, {"/nowhere/backups"}}),
+        core_(*mapper_, {"test", "b007b007b007", "/data", "", false, 4711, 0, {"/nowhere/backups"}}, limits()),
         sink_(*mapper_),
         gateway_(core_.limits, mapper_->budget(), core_.metrics, everyone_, connections_) {
     intake::IngestServerOptions options;
     options.map = mapper_->identity();
     intake_ = std::make_unique<intake::IngestServer>(sink_, mapper_->budget(), BootId{4, 2}, std::move(options));
+    mapper_->watch_closures([this](const storage::Graph& graph, const storage::Edge& closure) {
+      if (auto news = ingest::closure_news(graph, closure)) intake_->tell(std::move(*news));
+    });
     core_.intake.server = intake_.get();
+    core_.intake.facts = [] {
+      rpc::IngestFacts facts;
+      facts.lcm = {Reason::IO_ERROR, "gone"};
+      facts.not_taken[Reason::CORRUPT] = 1;
+      return facts;
+    };
+    core_.process = [] { return rpc::ProcessFacts{1, 2}; };
     services_.push_back(rpc::make_map_service(core_, gateway_));
     services_.push_back(rpc::make_ingest_service(core_, gateway_));
     services_.push_back(rpc::make_admin_service(core_, gateway_));
@@ -104,6 +128,7 @@ class Daemon {
     hash_ = storage::hash_map(*mapper_->view());
   }
   ~Daemon() {
+    mapper_->watch_closures({});
     intake_->stop();
     server_->Shutdown(std::chrono::system_clock::now() + kPatience);
     queue_.Shutdown();
@@ -113,8 +138,9 @@ class Daemon {
   }
 
   // Sends the messages of a call, and returns how it ended and what was answered.
+  // If `settled`, the daemon has done all that they ask of it before it is told that there are no more.
   std::pair<grpc::Status, std::vector<std::string>> call(const std::string& path,
-                                                         const std::vector<std::string>& messages) {
+                                                         const std::vector<std::string>& messages, bool settled) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kPatience);
     const auto stream = stub_->PrepareCall(&context, path, &queue_);
@@ -127,6 +153,7 @@ class Daemon {
       open = done();
     }
     if (open) {
+      if (settled) settle();
       stream->WritesDone(this);
       (void)done();
     }
@@ -155,6 +182,11 @@ class Daemon {
   }
 
  private:
+  static rpc::RpcLimits limits() {
+    rpc::RpcLimits limits;
+    limits.route_steps_per_message = 8;  // so that routes of the small map are resumed
+    return limits;
+  }
   bool done() {
     void* tag = nullptr;
     bool ok = false;
@@ -265,7 +297,10 @@ class Requests {
     } else if (name == "KeyframePayload") {
       v1::KeyframePayload wire;
       Keyframe next = keyframe;
-      if (which % 4 != 1) next.session.uuid.bytes[15] = 9;  // of a new session
+      if (which % 4 != 1) {  // of a new session, of another camera before rectification
+        next.session.uuid.bytes[15] = 9;
+        next.session.raw = sample_raw_calibration(3);
+      }
       const Bytes payload = encode_keyframe(next);
       wire.set_session_uuid(uuid_to_wire(next.session.uuid));
       wire.set_sequence(which % 4 == 3 ? i + 100 : next.sequence);
@@ -470,7 +505,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       messages.push_back(request->SerializePartialAsString());
     }
     may_change = may_change || edits(method);
-    const auto [status, replies] = daemon->call("/" + method.service()->full_name() + "/" + method.name(), messages);
+    const auto [status, replies] =
+        daemon->call("/" + method.service()->full_name() + "/" + method.name(), messages, how >= 192);
     check_status(method.full_name(), status);
     for (const std::string& reply : replies) {
       const std::unique_ptr<pb::Message> answer(

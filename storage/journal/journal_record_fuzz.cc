@@ -1,6 +1,12 @@
-// Any bytes as a record of the journal, or as one of the records that describe the map beside its frames: as they are,
-// and sealed as what they may be. What decodes encodes to bytes that decode to the same again.
+// Any bytes as a record of the journal, as one of the records that describe the map beside its frames, and as the
+// extensions of these: as they are, and sealed as what they may be. What decodes encodes to bytes that decode to the
+// same again.
+#include <memory>
+#include <vector>
+
 #include "proto/base/testing/fuzzing.h"
+#include "proto/keyframe/extension_codec.h"
+#include "storage/format/extension_tags.h"
 #include "storage/format/sealed.h"
 #include "storage/format/state_codec.h"
 #include "storage/journal/journal_record.h"
@@ -23,6 +29,40 @@ void round_trip(ByteSpan bytes, Result<Decoded> (*decode)(ByteSpan), Bytes (*enc
   must(again.ok() && encode(*again) == once);
 }
 
+// A field that is taken of extensions can be added to them again.
+template <typename Field, typename Added>
+void try_field(const Extensions& all, bool (*take)(Extensions&, Field&), void (*add)(Extensions&, Added),
+               auto added_of) {
+  Extensions rest = all;
+  Field field{};
+  if (!take(rest, field)) return;
+  add(rest, added_of(field));
+  Field again{};
+  Extensions once = rest;
+  must(take(rest, again));
+  add(rest, added_of(again));
+  must(rest == once);
+}
+
+void try_extensions(ByteSpan bytes) {
+  ByteReader in(bytes);
+  const auto all = read_extensions(in);
+  if (!all.ok()) return;
+  const auto itself = [](const auto& field) -> const auto& { return field; };
+  const auto pointer = [](const std::shared_ptr<const WayAround>& around) { return around.get(); };
+  try_field<Uniqueness, const Uniqueness&>(*all, tags::take_uniqueness, tags::add_uniqueness, itself);
+  try_field<FrameRange, const FrameRange&>(*all, tags::take_carried, tags::add_carried, itself);
+  try_field<std::shared_ptr<const WayAround>, const WayAround*>(*all, tags::take_way_around, tags::add_way_around,
+                                                                pointer);
+  try_field<std::vector<std::uint32_t>, const std::vector<std::uint32_t>&>(*all, tags::take_unseen, tags::add_unseen,
+                                                                           itself);
+  try_field<ClosureId, ClosureId>(*all, tags::take_unseen_place, tags::add_unseen_place, itself);
+  try_field<MapIdentity, const MapIdentity&>(*all, tags::take_map_identity, tags::add_map_identity, itself);
+  try_field<SessionState, SessionState>(*all, tags::take_before_frozen, tags::add_before_frozen, itself);
+  try_field<std::uint64_t, std::uint64_t>(*all, tags::take_shown, tags::add_shown, itself);
+  try_field<EditKey, const EditKey&>(*all, tags::take_edit_key, tags::add_edit_key, itself);
+}
+
 void try_all(ByteSpan bytes) {
   if (const auto decoded = decode_record(bytes); decoded.ok()) {
     const Bytes once = encode_record(decoded->record, decoded->acknowledged_through);
@@ -41,6 +81,7 @@ void try_all(ByteSpan bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const ByteSpan bytes(data, size);
+  try_extensions(bytes);
   try_all(bytes);
   if (size == 0) return 0;
   // Bytes of chance do not pass the checksum. The first one is the kind of the record; each kind has some of these

@@ -29,10 +29,10 @@ class ServedMap {
   }
 
   // Ends the service and serves the same map again.
-  void restart() {
+  void restart(const map::MapperOptions& options = {}) {
     core.reset();
     mapper.reset();
-    start({}, {});
+    start({}, options);
   }
 
   void take_in(const sim::PointsWorld& world) {
