@@ -351,6 +351,7 @@ void write_lcm_messages(const std::string& root) {
   news.rate_hz = 0;
   news.covariance = -Matrix6::Identity();
   corpus.add("pose_bad_covariance", {kPose, 0, 1, 100}, encode_lcm(news));
+  corpus.add("secret", {kHello, 0, 1, 100}, as_bytes(std::string(64, 'a') + "\n"));
   // The exchange: flags, seconds until the daemon takes it, time by which keys expire.
   enum Flag { kPinned = 1, kManyDaemons = 2, kManyRuns = 4, kManySessions = 8, kRevoked = 16 };
   const Bytes gap = messages[1].second.second;

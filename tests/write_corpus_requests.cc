@@ -1,5 +1,6 @@
 // What rpc_request_fuzz starts from: requests of all methods that mean something in its small map, in which session 1
-// has 50 frames, of which the last ten come back to where the first were, and session 2 has six elsewhere.
+// has 50 frames, of which the last ten come back to where the first were, session 2 has six elsewhere, and session 3
+// has five where session 1 began.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
 
@@ -50,9 +51,11 @@ class Calls {
     return *this;
   }
   // Fields are set one by one, as the fuzzer reads them from bytes; it knows keyframes and views of the map.
-  Calls& fields(const std::string& method, int messages, std::initializer_list<int> bytes) {
+  // `settled`: the daemon has done what the messages of a stream ask of it before the stream ends.
+  Calls& fields(const std::string& method, int messages, std::initializer_list<int> bytes, bool settled = false) {
+    constexpr int kSettled = 192;
     w_.put(number_of(method));
-    w_.put(static_cast<std::uint8_t>(2 * messages));
+    w_.put(static_cast<std::uint8_t>((settled ? kSettled : 0) + 2 * messages));
     for (const int byte : bytes) w_.put(static_cast<std::uint8_t>(byte));
     return *this;
   }
@@ -455,25 +458,33 @@ void add_edits(const Corpus& corpus) {
     });
   };
   const auto as_it_is = [](v1::ProposeEdgeRequest&) {};
-  for (const std::uint32_t index : {41u, 44u, 47u})
-    corpus.add(
-        "closure_" + std::to_string(index), {},
-        Calls()
-            .call("ProposeEdge", proposal(index, 1, index - 40, [](v1::ProposeEdgeRequest& r) { r.set_dry_run(true); }))
-            .call("ProposeEdge", proposal(index - 40, 1, index,
-                                          [](v1::ProposeEdgeRequest& r) {
-                                            r.set_accept(true);
-                                            r.set_note("seen");
-                                            r.set_idempotency_key("once");
-                                          }))
-            .call("ProposeEdge", proposal(index - 40, 1, index,
-                                          [](v1::ProposeEdgeRequest& r) {
-                                            r.set_accept(true);
-                                            r.set_note("seen");
-                                            r.set_idempotency_key("once");
-                                          }))
-            .call("ProposeEdge", proposal(index, 1, index - 39, as_it_is))
-            .bytes());
+  corpus.add("closure_of_one_drive", {}, Calls().call("ProposeEdge", proposal(20, 1, 24, as_it_is)).bytes());
+  // Session 3 saw what session 1 did where both began, and no closure says so yet.
+  const auto dry = [](v1::ProposeEdgeRequest& r) { r.set_dry_run(true); };
+  const auto accepted = [](v1::ProposeEdgeRequest& r) {
+    r.set_accept(true);
+    r.set_note("seen");
+    r.set_idempotency_key("once");
+  };
+  corpus.add("closure_tried", {},
+             Calls()
+                 .call("ProposeEdge", proposal(1, 3, 1, dry))
+                 .call("ProposeEdge", proposal(2, 3, 2,
+                                               [](v1::ProposeEdgeRequest& r) {
+                                                 r.set_dry_run(true);
+                                                 r.set_accept(true);
+                                                 r.set_note("seen");
+                                               }))
+                 .call("ProposeEdge", proposal(1, 3, 1, as_it_is))
+                 .call("ProposeEdge", proposal(1, 3, 1, as_it_is))
+                 .bytes());
+  corpus.add("closure_accepted", {},
+             Calls()
+                 .call("ProposeEdge", proposal(2, 3, 2, accepted))
+                 .call("ProposeEdge", proposal(2, 3, 2, accepted))
+                 .call("ProposeEdge", proposal(3, 3, 3, accepted))  // of the same key
+                 .call("ListEdges", with<v1::ListEdgesRequest>([](v1::ListEdgesRequest& r) { r.set_session(3); }))
+                 .bytes());
   corpus.add("closure_refused", {},
              Calls()
                  .call("ProposeEdge", proposal(3, 1, 3, as_it_is))
@@ -548,6 +559,14 @@ void add_ingest(const Corpus& corpus) {
           .call("ListRobots", v1::ListRobotsRequest())
           .call("GetStatus", v1::GetStatusRequest())
           .bytes());
+  corpus.add("stream_that_is_localised", {},
+             Calls()
+                 .fields("Stream", 5,
+                         {kHello, kKnown, kEnd, kKeyframe, kNew, kEnd, kKeyframe, 4 + kNew, kEnd, kKeyframe, 8 + kNew,
+                          kEnd, kKeyframe, 12 + kNew, kEnd},
+                         true)
+                 .call("ListSessions", v1::ListSessionsRequest())
+                 .bytes());
   corpus.add("stream_of_known_session", {},
              Calls()
                  .fields("Stream", 4,

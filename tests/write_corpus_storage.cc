@@ -1,10 +1,13 @@
 // What fuzzers of the map's files on the disk start from: segments and records of the journal, parts of chunks.
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "proto/keyframe/extension_codec.h"
 #include "storage/format/chunk_codec.h"
+#include "storage/format/extension_tags.h"
 #include "storage/format/frame_codec.h"
 #include "storage/format/state_codec.h"
 #include "storage/journal/journal_record.h"
@@ -100,6 +103,36 @@ void write_journal_records(const std::string& root) {
   corpus.add("edit", {}, encode_edit({"an edit", 1}));
   corpus.add("edit_without_name", {kEdit}, body(encode_edit({"", 1})));
   corpus.add("unknown_kind", {99}, Bytes(20, 0));
+
+  Extensions all;
+  Uniqueness uniqueness;
+  uniqueness.known = true;
+  uniqueness.runner_up = {1, 2};
+  uniqueness.alike = 3;
+  tags::add_uniqueness(all, uniqueness);
+  tags::add_carried(all, {1, 5, 9});
+  const WayAround around{{1, 4}, SE3(), 0.01 * Matrix6::Identity()};
+  tags::add_way_around(all, &around);
+  tags::add_unseen(all, {4, 5, 70});
+  tags::add_unseen_place(all, {{1, 9}, 1});
+  tags::add_map_identity(all, {Uuid{{1, 2}}, 9});
+  tags::add_before_frozen(all, SessionState::kEnded);
+  tags::add_shown(all, 17);
+  tags::add_edit_key(all, {"an edit", 1});
+  std::sort(all.begin(), all.end(), [](const Extension& a, const Extension& b) { return a.tag < b.tag; });
+  const auto extensions = [](const Extensions& list) {
+    ByteWriter w;
+    put_extensions(w, list);
+    return w.take();
+  };
+  corpus.add("extensions", {}, extensions(all));
+  for (const Extension& one : all) {
+    const std::string name = "extension_" + std::to_string(one.tag);
+    corpus.add(name, {}, extensions({one}));
+    if (one.bytes.empty()) continue;
+    corpus.add(name + "_cut", {}, extensions({{one.tag, cut(one.bytes, 1)}}));
+    corpus.add(name + "_empty", {}, extensions({{one.tag, {}}}));
+  }
 }
 
 // Frames for which the fuzzer writes containers: how far its slot is behind the one before, length, body.
