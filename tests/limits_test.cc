@@ -137,10 +137,10 @@ TEST_F(LimitsTest, ConnectionsOverWhichNobodyCallsAreClosed) {
   drive();
   auto halves = connect(5, 65535);
   for (RawHttp2& one : halves) one.call(kStatus, std::string(20, 'x'), 10);
-  auto running = connect(1, 0);
-  running.front().call(kExport, kGraph);
+  auto called = connect(1, 0);
+  called.front().call(kExport, kGraph);
   for (RawHttp2& one : halves) EXPECT_TRUE(eventually([&] { return one.ended(); }));
-  EXPECT_FALSE(running.front().ended());
+  EXPECT_FALSE(called.front().ended());
   expect_answers(1);
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
