@@ -426,8 +426,8 @@ int controlled(int fd, int command, const Control& control_it) {
   return duplicated(fd, control_it());
 }
 
-// System calls that would change files below the root unseen: those that take a descriptor, and those that take a path
-// first or behind the descriptor of a folder.
+// System calls that would change files below the root unseen, by what they take first: a descriptor, a path, or the
+// descriptor of a folder and a path.
 bool writes_to_descriptor(long number) {
   switch (number) {
     case SYS_write:
@@ -447,6 +447,31 @@ bool writes_to_descriptor(long number) {
     default:
       return false;
   }
+}
+bool writes_to_path(long number) {
+  switch (number) {
+    case SYS_truncate:
+#ifdef SYS_open  // some architectures have only those that take a folder
+    case SYS_open:
+    case SYS_creat:
+    case SYS_rename:
+    case SYS_unlink:
+    case SYS_rmdir:
+    case SYS_mkdir:
+    case SYS_link:
+    case SYS_symlink:
+#endif
+      return true;
+    default:
+      return false;
+  }
+}
+bool takes_two_paths(long number) {
+#ifdef SYS_open
+  return number == SYS_rename || number == SYS_link || number == SYS_symlink;
+#else
+  return number < 0;
+#endif
 }
 bool writes_to_path_in_folder(long number) {
   switch (number) {
@@ -688,6 +713,8 @@ long syscall(long number, ...) {
   const int first = static_cast<int>(a[0]);
   if ((writes_to_descriptor(number) && is_watched(first)) ||
       (number == SYS_copy_file_range && is_watched(static_cast<int>(a[2]))) ||
+      (writes_to_path(number) && (below_root(AT_FDCWD, text(a[0]), true) != kElsewhere ||
+                                  (takes_two_paths(number) && below_root(AT_FDCWD, text(a[1]), true) != kElsewhere))) ||
       (writes_to_path_in_folder(number) &&
        below_root(first, text(number == SYS_symlinkat ? a[2] : a[1]), true) != kElsewhere))
     give_up("a direct system call");
