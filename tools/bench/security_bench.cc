@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <iterator>
 #include <memory>
@@ -21,6 +22,7 @@
 #include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
+#include "server/ops/process.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/private_network.h"
 #include "tests/support/raw_http2.h"
@@ -93,22 +95,33 @@ void price_of_seals(const SecurityOptions& options, Report& report) {
   report.add("sealed_ack_p50_ratio", ack, "time until keyframes are acknowledged, sealed and not");
 }
 
-// The same fleet while forged and broken messages come in.
+// The same fleet while somebody forges what its robots and the daemon say: one of the fleet, so that what it seals is
+// not refused for its key alone.
 void cost_of_forgeries(const SecurityOptions& options, Report& report) {
-  Report quiet, attacked;
-  for (Report* figures : {&quiet, &attacked}) {
-    FleetOptions fleet;
-    fleet.robots = options.robots;
-    fleet.seconds = options.seconds;
-    fleet.seed = options.seed;
-    fleet.sealed = true;
-    fleet.garbage_hz = figures == &attacked ? options.forgeries_hz : 0;
-    run_fleet(fleet, *figures);
+  std::vector<double> ratios;
+  double lost = 0, refused = 0, forged = 0, turned_away = 0;
+  for (std::uint32_t round = 0; round < options.rounds; ++round) {
+    Report quiet, attacked;
+    for (Report* figures : {&quiet, &attacked}) {
+      FleetOptions fleet;
+      fleet.robots = options.robots;
+      fleet.seconds = options.seconds;
+      fleet.seed = options.seed + round;
+      fleet.sealed = true;
+      fleet.forgeries_hz = figures == &attacked ? options.forgeries_hz : 0;
+      run_fleet(fleet, *figures);
+    }
+    ratios.push_back(attacked.value("ack_p99_ms") / quiet.value("ack_p99_ms"));
+    lost += attacked.value("lost");
+    refused += attacked.value("refused") + attacked.value("given_up");
+    forged += attacked.value("forgeries_sent");
+    turned_away += attacked.value("forgeries_refused");
   }
-  report.add("forged_ack_p99_ratio", attacked.value("ack_p99_ms") / quiet.value("ack_p99_ms"),
-             "time until keyframes are acknowledged, under forgeries and without");
-  report.add("forged_lost", attacked.value("lost"), "keyframes of honest robots");
-  report.add("forged_refused", attacked.value("refused") + attacked.value("given_up"), "likewise");
+  report.add("forged_ack_p99_ratio", ratios, "time until keyframes are acknowledged, under forgeries and without");
+  report.add("forged_lost", lost, "keyframes of honest robots");
+  report.add("forged_refused", refused, "likewise");
+  report.add("forgeries_sent", forged, "gaps, ends, keyframes, acknowledgements, news, hellos and repetitions");
+  report.add("forgeries_refused", turned_away, "by the daemon; what is in its name it does not hear");
 }
 
 void price_of_tls(const SecurityOptions& options, const std::string& folder, Report& report) {
@@ -148,89 +161,184 @@ void price_of_tls(const SecurityOptions& options, const std::string& folder, Rep
   daemon.stop();
 }
 
-// Many who take no answer, say nothing, send half a request, or wait until the daemon is idle, which it is not.
-void crowd(const SecurityOptions& options, const std::string& folder, Report& report) {
-  constexpr std::size_t kStalled = 1000, kIdle = 5000, kHalves = 100, kWaits = 16;
-  const std::string drive = testing::record_simulation(folder + "/long", {"--seed", "2", "--pairs", "300"});
-  DaemonOptions served{.data = folder + "/crowd", .lcm = "", .more = {"--backup-root", folder + "/backups"}};
-  fs::create_directories(folder + "/backups");
-  fs::permissions(folder + "/backups", fs::perms::owner_all);
-  RunningDaemon daemon(served);
-  testing::Process robot({built_program("relmap-frontend"), drive, "--robot", "cart", "--server", served.data,
-                          "--spool", "none", "--quiet", "--live", "--rate", "10"},
-                         testing::ProcessOptions{.standard_output = "", .standard_error = folder + "/robot.log"});
-  const auto client = client::Client::connect(served.data).or_throw();
-  const auto asked = [&] {
-    std::vector<double> ms;
-    for (std::uint32_t i = 0; i < options.questions; ++i) {
+// What callers get while a crowd is there.
+struct Answers {
+  std::vector<double> ms;
+  double refused = 0;           // for want of room
+  double backup_starts_s = -1;  // until a backup was under way
+};
+
+// Callers of one kind, each with a connection of its own, from several addresses.
+class Crowd {
+ public:
+  Crowd(const std::string& daemon, std::size_t count, int first_address, int addresses,
+        const std::function<void(testing::RawHttp2&)>& act) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const int address = first_address + static_cast<int>(i) % addresses;
+      testing::RawHttp2 one(daemon, "127.0.0." + std::to_string(address));
+      if (one.connected()) act(one);
+      all_.push_back(std::move(one));
+    }
+  }
+  double open() {
+    return static_cast<double>(std::count_if(all_.begin(), all_.end(), [](auto& one) { return !one.closed(); }));
+  }
+
+ private:
+  std::vector<testing::RawHttp2> all_;
+};
+
+// Calls WaitIdle again and again, so that so many wait at once.
+class Waits {
+ public:
+  Waits(const std::string& daemon, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      threads_.emplace_back([this, daemon] {
+        const auto client = client::Client::connect(daemon).or_throw();
+        for (; !stopping_; std::this_thread::sleep_for(milliseconds(50))) {
+          ++waiting_;
+          (void)client->wait_idle();
+          --waiting_;
+        }
+      });
+  }
+  ~Waits() {
+    stopping_ = true;
+    for (std::thread& thread : threads_) thread.join();
+  }
+  double open() const { return waiting_; }
+
+ private:
+  std::atomic<bool> stopping_ = false;
+  std::atomic<int> waiting_ = 0;
+  std::vector<std::thread> threads_;
+};
+
+// A daemon that lets all of them in: who is refused at the door costs nobody anything.
+class CrowdedDaemon {
+ public:
+  CrowdedDaemon(const SecurityOptions& options, const std::string& folder)
+      : options_(options), folder_(folder), daemon_(served(folder)) {
+    testing::record_simulation(folder + "/long", {"--seed", "2", "--pairs", "300"});
+    robot_ = std::make_unique<testing::Process>(
+        std::vector<std::string>{built_program("relmap-frontend"), folder + "/long", "--robot", "cart", "--server",
+                                 data(), "--spool", "none", "--quiet", "--live", "--rate", "4"},
+        testing::ProcessOptions{.standard_output = "", .standard_error = folder + "/robot.log"});
+    here_ = client::Client::connect(data()).or_throw();
+    over_tcp_ = client::Client::connect(daemon_.address()).or_throw();
+  }
+  ~CrowdedDaemon() {
+    robot_->kill();
+    daemon_.stop();
+  }
+
+  std::string data() const { return folder_ + "/crowd"; }
+  std::string address() const { return daemon_.address(); }
+
+  // Asks for the status at the socket and over TCP, in turn, and begins a backup.
+  Answers ask() {
+    std::this_thread::sleep_for(seconds(1));
+    Answers answers;
+    for (std::uint32_t i = 0; i < options_.questions; ++i) {
       const auto begin = Clock::now();
-      if (const auto status = client->status(); !status.ok()) throw StatusError(status.status());
-      ms.push_back(1e-3 * microseconds_since(begin));
+      const auto status = (i % 2 == 0 ? here_ : over_tcp_)->status();
+      answers.ms.push_back(1e-3 * microseconds_since(begin));
+      if (status.reason() == Reason::BUDGET_EXCEEDED)
+        ++answers.refused;
+      else if (!status.ok())
+        throw StatusError(status.status());
       std::this_thread::sleep_for(milliseconds(10));
     }
-    return ms;
+    const auto begin = Clock::now();
+    const auto backup = here_->backup(folder_ + "/backups/" + std::to_string(++backups_), [&](const client::Progress&) {
+      if (answers.backup_starts_s < 0) answers.backup_starts_s = seconds_since(begin);
+      return true;
+    });
+    if (!backup.ok() && backup.reason() != Reason::BUDGET_EXCEEDED) throw StatusError(backup.status());
+    return answers;
+  }
+
+ private:
+  static DaemonOptions served(const std::string& folder) {
+    const std::string backups = folder + "/backups";
+    fs::create_directories(backups);
+    fs::permissions(backups, fs::perms::owner_all);
+    std::ofstream(folder + "/relmapd.yaml") << "rpc: {max_connections: 8192, max_connections_per_peer: 1024}\n";
+    return {
+        .data = folder + "/crowd", .lcm = "", .more = {"--backup-root", backups, "--config", folder + "/relmapd.yaml"}};
+  }
+
+  const SecurityOptions& options_;
+  const std::string folder_;
+  RunningDaemon daemon_;
+  std::unique_ptr<testing::Process> robot_;
+  std::unique_ptr<client::Client> here_, over_tcp_;
+  int backups_ = 0;
+};
+
+// Many who take no answer, say nothing, send half a request, or wait until the daemon is idle, which it is not: each
+// kind alone, and all at once.
+void crowd(const SecurityOptions& options, const std::string& folder, Report& report) {
+  constexpr std::size_t kStalled = 1000, kIdle = 5000, kHalves = 100, kWaits = 16;
+  constexpr int kFirst = 2;  // ours come from 127.0.0.1
+  ops::raise_file_limit();
+  CrowdedDaemon daemon(options, folder);
+  const auto stalled = [&](int addresses) {
+    return Crowd(daemon.address(), kStalled, kFirst, addresses, [](testing::RawHttp2& one) {
+      one.begin(0);
+      one.call("/relmap.v1.Map/Export", std::string("\x08\x01", 2));
+    });
   };
-  const std::vector<double> quiet = asked();
-  std::vector<testing::RawHttp2> crowd;
-  const auto come = [&](std::size_t count, const auto& act) {
-    for (std::size_t i = 0; i < count; ++i) {
-      testing::RawHttp2 one(daemon.address());
-      if (one.connected()) act(one);
-      crowd.push_back(std::move(one));
-    }
+  const auto halves = [&] {
+    return Crowd(daemon.address(), kHalves, kFirst + 10, 1, [](testing::RawHttp2& one) {
+      one.begin(65535);
+      one.call("/relmap.v1.Map/GetStatus", std::string(100, 'x'), 50);
+    });
   };
-  come(kStalled, [](testing::RawHttp2& one) {
-    one.begin(0);
-    one.call("/relmap.v1.Map/Export", std::string("\x08\x01", 2));
-  });
-  come(kHalves, [](testing::RawHttp2& one) {
-    one.begin(65535);
-    one.call("/relmap.v1.Map/GetStatus", std::string(100, 'x'), 50);
-  });
-  come(kIdle, [](testing::RawHttp2& one) { one.begin(65535); });
-  std::vector<std::thread> waits;
-  for (std::size_t i = 0; i < kWaits; ++i)
-    waits.emplace_back([&] { (void)client::Client::connect(served.data).or_throw()->wait_idle(); });
-  std::this_thread::sleep_for(seconds(1));
-  const std::vector<double> crowded = asked();
-  const auto begin = Clock::now();
-  double started_s = -1;
-  const auto backup = client->backup(folder + "/backups/now", [&](const client::Progress&) {
-    if (started_s < 0) started_s = seconds_since(begin);
-    return true;
-  });
-  if (!backup.ok()) throw StatusError(backup.status());
-  report.add("crowd_status_p99_ms", quantile(crowded, 0.99),
-             "GetStatus beside a crowd of callers that hold on to theirs");
-  report.add("quiet_status_p99_ms", quantile(quiet, 0.99), "the same without them");
-  report.add("crowd_backup_starts_s", std::max(0.0, started_s), "until a backup is under way beside them");
-  robot.kill();
-  crowd.clear();
-  for (std::thread& wait : waits) wait.join();
-  daemon.stop();
+  const auto idle = [&] {
+    return Crowd(daemon.address(), kIdle, kFirst + 20, 10, [](testing::RawHttp2& one) { one.begin(65535); });
+  };
+  const auto tell = [&](const std::string& who, const Answers& answers, const std::string& meaning) {
+    report.add(who + "_status_p99_ms", quantile(answers.ms, 0.99), "GetStatus beside " + meaning);
+    report.add(who + "_status_refused", answers.refused, "of these questions, for want of room");
+    report.add(who + "_backup_starts_s", answers.backup_starts_s, "until a backup is under way; negative: never");
+  };
+  const auto measured = [&](const std::string& who, auto crowd, const std::string& meaning) {
+    const Answers answers = daemon.ask();
+    report.add(who + "_open", crowd.open(), "so many are still there afterwards");
+    tell(who, answers, meaning);
+  };
+  tell("quiet", daemon.ask(), "nobody");
+  measured("stalled", stalled(1), "1,000 calls of one caller who takes no answer");
+  measured("stalled_4_callers", stalled(4), "the same of four callers");
+  measured("halves", halves(), "100 requests that do not finish arriving");
+  measured("idle", idle(), "5,000 idle connections");
+  const Waits waits(daemon.data(), kWaits);
+  const Answers beside_waits = daemon.ask();
+  report.add("waits_open", waits.open(), "so many wait just then");
+  tell("waits", beside_waits, "16 calls of WaitIdle");
+  Crowd all[] = {stalled(1), halves(), idle()};
+  const Answers beside_all = daemon.ask();
+  double open = waits.open();
+  for (Crowd& one : all) open += one.open();
+  report.add("crowd_open", open, "so many of all are still there afterwards");
+  tell("crowd", beside_all, "all of these but the four");
 }
 
-std::uint64_t bytes_in(const std::string& folder) {
-  std::uint64_t sum = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file()) sum += entry.file_size();
-  return sum;
-}
-
-// Sends the first keyframes of sessions without end: half of them without a seal, half with that of a robot of the
-// fleet.
+// Sends the first keyframes of sessions without end, sealed with the key of a robot of the fleet.
 class Strangers {
  public:
-  Strangers(const std::string& url, const access::RobotKey& key, std::uint32_t count)
+  Strangers(const std::string& url, const access::RobotKey& key)
       : link_(LcmLink::open(url, {{kMapChannel, [this](ByteSpan datagram) { meet(datagram); }}}).or_throw()),
         daemon_(key, 1) {
-    thread_ = std::thread([this, count] { run(count); });
+    thread_ = std::thread([this] { run(); });
   }
-  ~Strangers() { join(); }
-  void join() {
-    if (thread_.joinable()) thread_.join();
+  ~Strangers() {
+    stopping_ = true;
+    thread_.join();
     link_->stop();
   }
+  std::uint64_t sent() const { return sent_; }
 
  private:
   void meet(ByteSpan datagram) {
@@ -240,52 +348,96 @@ class Strangers {
     if (map.ok() && daemon_.heard(map->boot, opened->seal, Clock::now())) (void)daemon_.welcome(*map, Clock::now());
   }
 
-  void run(std::uint32_t count) {
+  void run() {
+    constexpr int kAtOnce = 100;
     Keyframe keyframe = sample_keyframe();
     keyframe.session.robot = "mallory";
     keyframe.sequence = 0;
     keyframe.tracks.clear();
-    for (std::uint32_t i = 0; i < count; ++i) {
-      keyframe.session.uuid = SessionUuid::random();
-      const Bytes payload = encode_keyframe(keyframe);
-      Bytes message = encode_lcm(cut_part(keyframe.session.uuid, 0, payload, crc32c(payload), kMaxPartBytes, 0));
-      {
-        const MutexLock lock(mutex_);
-        if (i % 1000 == 0) {
-          Bytes hello = encode_lcm(Hello{keyframe.session.uuid});
-          daemon_.seal_hello(hello);
-          link_->publish(kHelloChannel, hello);
+    for (; !stopping_; std::this_thread::sleep_for(milliseconds(20))) {
+      if (!ready()) continue;
+      for (int i = 0; i < kAtOnce; ++i, ++sent_) {
+        keyframe.session.uuid = SessionUuid::random();
+        const Bytes payload = encode_keyframe(keyframe);
+        Bytes message = encode_lcm(cut_part(keyframe.session.uuid, 0, payload, crc32c(payload), kMaxPartBytes, 0));
+        {
+          const MutexLock lock(mutex_);
+          daemon_.seal(kKeyframeChannel, message);
         }
-        if (i % 2 == 0 && daemon_.ready(Clock::now())) daemon_.seal(kKeyframeChannel, message);
+        link_->publish(kKeyframeChannel, message);
       }
-      link_->publish(kKeyframeChannel, message);
-      if (i % 100 == 99) std::this_thread::sleep_for(milliseconds(5));
     }
+  }
+
+  // Says hello while the daemon does not take what is sealed.
+  bool ready() {
+    Bytes hello = encode_lcm(Hello{SessionUuid::random()});
+    const MutexLock lock(mutex_);
+    if (daemon_.wants_hello(Clock::now())) {
+      daemon_.seal_hello(hello);
+      link_->publish(kHelloChannel, hello);
+    }
+    return daemon_.ready(Clock::now());
   }
 
   Mutex mutex_;
   std::unique_ptr<LcmLink> link_;
   publishing::SealedDaemon daemon_ RELMAP_GUARDED_BY(mutex_);
+  std::atomic<bool> stopping_ = false;
+  std::atomic<std::uint64_t> sent_ = 0;
   std::thread thread_;
 };
 
-void strangers(const SecurityOptions& options, const std::string& folder, Report& report) {
-  DaemonOptions served{.data = folder + "/strangers", .lcm = testing::random_lcm_url(), .more = {}};
-  served.credentials = make_credentials(folder + "/fleet", {"cart", "mallory"});
-  const auto key = [&](const std::string& robot) {
-    return access::read_credentials(served.credentials + "/" + robot + ".pem").or_throw().robot_key.value();
-  };
-  auto daemon = std::make_unique<RunningDaemon>(served);
-  int begun = 0;
-  // Seconds until the first keyframe of a new session of an honest robot is settled.
-  const auto begin_session = [&] {
+// A daemon with an honest robot, whose sessions begin beside those of a robot that begins them without end.
+class StrangersDaemon {
+ public:
+  StrangersDaemon(const std::string& folder, const std::string& settings) : folder_(folder) {
+    fs::create_directories(folder);
+    std::ofstream(folder + "/relmapd.yaml") << settings;
+    options_ = {.data = folder + "/map",
+                .lcm = testing::random_lcm_url(),
+                .memory_budget_mb = 1024,
+                .more = {"--config", folder + "/relmapd.yaml"}};
+    options_.credentials = make_credentials(folder + "/fleet", {"cart", "mallory"});
+    start();
+  }
+  ~StrangersDaemon() { daemon_->stop(); }
+
+  void start() { daemon_ = std::make_unique<RunningDaemon>(options_); }
+  void restart() {
+    daemon_->stop();
+    start();
+  }
+  client::DaemonStatus status() const { return daemon_->client()->status().or_throw(); }
+  double resident_mb() const { return static_cast<double>(status().resident_bytes) / (1 << 20); }
+  double disk_mb() const {
+    std::uint64_t sum = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(options_.data))
+      if (entry.is_regular_file()) sum += entry.file_size();
+    return static_cast<double>(sum) / (1 << 20);
+  }
+  std::unique_ptr<client::Client> client() const {
+    client::ClientOptions patient;
+    patient.deadline = std::chrono::hours(1);
+    return client::Client::connect(options_.data, patient).or_throw();
+  }
+  void wait_idle() const {
+    if (Status idle = client()->wait_idle(); !idle.ok()) throw StatusError(idle);
+  }
+  const std::string& lcm() const { return options_.lcm; }
+  access::RobotKey key(const std::string& robot) const {
+    return access::read_credentials(options_.credentials + "/" + robot + ".pem").or_throw().robot_key.value();
+  }
+
+  // Seconds until the first keyframe of a new session of the honest robot is settled.
+  double begin_session() {
     publishing::PublisherOptions publisher;
-    publisher.spool = folder + "/spool-" + std::to_string(++begun);
+    publisher.spool = folder_ + "/spool-" + std::to_string(++begun_);
     SessionHeader header = sample_keyframe().session;
     header.uuid = {};
     header.robot = "cart";
-    header.name = "session " + std::to_string(begun);
-    auto transport = publishing::LcmTransport::open(served.lcm, {key("cart")}).or_throw();
+    header.name = "session " + std::to_string(begun_);
+    auto transport = publishing::LcmTransport::open(options_.lcm, {key("cart")}).or_throw();
     const auto begin = Clock::now();
     const auto robot = publishing::Publisher::start(publisher, header, std::move(transport)).or_throw();
     Keyframe keyframe = sample_keyframe();
@@ -296,44 +448,108 @@ void strangers(const SecurityOptions& options, const std::string& folder, Report
     if (!robot->finish(Clock::now() + seconds(60)).all_settled())
       throw std::runtime_error("an honest robot's session does not begin");
     return seconds_since(begin);
-  };
-  (void)begin_session();
-  const double resident = daemon->client()->status().or_throw().resident_bytes;
-  const std::uint64_t disk = bytes_in(served.data);
+  }
+
+  // As an operator does who wants the robot's sessions to be gone.
+  void delete_sessions_of(const std::string& robot) const {
+    constexpr std::size_t kAtOnce = 16;
+    const auto sessions = client()->sessions().or_throw();
+    std::atomic<std::size_t> next = 0;
+    std::atomic<std::size_t> failed = 0;
+    std::vector<std::thread> threads;
+    for (std::size_t t = 0; t < kAtOnce; ++t)
+      threads.emplace_back([&] {
+        const auto deleting = client();
+        for (std::size_t i; (i = next++) < sessions.size();)
+          if (sessions[i].robot == robot &&
+              !deleting
+                   ->delete_session(sessions[i].number, sessions[i].uuid, [](const client::Progress&) { return true; })
+                   .ok())
+            ++failed;
+      });
+    for (std::thread& thread : threads) thread.join();
+    if (failed > 0) throw std::runtime_error(std::to_string(failed) + " sessions were not deleted");
+  }
+
+ private:
+  const std::string folder_;
+  DaemonOptions options_;
+  std::unique_ptr<RunningDaemon> daemon_;
+  int begun_ = 0;
+};
+
+// How many sessions a robot gets in that begins them without end, as relmapd is configured by default.
+void limited_strangers(const std::string& folder, Report& report) {
+  StrangersDaemon daemon(folder, "");
+  const std::uint32_t before = daemon.status().sessions;
+  std::uint64_t tried = 0;
+  {
+    Strangers crowd(daemon.lcm(), daemon.key("mallory"));
+    std::this_thread::sleep_for(seconds(5));
+    report.add("limited_begin_s", daemon.begin_session(), "a new session of an honest robot meanwhile");
+    tried = crowd.sent();
+  }
+  report.add("limited_tried", static_cast<double>(tried), "sessions that a robot tries to begin in five seconds");
+  report.add("limited_sessions", daemon.status().sessions - before,
+             "of these, in the map, with that of the honest one");
+}
+
+// The same without a limit, so that all of them are there, and what is left of them after they were deleted.
+void strangers(const SecurityOptions& options, const std::string& folder, Report& report) {
+  StrangersDaemon daemon(folder, "ingest: {max_new_sessions_per_min: 0}\n");
+  (void)daemon.begin_session();
+  daemon.wait_idle();
+  const double resident = daemon.resident_mb(), disk = daemon.disk_mb();
   std::vector<double> meanwhile;
   {
-    Strangers crowd(served.lcm, key("mallory"), options.strangers);
-    for (int i = 0; i < 5; ++i) {
-      meanwhile.push_back(begin_session());
+    const Strangers crowd(daemon.lcm(), daemon.key("mallory"));
+    while (daemon.status().sessions < options.strangers) {
+      meanwhile.push_back(daemon.begin_session());
       std::this_thread::sleep_for(seconds(1));
     }
-    crowd.join();
   }
-  if (Status idle = daemon->client()->wait_idle(); !idle.ok()) throw StatusError(idle);
-  const auto status = daemon->client()->status().or_throw();
+  daemon.wait_idle();
   report.add("strangers_begin_max_s", *std::max_element(meanwhile.begin(), meanwhile.end()),
              "until an honest robot's new session is settled, beside the sessions of strangers");
-  report.add("strangers_sessions", status.sessions, "in the map afterwards, with those of the honest robot");
-  report.add("strangers_resident_ratio", static_cast<double>(status.resident_bytes) / resident, "after and before");
-  report.add("strangers_disk_mb", static_cast<double>(bytes_in(served.data) - disk) / (1 << 20), "more than before");
-  daemon->stop();
-  daemon = std::make_unique<RunningDaemon>(served);
-  report.add("strangers_begin_after_restart_s", begin_session(), "the same after a restart");
-  daemon->stop();
+  report.add("strangers_sessions", daemon.status().sessions, "in the map afterwards, with those of the honest robot");
+  report.add("strangers_resident_before_mb", resident, "of the daemon, before they came");
+  report.add("strangers_resident_top_mb", daemon.resident_mb(), "with all of them");
+  report.add("strangers_disk_top_mb", daemon.disk_mb() - disk, "more than before");
+  const auto begin_again = Clock::now();
+  daemon.restart();
+  report.add("strangers_restart_s", seconds_since(begin_again), "to stop and to serve again");
+  report.add("strangers_begin_after_restart_s", daemon.begin_session(), "an honest session after a restart");
+  const auto begin = Clock::now();
+  daemon.delete_sessions_of("mallory");
+  report.add("strangers_delete_s", seconds_since(begin), "to delete their sessions, sixteen at a time");
+  daemon.wait_idle();
+  if (const auto done = daemon.client()->compact([](const client::Progress&) { return true; }); !done.ok())
+    throw StatusError(done.status());
+  report.add("strangers_resident_after_mb", daemon.resident_mb(), "once they are deleted and the store is compacted");
+  report.add("strangers_resident_ratio", daemon.resident_mb() / resident, "of this to that before they came");
+  report.add("strangers_disk_mb", daemon.disk_mb() - disk, "more than before they came");
+  report.add("strangers_sessions_left", daemon.status().sessions, "those of the honest robot");
+  daemon.restart();
+  report.add("strangers_begin_after_deletion_s", daemon.begin_session(), "an honest session after one more restart");
 }
 
 void run(const SecurityOptions& options, Report& report) {
   if (!testing::enter_private_network(testing::Multicast::kOnLoopback))
     std::cerr << "no network namespace may be made here: random multicast groups of this machine instead\n";
   const storage::TemporaryFolder folder;
-  for (const char* part : {"tls", "crowd", "strangers"}) fs::create_directories(folder / part);
+  for (const char* part : {"tls", "crowd"}) fs::create_directories(folder / part);
   if (options.seconds > 0) {
     price_of_seals(options, report);
     cost_of_forgeries(options, report);
   }
-  price_of_tls(options, folder / "tls", report);
-  crowd(options, folder / "crowd", report);
-  strangers(options, folder / "strangers", report);
+  if (options.questions > 0) {
+    price_of_tls(options, folder / "tls", report);
+    crowd(options, folder / "crowd", report);
+  }
+  if (options.strangers > 0) {
+    limited_strangers(folder / "limited", report);
+    strangers(options, folder / "strangers", report);
+  }
 }
 
 }  // namespace
@@ -343,13 +559,14 @@ Run declare_security(CLI::App& app) {
   app.footer(
       "Examples:\n"
       "  relmap-bench security --json\n"
-      "  relmap-bench security --seconds 0 --strangers 10000    without the fleets");
+      "  relmap-bench security --seconds 0 --strangers 10000    without the fleets\n"
+      "  relmap-bench security --seconds 0 --strangers 0        only TLS and crowds");
   app.add_option("--seconds", options->seconds, "of each fleet; 0: no fleets")->capture_default_str();
   app.add_option("--robots", options->robots, "of each fleet")->capture_default_str();
   app.add_option("--rounds", options->rounds, "pairs of fleets, without seals and with them")->capture_default_str();
   app.add_option("--forgeries", options->forgeries_hz, "forged messages a second")->capture_default_str();
-  app.add_option("--questions", options->questions, "of each kind")->capture_default_str();
-  app.add_option("--strangers", options->strangers, "sessions that strangers try to begin")->capture_default_str();
+  app.add_option("--questions", options->questions, "of each kind; 0: neither TLS nor crowds")->capture_default_str();
+  app.add_option("--strangers", options->strangers, "sessions that strangers begin; 0: none")->capture_default_str();
   app.add_option("--seed", options->seed, "seed of the fleets")->capture_default_str();
   return [options](Report& report) { run(*options, report); };
 }

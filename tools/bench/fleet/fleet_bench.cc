@@ -215,6 +215,8 @@ class FleetRun {
     processes_.finish();
     flooder_.reset();
     garbage_.reset();
+    if (forger_) forgeries_ = forger_->sent();
+    forger_.reset();
     applied_s_ = wait_until_applied(*daemon_.running().client());
     client::ClientOptions patient;
     patient.deadline = std::chrono::minutes(10);
@@ -250,7 +252,7 @@ class FleetRun {
         testing::run_program({testing::built_program("relmap-admin"), "credentials", "ca", made});
     if (ca.exit_code != 0) throw std::runtime_error("relmap-admin credentials: " + ca.standard_error);
     access::AccessList list = access::read_access_list(made + "/access").or_throw();
-    for (std::uint32_t robot = 0; robot < options.robots; ++robot) list.add(grant_of({.number = robot}));
+    for (std::uint32_t robot = 0; robot <= forger(options); ++robot) list.add(grant_of({.number = robot}));
     if (const Status written = access::write_private_file(made + "/access", list.text()); !written.ok())
       throw StatusError(written);
     return made;
@@ -264,6 +266,9 @@ class FleetRun {
     return daemon;
   }
 
+  // The number of a robot that drives nowhere.
+  static std::uint32_t forger(const FleetOptions& options) { return options.robots + 1; }
+
   FleetRobot flooding_robot() const { return processes_.robot(options_.robots); }
 
   void make_trouble() {
@@ -275,6 +280,14 @@ class FleetRun {
     }
     if (options_.garbage_hz > 0)
       garbage_ = std::make_unique<GarbageSender>(groups_.first, options_.garbage_hz, options_.seed);
+    if (options_.forgeries_hz > 0) {
+      std::vector<SessionUuid> sessions;
+      for (std::uint32_t robot = 0; robot < options_.robots; ++robot)
+        sessions.push_back(processes_.robot(robot).uuid());
+      const access::SealKey secret = access::read_secret(credentials_ + "/lcm.key").or_throw();
+      forger_ = std::make_unique<Forger>(groups_.first, std::move(sessions), key_of(secret, forger(options_)),
+                                         options_.forgeries_hz, options_.seed);
+    }
   }
 
   void wait_until(double share) const {
@@ -320,6 +333,15 @@ class FleetRun {
     report.add("given_up", given_up, "");
     report.add("resent_share", 1 - all * keyframe_bytes / part_bytes, "of the bytes of parts: those sent again");
     report.add("closures", static_cast<double>(client->status().or_throw().closures_accepted), "in force at the end");
+    if (options_.forgeries_hz > 0) {
+      const client::ReasonCounts not_taken = client->status().or_throw().not_taken;
+      double refused_forgeries = 0;
+      for (const Reason reason : {Reason::UNAUTHENTICATED, Reason::NOT_ALLOWED, Reason::REPLAYED})
+        if (const auto count = not_taken.find(reason); count != not_taken.end())
+          refused_forgeries += static_cast<double>(count->second);
+      report.add("forgeries_sent", static_cast<double>(forgeries_), "in the robots' and the daemon's name");
+      report.add("forgeries_refused", refused_forgeries, "by the daemon; what is in its name it does not hear");
+    }
     if (options_.flood > 0)
       report.add("flood_frames", static_cast<double>(tally.flooded), "of the flooding robot in the map");
   }
@@ -352,6 +374,8 @@ class FleetRun {
   FleetProcesses processes_;
   std::unique_ptr<Flooder> flooder_;
   std::unique_ptr<GarbageSender> garbage_;
+  std::unique_ptr<Forger> forger_;
+  std::size_t forgeries_ = 0;
 
   std::int64_t begin_ns_ = 0, end_ns_ = 0;
   double daemon_cpu_at_begin_ = 0, daemon_cpu_s_ = 0, cpu_percent_ = 0, applied_s_ = 0;

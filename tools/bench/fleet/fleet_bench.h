@@ -20,6 +20,7 @@ struct FleetOptions {
   std::size_t memory_budget_mb = 1024;
   std::uint32_t kill_daemon = 0, kill_robots = 0, kills_each = 1;
   double flood = 0, garbage_hz = 0;
+  double forgeries_hz = 0;  // only of a fleet that is sealed
   bool closures = true;
   bool sealed = false;  // robots prove who they are, and daemon and robots believe nothing else
   std::uint32_t batch = 20'000;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <utility>
 
 #include "proto/base/crc32c.h"
 #include "proto/wire/channels.h"
@@ -140,6 +141,18 @@ void GarbageSender::send_one() {
     default:  // a gap of everything
       return link_->publish(kGapChannel, encode_lcm(Gap{SessionUuid::random(), 0, UINT32_MAX - 1}));
   }
+}
+
+Forger::Forger(const std::string& lcm_url, std::vector<SessionUuid> sessions, const access::RobotKey& own,
+               double messages_per_s, std::uint64_t seed)
+    : messages_per_s_(messages_per_s), attacker_(lcm_url, std::move(sessions), seed) {
+  attacker_.use(own);
+  thread_ = std::thread([this] { at_rate(messages_per_s_, stopping_, [this] { attacker_.forge(); }); });
+}
+
+Forger::~Forger() {
+  stopping_ = true;
+  thread_.join();
 }
 
 }  // namespace relmap::bench

@@ -1,4 +1,5 @@
-// Trouble-makers for a fleet: a robot that sends far faster than it may, and a sender of garbage.
+// Trouble-makers for a fleet: a robot that sends far faster than it may, a sender of garbage, and one who forges what
+// the others say.
 #pragma once
 
 #include <atomic>
@@ -7,9 +8,11 @@
 #include <random>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "proto/keyframe/ingest_messages.h"
 #include "proto/wire/lcm_link.h"
+#include "tests/support/lcm_attacker.h"
 #include "tools/bench/fleet/keyframes.h"
 
 namespace relmap::bench {
@@ -53,6 +56,22 @@ class GarbageSender {
   std::atomic<std::uint64_t> sent_ = 0;
   std::atomic<bool> stopping_ = false;
   std::unique_ptr<LcmLink> link_;
+  std::thread thread_;
+};
+
+// Forges, spoils and repeats what the robots and the daemon say (tests/support/adversary.h), at a rate.
+class Forger {
+ public:
+  // `own`: the key of a robot of the fleet, which the forger is, too. Throws.
+  Forger(const std::string& lcm_url, std::vector<SessionUuid> sessions, const access::RobotKey& own,
+         double messages_per_s, std::uint64_t seed);
+  ~Forger();
+  std::size_t sent() const { return attacker_.sent(); }
+
+ private:
+  const double messages_per_s_;
+  std::atomic<bool> stopping_ = false;
+  testing::LcmAttacker attacker_;
   std::thread thread_;
 };
 
