@@ -74,6 +74,7 @@ Keyframe Adversary::forged_keyframe(const SessionUuid& session, std::uint32_t se
   k.sequence = sequence;
   k.time_us = 4'900'000'000'000'000;  // in the year 2125
   k.tracks.clear();
+  k.appearance.clear();
   return k;
 }
 
