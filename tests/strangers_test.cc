@@ -78,7 +78,8 @@ class StrangersTest : public ::testing::Test {
     return encode_keyframe(k);
   }
   void send(const SessionUuid& session, const std::string& robot, const Bytes& payload) {
-    EXPECT_TRUE(server_->take_payload(session, 0, crc32c(payload), payload, {robot}).ok());
+    server_->take_payload(session, 0, crc32c(payload), payload, {robot},
+                          [](const Status& taken) { EXPECT_TRUE(taken.ok()) << taken.to_string(); });
   }
   void send_stranger() {
     const SessionUuid session = SessionUuid::random();
