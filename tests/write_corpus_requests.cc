@@ -39,16 +39,12 @@ class Calls {
  public:
   template <typename... Messages>
   Calls& call(const std::string& method, const Messages&... messages) {
-    constexpr int kWholeMessages = 129;
-    w_.put(number_of(method));
-    w_.put(static_cast<std::uint8_t>(kWholeMessages + 2 * sizeof...(messages)));
-    const auto put = [&](const google::protobuf::Message& message) {
-      const std::string bytes = message.SerializeAsString();
-      w_.put(static_cast<std::uint16_t>(bytes.size()));
-      w_.put_bytes(as_bytes(bytes));
-    };
-    (put(messages), ...);
-    return *this;
+    return whole_messages(0, method, messages...);
+  }
+  // The daemon has answered what is streamed before the stream ends; or the caller leaves after the first answer.
+  template <typename... Messages>
+  Calls& call_otherwise(const std::string& method, const Messages&... messages) {
+    return whole_messages(64, method, messages...);
   }
   // Fields are set one by one, as the fuzzer reads them from bytes; it knows keyframes and views of the map.
   // `settled`: the daemon has done what the messages of a stream ask of it before the stream ends.
@@ -62,6 +58,20 @@ class Calls {
   const Bytes& bytes() const { return w_.bytes(); }
 
  private:
+  template <typename... Messages>
+  Calls& whole_messages(std::size_t manner, const std::string& method, const Messages&... messages) {
+    constexpr std::size_t kWholeMessages = 129;
+    w_.put(number_of(method));
+    w_.put(static_cast<std::uint8_t>(kWholeMessages + manner + 2 * sizeof...(messages)));
+    const auto put = [&](const google::protobuf::Message& message) {
+      const std::string bytes = message.SerializeAsString();
+      w_.put(static_cast<std::uint16_t>(bytes.size()));
+      w_.put_bytes(as_bytes(bytes));
+    };
+    (put(messages), ...);
+    return *this;
+  }
+
   ByteWriter w_;
 };
 
@@ -237,8 +247,9 @@ void add_routes(const Corpus& corpus) {
                  .bytes());
   corpus.add("route_resumed", {},
              Calls()
-                 .call("FindRoute", route(0, 45))
-                 .call("FindRoute", route(0, 45, [](v1::FindRouteRequest& r) { r.set_resume_token(kHeard); }))
+                 .call_otherwise("FindRoute", route(0, 25))
+                 .call("FindRoute", route(0, 25, [](v1::FindRouteRequest& r) { r.set_resume_token(kHeard); }))
+                 .call("FindRoute", route(1, 25, [](v1::FindRouteRequest& r) { r.set_resume_token(kHeard); }))
                  .bytes());
   const auto between = [](std::uint32_t a, std::uint32_t session, std::uint32_t b) {
     return with<v1::TransformBetweenRequest>([&](v1::TransformBetweenRequest& r) {
@@ -601,6 +612,7 @@ void add_ingest(const Corpus& corpus) {
   const std::string uuid = uuid_to_wire(known);
   const auto add = [&](const std::string& name, const auto&... messages) {
     corpus.add("stream_" + name, {}, Calls().call("Stream", messages...).bytes());
+    corpus.add("answered_stream_" + name, {}, Calls().call_otherwise("Stream", messages...).bytes());
   };
   add("gap_and_end", hello, gap(uuid, 50, 52, v1::REASON_DROPPED_BY_ROBOT), end(uuid, 53));
   add("gap_backwards", hello, gap(uuid, 60, 52, v1::REASON_DROPPED_BY_ROBOT));

@@ -11,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -29,6 +30,7 @@
 #include "server/rpc/testing/served_map.h"
 #include "server/rpc/unreadable_request.h"
 #include "storage/maintenance/verify.h"
+#include "storage/testing/forwarding_engine.h"
 
 namespace {
 
@@ -36,11 +38,12 @@ using namespace relmap;
 using fuzzing::must;
 namespace pb = google::protobuf;
 
-constexpr std::size_t kCalls = 4;                    // of one input
-constexpr int kFields = 24, kDepth = 4;              // of one message
-constexpr std::size_t kRepeats = 200;                // of one field
-constexpr auto kPatience = std::chrono::minutes(5);  // with sanitizers, on a busy machine
-constexpr std::uint32_t kAgain = 5;                  // frames of session 3
+constexpr std::size_t kCalls = 4;                       // of one input
+constexpr int kFields = 24, kDepth = 4;                 // of one message
+constexpr std::size_t kRepeats = 200;                   // of one field
+constexpr auto kPatience = std::chrono::minutes(5);     // with sanitizers, on a busy machine
+constexpr auto kNews = std::chrono::milliseconds(200);  // in which a daemon tells robots what it has done
+constexpr std::uint32_t kAgain = 5;                     // frames of session 3
 constexpr std::size_t kBudget = std::size_t{256} << 20;
 
 // The map that a daemon begins with. A daemon serves input after input until one has changed the map.
@@ -89,11 +92,27 @@ class SmallMap {
   std::uint64_t applied_ = 0;
 };
 
+// Tells of its progress and of itself, as an engine on the disk does.
+class TellingEngine final : public storage::ForwardingEngine {
+ public:
+  explicit TellingEngine(std::shared_ptr<storage::Engine> engine) : ForwardingEngine(std::move(engine)) {}
+  Status compact(const storage::EngineProgress& progress) override {
+    if (Status going = progress(1, 2); !going.ok()) return going;
+    return ForwardingEngine::compact(progress);
+  }
+  Result<storage::EngineStats> stats() const override {
+    auto stats = ForwardingEngine::stats();
+    if (stats.ok()) stats->properties.emplace_back("tables", "3");
+    return stats;
+  }
+};
+
 // The services over a copy of the small map.
 class Daemon {
  public:
   explicit Daemon(const SmallMap& map)
-      : mapper_(map::Mapper::open(map.copy(), std::make_shared<storage::Budget>(kBudget),
+      : mapper_(map::Mapper::open(std::make_shared<TellingEngine>(map.copy()),
+                                  std::make_shared<storage::Budget>(kBudget),
                                   place::random_vocabulary(rpc::ServedMap::kWords, 60, 1), {})
                     .or_throw()),
         core_(*mapper_, {"test", "b007b007b007", "/data", "", false, 4711, 0, {"/nowhere/backups"}}, limits()),
@@ -137,10 +156,14 @@ class Daemon {
     while (queue_.Next(&tag, &ok)) continue;
   }
 
+  enum class Manner : std::uint8_t {
+    kUsual,
+    kPatient,  // the daemon has done what the messages ask of it, and says so, before it is told that there are no more
+    kLeaves,   // after the first answer
+  };
   // Sends the messages of a call, and returns how it ended and what was answered.
-  // If `settled`, the daemon has done all that they ask of it before it is told that there are no more.
   std::pair<grpc::Status, std::vector<std::string>> call(const std::string& path,
-                                                         const std::vector<std::string>& messages, bool settled) {
+                                                         const std::vector<std::string>& messages, Manner manner) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kPatience);
     const auto stream = stub_->PrepareCall(&context, path, &queue_);
@@ -153,7 +176,10 @@ class Daemon {
       open = done();
     }
     if (open) {
-      if (settled) settle();
+      if (manner == Manner::kPatient) {
+        settle();
+        std::this_thread::sleep_for(kNews);
+      }
       stream->WritesDone(this);
       (void)done();
     }
@@ -165,10 +191,12 @@ class Daemon {
       grpc::Slice whole;
       if (reply.DumpToSingleSlice(&whole).ok())
         replies.emplace_back(reinterpret_cast<const char*>(whole.begin()), whole.size());
+      if (manner == Manner::kLeaves) context.TryCancel();
     }
     grpc::Status status;
     stream->Finish(&status, this);
     must(done());
+    if (manner == Manner::kLeaves && status.error_code() == grpc::StatusCode::CANCELLED) status = grpc::Status();
     return {status, std::move(replies)};
   }
 
@@ -505,8 +533,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       messages.push_back(request->SerializePartialAsString());
     }
     may_change = may_change || edits(method);
-    const auto [status, replies] =
-        daemon->call("/" + method.service()->full_name() + "/" + method.name(), messages, how >= 192);
+    const auto [status, replies] = daemon->call("/" + method.service()->full_name() + "/" + method.name(), messages,
+                                                how < 192                   ? Daemon::Manner::kUsual
+                                                : method.client_streaming() ? Daemon::Manner::kPatient
+                                                                            : Daemon::Manner::kLeaves);
     check_status(method.full_name(), status);
     for (const std::string& reply : replies) {
       const std::unique_ptr<pb::Message> answer(
