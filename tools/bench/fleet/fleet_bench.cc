@@ -304,6 +304,7 @@ class FleetRun {
                 << " more were lost: the kernel dropped what the relay could not carry\n";
     if (flooder_) std::cerr << "flood: " << flooder_->sent() << " keyframes sent\n";
     if (garbage_) std::cerr << "garbage: " << garbage_->sent() << " messages sent\n";
+    if (forger_) std::cerr << "forgeries: " << forger_->sent() << " messages sent\n";
   }
 
   void report_counts(const std::map<std::uint32_t, RobotDeeds>& robots, Report& report) {
@@ -408,6 +409,7 @@ void run(const FleetOptions& options, Report& report) {
   if (options.kill_robots > options.robots) throw std::runtime_error("more robots to be killed than there are");
   if (!testing::enter_private_network(testing::Multicast::kOnLoopback))
     std::cerr << "no network namespace may be made here: random multicast groups of this machine instead\n";
+  if (options.forgeries_hz > 0 && !options.sealed) throw std::runtime_error("--forgeries needs --sealed");
   run_fleet(options, report);
   report_batch(options, report);
 }
@@ -460,6 +462,9 @@ Run declare_fleet(CLI::App& app) {
   app.add_option("--garbage", options->garbage_hz, "send so many meaningless or harmful messages a second")
       ->capture_default_str();
   app.add_option("--budget-mb", options->memory_budget_mb, "memory budget of relmapd")->capture_default_str();
+  app.add_option("--forgeries", options->forgeries_hz,
+                 "with --sealed: another robot forges, spoils and repeats so many messages of the others a second")
+      ->capture_default_str();
   app.add_flag("--sealed", options->sealed, "robots prove who they are, and nothing else is believed");
   app.add_flag("!--no-closures", options->closures, "relmapd recognises no places");
   app.add_option("--batch", options->batch,
