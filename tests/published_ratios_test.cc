@@ -80,6 +80,24 @@ TEST(PublishedRatios, HoldForAnUpdateInAMapThatGrows) {
                   "median update of the last tenth over that of the first"}});
 }
 
+// Five robots instead of twenty, and fewer forgeries in proportion.
+TEST(PublishedRatios, HoldForSealsAndForgeries) {
+  const auto figure = [](const std::string& key) {
+    return [key](const BenchFigures& found) { return found.series(key).front(); };
+  };
+  expect_ratios(
+      {"security", "--seconds", "4", "--robots", "5", "--rounds", "1", "--questions", "0", "--strangers", "0",
+       "--forgeries", "500"},
+      {{figure("sealed_cpu_ratio"),
+        published_figure(kFigures, "daemon's time a keyframe, sealed over not \\| ([0-9.]+) \\|"),
+        "CPU a keyframe with seals over that without"},
+       {figure("forged_ack_p99_ratio"),
+        published_figure(kFigures, "acknowledged after, p99, under forgeries over quiet \\| ([0-9.]+) \\|"),
+        "p99 of acknowledgements under forgeries"},
+       {[](const BenchFigures& found) { return found["forged_lost"] + (found["forgeries_refused"] > 0 ? 0 : 1); }, 0,
+        "keyframes lost, or no forgery refused"}});
+}
+
 TEST(PublishedRatios, HoldForUnpackingARawFrame) {
   const auto grey = published(kFigures, "\\| grey \\| [0-9.]+ / [0-9.]+ \\| ([0-9.]+) \\| ([0-9.]+) \\|");
   const auto colour =

@@ -414,10 +414,10 @@ void Intake::try_to_begin(const SessionUuid& session, Entry& entry, SteadyTime n
 }
 
 void Intake::join_line(const SessionUuid& session, Entry& entry) {
-  if (!std::exchange(entry.in_line, true)) line_.push_back(session);
+  if (!std::exchange(entry.in_line, true)) line_.push(entry.intake.header().robot, session);
 }
 
-void Intake::leave_line(const SessionUuid& session) { std::erase(line_, session); }
+void Intake::leave_line(const SessionUuid& session) { line_.erase(session); }
 
 // Submits what the sessions in line have, one record of each in turn, until the sink has no more room.
 void Intake::serve_line(SteadyTime now) {
@@ -431,7 +431,7 @@ void Intake::serve_line(SteadyTime now) {
       no_room_ = entry.intake.blocked();
       return;
     }
-    line_.pop_front();
+    (void)line_.pop();
     entry.in_line = false;
     if (more) join_line(session, entry);
   }

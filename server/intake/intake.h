@@ -2,7 +2,6 @@
 // Deterministic apart from the sink, since time is an argument. Not thread-safe; IngestServer adds a lock and threads.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "proto/base/mutex.h"
+#include "proto/base/turn_queue.h"
 #include "server/intake/acknowledgement.h"
 #include "server/intake/ingest_stats.h"
 #include "server/intake/known_session.h"
@@ -184,9 +184,10 @@ class Intake {
   std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};
   std::map<std::pair<std::string, std::string>, Allowance> allowances_;  // by robot, or address; "": not known
-  // Sessions that have something to submit, each once, in the order in which they are served, one record at a time. It
-  // is empty but while the sink has no room: then a session that sends more than others waits longer than they do.
-  std::deque<SessionUuid> line_;
+  // Sessions that have something to submit, each once, by robot, in the order in which they are served, one record at a
+  // time. It is empty but while the sink has no room: then robots take turns, and one that sends more than others, or
+  // more sessions at a time, waits longer than they do.
+  TurnQueue<SessionUuid> line_;
   Status no_room_;  // why the first of them waits
   std::vector<PoseNews> news_;
   std::vector<RobotEvent> events_;

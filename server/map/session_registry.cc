@@ -60,7 +60,7 @@ void SessionRegistry::begin(const SessionHeader& header, Begun begun) {
                  "the map has " + std::to_string(index_.size()) + " sessions, as many as its memory budget allows"};
     } else {
       beginning_[header.uuid] = {header, 0, {std::move(begun)}};
-      queue_.push_back(header.uuid);
+      queue_.push(header.robot, header.uuid);
       return wake_.notify_one();
     }
   }
@@ -106,8 +106,7 @@ void SessionRegistry::run() {
       wake_.wait(mutex_, [this]() RELMAP_REQUIRES(mutex_) { return stopping_ || !queue_.empty(); });
       if (queue_.empty()) return;
       refuse = stopping_;
-      uuid = queue_.front();
-      queue_.pop_front();
+      uuid = queue_.pop();
     }
     if (refuse) {
       finish(uuid, {Reason::SHUTTING_DOWN, "the daemon is stopping"});

@@ -1,7 +1,6 @@
 // Gives each session's uuid one number: beginning the same uuid again returns the same number.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -13,6 +12,7 @@
 #include "proto/base/ids.h"
 #include "proto/base/mutex.h"
 #include "proto/base/status.h"
+#include "proto/base/turn_queue.h"
 #include "server/map/session_index.h"
 #include "storage/engine/engine.h"
 #include "storage/graph/graph.h"
@@ -21,7 +21,8 @@
 
 namespace relmap::map {
 
-// Thread-safe, but for load(). Callers never wait for the disk: a thread of its own makes numbers durable.
+// Thread-safe, but for load(). Callers never wait for the disk: a thread of its own makes numbers durable. Robots take
+// turns, so that one that begins sessions without end keeps no other waiting.
 class SessionRegistry {
  public:
   // The map as readers see it now.
@@ -87,7 +88,7 @@ class SessionRegistry {
   ConditionVariable wake_;
   SessionIndex index_ RELMAP_GUARDED_BY(mutex_);
   std::map<SessionUuid, Beginning> beginning_ RELMAP_GUARDED_BY(mutex_);     // not durable yet
-  std::deque<SessionUuid> queue_ RELMAP_GUARDED_BY(mutex_);                  // of these, those without a number
+  TurnQueue<SessionUuid> queue_ RELMAP_GUARDED_BY(mutex_);                   // of these, those without a number
   std::map<SessionNumber, SessionHeader> unseen_ RELMAP_GUARDED_BY(mutex_);  // durable; the map may not show them yet
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
   std::thread thread_;

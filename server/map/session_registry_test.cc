@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <optional>
@@ -99,6 +100,25 @@ TEST_F(SessionRegistryTest, SessionsOfOneNameAreNumbered) {
   ASSERT_EQ(3u, journalled_.size());
   EXPECT_EQ("tour#2", journalled_[1].display_name);
   EXPECT_EQ("tour", journalled_[2].display_name);
+}
+
+// A robot that begins sessions without end keeps no other waiting.
+TEST_F(SessionRegistryTest, RobotsTakeTurns) {
+  sessions_->load(epoch_, *view_);
+  std::unique_lock held(waiting_mutex_);  // the thread stops at the first session of the journal
+  journal_waits_ = true;
+  const auto begin = [&](const SessionHeader& header) {
+    sessions_->begin(header, [](const Result<SessionNumber>&) {});
+  };
+  for (int i = 0; i < 50; ++i) begin(header("flood " + std::to_string(i), "mallory"));
+  begin(header("tour", "cart"));
+  held.unlock();
+  while (waiting() < 51) std::this_thread::yield();
+  held.lock();
+  const auto tour = std::find_if(journalled_.begin(), journalled_.end(),
+                                 [](const storage::SessionRecord& record) { return record.header.robot == "cart"; });
+  EXPECT_LE(tour - journalled_.begin(), 2);
+  for (auto& [sequence, done] : waiting_) done(sequence);
 }
 
 TEST_F(SessionRegistryTest, TheCameraOfAKnownSessionIsCompared) {
