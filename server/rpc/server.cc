@@ -26,8 +26,10 @@ namespace {
 // Two pictures and the rest of their message.
 constexpr int kMaxRequestBytes = 2 * static_cast<int>(vision::kMaxPictureBytes) + (1 << 20);
 
-// Memory that gRPC may use for incoming requests and for replies that are not taken. Beyond it gRPC stops reading.
+// Memory that gRPC may use for incoming requests and for replies that are not taken, and for each connection. Beyond it
+// gRPC stops reading, and closes connections, whosever they are: as many as may be open must have room.
 constexpr std::size_t kTransportBytes = kMaxRequestBytes + (std::size_t{16} << 20);
+constexpr std::size_t kConnectionBytes = 64 << 10;
 
 // How long Shutdown() waits for what is not a call of ours (health watches, idle connections).
 constexpr std::chrono::milliseconds kGrace{50};
@@ -125,7 +127,8 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // any number
-  builder.SetResourceQuota(grpc::ResourceQuota("relmapd").Resize(kTransportBytes));
+  builder.SetResourceQuota(
+      grpc::ResourceQuota("relmapd").Resize(kTransportBytes + options.connections.total * kConnectionBytes));
   std::vector<Listener::Source> sources;
   const auto listen_at = [&](std::vector<ListeningSocket> sockets, std::shared_ptr<grpc::ServerCredentials> by) {
     const Listener::Take take = hand_over_to(builder.experimental().AddExternalConnectionAcceptor(
