@@ -2,11 +2,11 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
+#include <iostream>
 #include <iterator>
 #include <string>
 #include <string_view>
@@ -17,9 +17,9 @@
 namespace relmap::fuzzing {
 
 // Ends the process unless `holds`: libFuzzer then keeps the input, and a replay of the corpus fails.
-inline void must(bool holds, std::string_view what = {}) {
+inline void must(bool holds, std::string_view what = "what must hold does not") {
   if (holds) return;
-  std::fprintf(stderr, "%.*s\n", static_cast<int>(what.size()), what.data());
+  std::cerr << what << "\n";
   std::abort();
 }
 
