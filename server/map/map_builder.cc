@@ -51,10 +51,9 @@ MapBuilder::MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaO
                        std::uint32_t loop_edge_spacing, ConsistencyRules rules)
     : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing), rules_(rules) {
   map_.visit_sessions(0, [&](const storage::Session& session) {
-    if (stands_still(session)) frozen_.insert(session.number);
+    if (stands_still(session)) relaxer_.freeze(session.number, true);
     return true;
   });
-  relaxer_.freeze({frozen_.begin(), frozen_.end()});
 }
 
 // Whether the frames that the session has do not move.
@@ -62,11 +61,7 @@ bool MapBuilder::stands_still(const storage::Session& session) {
   return storage::is_frozen(session) || (storage::is_going(session) && session.frames > 0);
 }
 
-void MapBuilder::freeze(const storage::Session& session) {
-  const bool changed =
-      stands_still(session) ? frozen_.insert(session.number).second : frozen_.erase(session.number) > 0;
-  if (changed) relaxer_.freeze({frozen_.begin(), frozen_.end()});
-}
+void MapBuilder::freeze(const storage::Session& session) { relaxer_.freeze(session.number, stands_still(session)); }
 
 Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& record,
                           std::optional<PreparedKeyframe> prepared) {

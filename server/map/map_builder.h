@@ -66,7 +66,6 @@ class MapBuilder {
   rba::Relaxer relaxer_;
   std::uint32_t loop_edge_spacing_;
   ConsistencyRules rules_;
-  std::set<SessionNumber> frozen_;  // sessions whose frames do not move
 };
 
 }  // namespace relmap::map

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -55,8 +56,13 @@ class LocalMap : public storage::LocalGraph {
 
   // Forgets everything loaded and releases the map's frames.
   void clear();
-  // Sets the sessions of which nothing moves. Takes effect at the next clear().
-  void freeze(std::vector<SessionNumber> sessions) { frozen_ = std::move(sessions); }
+  // Whether nothing of the session moves, which at first all does. Takes effect at the next clear().
+  void freeze(SessionNumber session, bool stands_still) {
+    if (stands_still)
+      frozen_.insert(session);
+    else
+      frozen_.erase(session);
+  }
   bool is_frozen(std::int32_t frame) const { return is_frozen(frames[frame].id.session); }
 
   EdgeEstimate& estimate(std::int32_t edge);
@@ -75,9 +81,7 @@ class LocalMap : public storage::LocalGraph {
   std::vector<StereoCamera> cameras;           // by session; kept from earlier relaxations, since they never change
 
  private:
-  bool is_frozen(SessionNumber session) const {
-    return std::find(frozen_.begin(), frozen_.end(), session) != frozen_.end();
-  }
+  bool is_frozen(SessionNumber session) const { return !frozen_.empty() && frozen_.contains(session); }
   std::int32_t camera(SessionNumber session);
   std::int32_t landmark(LandmarkId id);  // -1: there is none
   // The local landmark in force that a stored landmark of a loaded frame stands for; -1: not known yet.
@@ -91,7 +95,7 @@ class LocalMap : public storage::LocalGraph {
   std::vector<std::int32_t> first_landmark_;  // in landmark_at_
   std::vector<std::int32_t> landmark_at_;
   std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;
-  std::vector<SessionNumber> frozen_;
+  std::unordered_set<SessionNumber> frozen_;
 };
 
 }  // namespace relmap::rba

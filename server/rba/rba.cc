@@ -187,7 +187,7 @@ struct Relaxer::Impl {
 Relaxer::Relaxer(storage::Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
 Relaxer::~Relaxer() = default;
 
-void Relaxer::freeze(std::vector<SessionNumber> sessions) { impl_->local.freeze(std::move(sessions)); }
+void Relaxer::freeze(SessionNumber session, bool stands_still) { impl_->local.freeze(session, stands_still); }
 
 RbaSummary Relaxer::relax(std::span<const FrameId> seeds, bool move_fixed) {
   RbaSummary summary;

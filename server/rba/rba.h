@@ -40,8 +40,8 @@ class Relaxer {
   Relaxer(storage::Map& map, const RbaOptions& options);
   ~Relaxer();
 
-  // Sets the sessions of which no frame is activated and no landmark moves from now on.
-  void freeze(std::vector<SessionNumber> sessions);
+  // Whether no frame of the session is activated and no landmark of it moves from now on; at first all do.
+  void freeze(SessionNumber session, bool stands_still);
 
   // Relaxes the map around `seeds` (a new frame, or both ends of a new loop edge): activates the window, solves, and
   // lets the region ripple until no frame in reach has moved or a bound (budget, size of the region) is met. Updates
