@@ -106,26 +106,26 @@ struct IngestServer::Impl {
     }
   };
 
-  // Takes the message in, unless the map has to be read first.
-  bool try_to_take(const Waiting& message, Status& status) {
+  // Takes the message in, unless something has to be read of the map first: then that.
+  std::optional<MapQuestion> try_to_take(const Waiting& message, Status& status) {
     bool sooner = false;
     {
       const MutexLock lock(mutex);
       if (stopped) {
         status = kStopped;
-        return true;
+        return std::nullopt;
       }
-      if (intake.question(message.session, message.sequence)) return false;
+      if (auto unread = intake.question(message.session, message.sequence)) return unread;
       status = message.action(intake);
       sooner = plan();
     }
     if (sooner) wake();
-    return true;
+    return std::nullopt;
   }
 
   void take(Waiting message) {
     Status status;
-    if (!try_to_take(message, status)) {
+    if (try_to_take(message, status)) {
       const MutexLock lock(waiting_mutex);
       if (waiting_stopping) {
         status = kStopped;
@@ -160,21 +160,15 @@ struct IngestServer::Impl {
         waiting.pop_front();
       }
       Status status;
-      while (!try_to_take(message, status)) read_one(message);
+      while (const auto unread = try_to_take(message, status)) read(*unread);
       message.done(status);
     }
   }
 
-  void read_one(const Waiting& message) {
-    std::optional<MapQuestion> question;
-    {
-      const MutexLock lock(mutex);
-      question = intake.question(message.session, message.sequence);
-    }
-    if (!question) return;
-    MapAnswer read = answer(sink, *question);
+  void read(const MapQuestion& unread) {
+    MapAnswer found = answer(sink, unread);
     const MutexLock lock(mutex);
-    intake.know(*question, std::move(read));
+    intake.know(unread, std::move(found));
   }
 
   void enqueue(KeyframePart part, Sender sender) {
@@ -332,7 +326,12 @@ void IngestServer::count_foreign(Reason reason) {
 }
 
 Result<Acknowledgement> IngestServer::acknowledgement(const SessionUuid& session) {
-  impl_->read_one({session, std::nullopt, {}, {}});
+  std::optional<MapQuestion> unread;
+  {
+    const MutexLock lock(impl_->mutex);
+    unread = impl_->intake.question(session, std::nullopt);
+  }
+  if (unread) impl_->read(*unread);
   const MutexLock lock(impl_->mutex);
   return impl_->intake.acknowledgement(session);
 }

@@ -101,11 +101,9 @@ void Intake::know(const MapQuestion& question, MapAnswer answer) {
 }
 
 Intake::Known Intake::known(const SessionUuid& session) {
-  if (auto known = known_.extract(session)) return std::move(known.mapped());
-  const auto number = sink_.find_session(session);
-  if (!number) return {};
-  MapAnswer read = answer(sink_, {session, *number, std::nullopt});
-  return {read.failed, std::move(read.session), {}};
+  if (const auto unread = question(session, std::nullopt)) know(*unread, answer(sink_, *unread));
+  auto known = known_.extract(session);
+  return known ? std::move(known.mapped()) : Known();
 }
 
 // The session's entry, which is made if it is not there. BUDGET_EXCEEDED: there are too many. NOT_ALLOWED.
@@ -613,9 +611,7 @@ Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const E
 
 Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try {
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
-  if (!known_.contains(session))
-    if (const auto number = sink_.find_session(session))
-      know({session, *number, std::nullopt}, answer(sink_, {session, *number, std::nullopt}));
+  if (const auto unread = question(session, std::nullopt)) know(*unread, answer(sink_, *unread));
   if (const auto at = known_.find(session);
       at == known_.end() || (at->second.failed.ok() && !at->second.session.session))
     return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
