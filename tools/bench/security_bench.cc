@@ -78,17 +78,22 @@ std::string picture(const std::string& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+FleetOptions fleet_of(const SecurityOptions& options, std::uint32_t round) {
+  FleetOptions fleet;
+  fleet.robots = options.robots;
+  fleet.seconds = options.seconds;
+  fleet.rate = kRate;
+  fleet.seed = options.seed + round;
+  return fleet;
+}
+
 // Runs the fleet without seals and with them, in turn.
 void price_of_seals(const SecurityOptions& options, Report& report) {
   std::vector<double> cpu, ack;
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
     Report figures[2];
     for (const bool sealed : {false, true}) {
-      FleetOptions fleet;
-      fleet.robots = options.robots;
-      fleet.seconds = options.seconds;
-      fleet.rate = kRate;
-      fleet.seed = options.seed + round;
+      FleetOptions fleet = fleet_of(options, round);
       fleet.sealed = sealed;
       run_fleet(fleet, figures[sealed]);
     }
@@ -108,11 +113,7 @@ void cost_of_forgeries(const SecurityOptions& options, Report& report) {
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
     Report quiet, attacked;
     for (Report* figures : {&quiet, &attacked}) {
-      FleetOptions fleet;
-      fleet.robots = options.robots;
-      fleet.seconds = options.seconds;
-      fleet.rate = kRate;
-      fleet.seed = options.seed + round;
+      FleetOptions fleet = fleet_of(options, round);
       fleet.sealed = true;
       fleet.forgeries_hz = figures == &attacked ? options.forgeries_hz : 0;
       run_fleet(fleet, *figures);
