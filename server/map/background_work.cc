@@ -78,6 +78,14 @@ std::optional<storage::RemoveChunkRecord> BackgroundWork::next_removal() {
   return std::nullopt;
 }
 
+bool BackgroundWork::removal_is_held_back() const {
+  {
+    const MutexLock lock(mutex_);
+    if (going_.empty()) return false;
+  }
+  return !hooks_.may_remove();
+}
+
 bool BackgroundWork::relaxation_waits() const {
   const MutexLock lock(mutex_);
   return relaxation_pending_ && !relaxation_on_its_way_;

@@ -59,6 +59,8 @@ class BackgroundWork {
   void submit_next();
   // The next chunk to take out; nullopt if there is none, or it has to wait. Forgets sessions without frames.
   std::optional<storage::RemoveChunkRecord> next_removal();
+  // Whether sessions are being deleted, and may_remove() holds that up.
+  bool removal_is_held_back() const;
 
   // Whether relaxation is pending of which no record is on its way: submit_next() should be called again soon.
   bool relaxation_waits() const;

@@ -19,8 +19,7 @@ namespace relmap::map {
 class DeterministicDriver {
  public:
   struct Hooks {
-    // Makes a record durable and returns its sequence; nullopt if the disk did not take it before the daemon stopped,
-    // or takes nothing while the daemon starts.
+    // Makes a record durable and returns its sequence; nullopt if the disk did not take it before the daemon stopped.
     std::function<std::optional<std::uint64_t>(const storage::JournalRecord&)> append;
     // Applies the record to the map. Throws what the map throws.
     std::function<void(std::uint64_t sequence, const storage::JournalRecord&)> apply;

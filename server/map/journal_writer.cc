@@ -37,7 +37,6 @@ JournalWriter::JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint6
       on_durable_(std::move(on_durable)),
       on_idle_(std::move(on_idle)),
       durable_(engine_->last_journal_sequence()),
-      finished_(durable_),
       thread_([this] { run(); }) {}
 
 JournalWriter::~JournalWriter() { stop(); }

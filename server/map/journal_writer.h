@@ -32,7 +32,8 @@ class JournalWriter {
   // Called from the writer's thread, without a lock held, when idle() may have become true.
   using OnIdle = std::function<void()>;
 
-  // `one_at_a_time` (deterministic mode): writes groups of one record, each only after finished() of the one before.
+  // `one_at_a_time` (deterministic mode): writes groups of one record, each only after finished() of the one before;
+  // the first after finished() of the last record that the journal has.
   JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch, std::shared_ptr<storage::Budget> budget,
                 bool one_at_a_time, OnDurable on_durable, OnIdle on_idle);
   ~JournalWriter();

@@ -89,13 +89,6 @@ void LookupQueue::close_locked(FrameId frame) {
   if (open_.erase(frame) > 0) budget_->release(storage::Share::kQueues, kBytesPerFrame);
 }
 
-std::set<FrameId> LookupQueue::close_all() {
-  const MutexLock lock(mutex_);
-  budget_->release(storage::Share::kQueues, open_.size() * kBytesPerFrame);
-  failed_.clear();
-  return std::exchange(open_, {});
-}
-
 void LookupQueue::forget_failed(SessionNumber session) {
   const MutexLock lock(mutex_);
   for (const FrameId frame : std::set<FrameId>(failed_))

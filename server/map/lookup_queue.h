@@ -63,8 +63,6 @@ class LookupQueue {
   // Opens and closes a frame that the caller looks up itself (deterministic mode).
   void open(FrameId frame);
   void close(FrameId frame);
-  // Closes all open frames and returns them.
-  std::set<FrameId> close_all();
   // Closes the session's frames whose lookup failed: the session is being deleted.
   void forget_failed(SessionNumber session);
 

@@ -286,8 +286,7 @@ TEST_F(LookupQueueTest, AFrameStaysOpenIfItsRecordsAreNotDurableWhenTheQueueStop
   queue_.stop();
   EXPECT_TRUE(queue_.is_open({1, 0}));
   EXPECT_TRUE(queue_.is_waiting(1));
-  EXPECT_EQ(queue_.close_all().size(), 1u);
-  EXPECT_EQ(queue_.waiting(), 0u);
+  EXPECT_EQ(queue_.waiting(), 1u);
 }
 
 }  // namespace

@@ -81,6 +81,8 @@ struct Mapper::Impl {
   void begin_deletion(const storage::Session& session);
   void fail(const std::string& what, const Status& why);
   std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
+  std::optional<storage::RemoveChunkRecord> next_removal_patiently();
+  bool wait_for_disk();
 
   // Lookup threads.
   RouteMap newest_map() const {
@@ -150,7 +152,6 @@ struct Mapper::Impl {
                            [this] { return failed ? health() : Status(); }};
   std::unique_ptr<JournalWriter> writer;  // declared after everything that its thread calls
 
-  bool patient = false;  // the worker is running, and may wait for the disk
   std::thread worker;
   bool stopped = false;
 };
@@ -198,7 +199,7 @@ DeterministicDriver::Hooks Mapper::Impl::driver_hooks() {
               },
           .look_up = [this](FrameId frame) { return recognition->look_up(*map->view(), frame); },
           .relaxation_pending = [this] { return !map->state().pending.empty(); },
-          .next_removal = [this] { return background.next_removal(); }};
+          .next_removal = [this] { return next_removal_patiently(); }};
 }
 
 Status Mapper::Impl::load() {
@@ -289,8 +290,10 @@ void Mapper::Impl::start() {
         tell_waiting();
       },
       [this] { tell_waiting(); });
-  if (options.deterministic) catch_up();
-  patient = true;
+  {
+    const MutexLock lock(mutex);
+    applying = options.deterministic;  // the worker begins with catch_up()
+  }
   worker = std::thread([this] { work(); });
   if (recognises_places() && !options.deterministic)
     lookups.start(
@@ -307,7 +310,7 @@ void Mapper::Impl::start() {
 // Deterministic mode: does what an interruption may have left undone.
 void Mapper::Impl::catch_up() {
   if (failed) return;
-  const std::set<FrameId> open = lookups.close_all();
+  const std::set<FrameId> open = lookups.open_frames();
   for (const FrameId frame : open) follow_up(map->state().applied_sequence, frame);
   constexpr std::uint32_t kAll = DeterministicDriver::kSlices;
   const auto done = static_cast<int>(std::min(map->state().idle_records, kAll));
@@ -321,7 +324,10 @@ Clock::time_point Mapper::Impl::next_due() const {
 }
 
 void Mapper::Impl::work() {
+  if (options.deterministic) catch_up();
   MutexLock lock(mutex);
+  applying = false;
+  changed.notify_all();
   for (;;) {
     changed.wait_until(mutex, next_due(),
                        [&]() RELMAP_REQUIRES(mutex) { return !durable.empty() || stopping || commits.wants_worker(); });
@@ -402,20 +408,32 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", outcome.trouble);
   background.forget_relaxation();
   tell_waiting();
-  writer->finished(outcome.last);
+  // Something may still follow if the daemon stops: the next start does it before another record is taken.
+  const MutexLock lock(mutex);
+  if (!shutting_down) writer->finished(outcome.last);
 }
 
-// Appends from the worker. While the disk takes nothing, the worker waits and only commits. Nullopt if the daemon stops
-// first, or, while it starts, if the disk takes nothing.
+// The worker waits a while for the disk, and only commits. False if the daemon stops.
+bool Mapper::Impl::wait_for_disk() {
+  commits.begin_if_due();
+  MutexLock lock(mutex);
+  return !changed.wait_for(mutex, kDiskFails, [this]() RELMAP_REQUIRES(mutex) { return shutting_down; });
+}
+
+// Appends from the worker, once the disk takes the record. Nullopt if the daemon stops first.
 std::optional<std::uint64_t> Mapper::Impl::append_patiently(const storage::JournalRecord& record) {
   for (;;) {
     if (const auto appended = writer->append_follow_up(record); appended.ok()) return *appended;
-    if (!patient) return std::nullopt;
-    commits.begin_if_due();
-    MutexLock lock(mutex);
-    if (changed.wait_for(mutex, kDiskFails, [this]() RELMAP_REQUIRES(mutex) { return shutting_down; }))
-      return std::nullopt;
+    if (!wait_for_disk()) return std::nullopt;
   }
+}
+
+// The next chunk to take out, once the disk takes what its removal edits. Nullopt if there is none, or if the daemon
+// stops first.
+std::optional<storage::RemoveChunkRecord> Mapper::Impl::next_removal_patiently() {
+  while (background.removal_is_held_back())
+    if (failed || !wait_for_disk()) return std::nullopt;
+  return background.next_removal();
 }
 
 // Makes the map read-only, for example because a part of it could not be read while a record was applied. Acknowledged

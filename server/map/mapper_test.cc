@@ -501,65 +501,129 @@ TEST(DeterministicMapper, GivesTheSameMapDespiteDiskFailures) {
   EXPECT_EQ(maps[0], maps[1]);
 }
 
-TEST(DeterministicMapper, GivesTheSameMapDespiteStopsWithAFullQueue) {
-  sim::PointsWorldOptions world_options = small_world(66);
-  world_options.births = 30;
-  world_options.appearance = 150;
-  const sim::PointsWorld world(world_options);
-  world_options.noise_seed = 2;
-  world_options.uuid.bytes[15] = 2;
-  world_options.session = "again";
-  const sim::PointsWorld again(world_options);
-  const auto vocabulary =
-      place::Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
-  MapperOptions options;
-  options.deterministic = true;
-  options.rba.idle_delta_eps = 0.001;
-  options.commit_interval = 20ms;
-
-  // Two drives; the first is deleted while the second goes on.
-  std::vector<storage::JournalRecord> input;
-  for (std::uint32_t i = 0; i < 66; ++i) input.emplace_back(keyframe_record(world, i));
-  for (std::uint32_t i = 0; i < 66; ++i) {
-    storage::KeyframeRecord record = keyframe_record(again, i);
-    record.session = 2;
-    input.emplace_back(std::move(record));
-    if (i == 40) input.emplace_back(storage::SetSessionStateRecord{1, storage::SessionState::kDeleting});
-  }
-  std::vector<storage::MapHash> maps;
-  for (const bool stops : {false, true}) {
-    const auto engine = storage::make_memory_engine();
-    const auto open = [&] {
-      return Mapper::open(engine, std::make_shared<storage::Budget>(std::size_t{256} << 20), vocabulary, options)
-          .or_throw();
-    };
-    auto mapper = open();
-    ASSERT_EQ(mapper->begin_session(world.keyframe(0).session).or_throw(), 1u);
-    ASSERT_EQ(mapper->begin_session(again.keyframe(0).session).or_throw(), 2u);
-    std::atomic<std::size_t> durable = 0;
-    std::mt19937 random(3);
-    int stopped = 0;
-    while (durable < input.size()) {
-      for (std::size_t i = durable; i < input.size(); ++i)
-        if (!mapper->submit(input[i], [&](const Result<std::uint64_t>& result) { durable += result.ok(); }).ok()) break;
-      if (stops) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(random() % 60));
-        ASSERT_TRUE(mapper->stop().ok());
-        mapper = open();
-        ++stopped;
-      } else {
-        ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+// Two drives of a robot; the first is deleted while the second goes on.
+class ADriveIsDeleted : public testing::Test {
+ protected:
+  ADriveIsDeleted() {
+    options_.deterministic = true;
+    options_.rba.idle_delta_eps = 0.001;
+    options_.commit_interval = 20ms;
+    for (std::uint32_t i = 0; i < 66; ++i) input_.emplace_back(keyframe_record(first_, i));
+    for (std::uint32_t i = 0; i < 66; ++i) {
+      storage::KeyframeRecord record = keyframe_record(again_, i);
+      record.session = 2;
+      input_.emplace_back(std::move(record));
+      if (i == 40) {
+        deletion_ = input_.size();
+        input_.emplace_back(storage::SetSessionStateRecord{1, storage::SessionState::kDeleting});
       }
     }
-    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
-    EXPECT_EQ(stops, stopped > 3);
-    const auto view = mapper->view();
+  }
+  std::unique_ptr<Mapper> open(std::shared_ptr<storage::Engine> engine) const {
+    auto mapper = Mapper::open(std::move(engine), std::make_shared<storage::Budget>(std::size_t{256} << 20),
+                               vocabulary_, options_)
+                      .or_throw();
+    if (mapper->view()->sessions().empty()) {
+      EXPECT_EQ(mapper->begin_session(first_.keyframe(0).session).or_throw(), 1u);
+      EXPECT_EQ(mapper->begin_session(again_.keyframe(0).session).or_throw(), 2u);
+    }
+    return mapper;
+  }
+  // Submits what is not durable yet, until the queue is full.
+  void submit(Mapper& mapper) {
+    for (std::size_t i = durable_; i < input_.size(); ++i)
+      if (!mapper.submit(input_[i], [&](const Result<std::uint64_t>& result) { durable_ += result.ok(); }).ok()) break;
+  }
+  // Submits what is not durable yet, and waits until all is applied.
+  void finish(Mapper& mapper) {
+    do {
+      submit(mapper);
+      ASSERT_TRUE(mapper.wait_idle(soon()).ok());
+    } while (durable_ < input_.size());
+  }
+  static storage::MapHash hash(const Mapper& mapper) {
+    const auto view = mapper.view();
     EXPECT_TRUE(storage::is_deleted(*view->session(1)));
     EXPECT_EQ(view->session(2)->frames, 66u);
     EXPECT_THAT(derived_differences(*view), testing::IsEmpty());
-    maps.push_back(storage::hash_map(*view));
+    return storage::hash_map(*view);
   }
-  EXPECT_EQ(maps[0], maps[1]);
+  storage::MapHash undisturbed() {
+    durable_ = 0;
+    const auto mapper = open(storage::make_memory_engine());
+    finish(*mapper);
+    const storage::MapHash map = hash(*mapper);
+    durable_ = 0;
+    return map;
+  }
+
+  const sim::PointsWorld first_{drive(1)}, again_{drive(2)};
+  std::vector<storage::JournalRecord> input_;
+  std::size_t deletion_ = 0;  // the record in `input_`
+  std::atomic<std::size_t> durable_ = 0;
+
+ private:
+  static sim::PointsWorldOptions drive(std::uint8_t number) {
+    sim::PointsWorldOptions world = small_world(66);
+    world.births = 30;
+    world.appearance = 150;
+    if (number == 1) return world;
+    world.noise_seed = number;
+    world.uuid.bytes[15] = number;
+    world.session = "again";
+    return world;
+  }
+  MapperOptions options_;
+  const std::shared_ptr<const place::Vocabulary> vocabulary_ =
+      place::Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
+};
+
+TEST_F(ADriveIsDeleted, StopsWithAFullQueueGiveTheSameMap) {
+  const storage::MapHash map = undisturbed();
+  const auto engine = storage::make_memory_engine();
+  auto mapper = open(engine);
+  std::mt19937 random(3);
+  int stopped = 0;
+  for (; durable_ < input_.size(); ++stopped) {
+    submit(*mapper);
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 60));
+    ASSERT_TRUE(mapper->stop().ok());
+    mapper = open(engine);
+  }
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  EXPECT_GT(stopped, 3);
+  EXPECT_EQ(hash(*mapper), map);
+}
+
+// What follows from a record is journalled before the next one, even if the disk, and then a stop, hold it up.
+TEST_F(ADriveIsDeleted, FailingCommitsGiveTheSameMapWithAStopAndWithout) {
+  const storage::MapHash map = undisturbed();
+  for (const bool stops : {false, true}) {
+    durable_ = 0;
+    const FailingDisk disk;
+    auto mapper = open(disk.open());
+    std::vector<storage::JournalRecord> later;
+    std::swap(later, input_);
+    input_.assign(later.begin(), later.begin() + static_cast<std::ptrdiff_t>(deletion_));
+    finish(*mapper);
+    disk.commits->write = Reason::IO_ERROR;
+    ASSERT_EQ(mapper->commit(soon()).reason(), Reason::IO_ERROR);
+    std::swap(later, input_);
+    submit(*mapper);
+    while (durable_ <= deletion_) std::this_thread::sleep_for(1ms);
+    std::this_thread::sleep_for(50ms);  // time in which no later record may become durable
+    EXPECT_EQ(durable_, deletion_ + 1);
+    EXPECT_GT(mapper->view()->session(1)->frames, 0u) << "what a removal edits could not leave memory";
+    if (stops) {
+      EXPECT_EQ(mapper->stop().reason(), Reason::IO_ERROR);
+      mapper.reset();
+      disk.commits->write = Reason::OK;
+      mapper = open(disk.open());
+    }
+    disk.commits->write = Reason::OK;
+    finish(*mapper);
+    EXPECT_EQ(hash(*mapper), map) << (stops ? "with a stop" : "without a stop");
+  }
 }
 
 TEST(Mapper, AnUnreadablePartIsReportedWithAdvice) {
