@@ -141,6 +141,7 @@ std::shared_ptr<const void> ChunkCache::find(const Key& key, std::uint64_t commi
 
 void ChunkCache::insert(Entry entry, std::uint64_t loaded_at) {
   const MutexLock lock(mutex_);
+  entry.from = std::min(entry.from, loaded_at);  // a part may name a commit to come, as of a map that was copied
   entry.through = loaded_at == current_ ? kNewest : loaded_at;
   insert_locked(std::move(entry));
   evict_locked();

@@ -489,6 +489,40 @@ TEST_F(MapTest, AnEditOfTheHotPartLeavesTheOtherBytesAlone) {
   EXPECT_EQ(changed, (std::vector<std::string>{keys::part(Part::kHot, {1, 0})}));
 }
 
+// Parts name the commit that wrote them. In a map that an older version migrated from format 1 they may name commits
+// to come.
+TEST_F(MapTest, AnEditIsKeptWhicheverCommitAPartNames) {
+  {
+    auto map = open();
+    begin(*map, 1);
+    for (std::uint32_t i = 0; i < 2 * kFramesPerChunk; ++i) {
+      add(*map, {1, i});
+      if (i % 16 == 15) throw_if(map->commit());
+    }
+  }
+  std::vector<Put> puts;
+  ASSERT_TRUE(engine->snapshot()
+                  ->scan("",
+                         [&](std::string_view key, ByteSpan value) {
+                           puts.push_back({std::string(key), {value.begin(), value.end()}});
+                           return true;
+                         })
+                  .ok());
+  engine = make_memory_engine();
+  epoch = engine->acquire().value();
+  ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+  auto map = open();
+  const FrameId closed{1, 3}, last{1, 2 * kFramesPerChunk - 1};
+  for (int commits = 1; commits < 20; ++commits) {
+    for (const FrameId frame : {closed, last}) map->edit_hot(frame).mean_error = commits;
+    ASSERT_TRUE(map->commit().ok());
+    for (const FrameId frame : {closed, last}) {
+      EXPECT_EQ(map->hot(frame)->mean_error, commits) << frame.to_string();
+      EXPECT_EQ(map->view()->hot(frame)->mean_error, commits) << frame.to_string();
+    }
+  }
+}
+
 TEST_F(MapTest, AFailedCommitLosesNothingAndCanBeRepeated) {
   const auto disk = ForgetfulFiles::create(1);
   const auto faults = std::make_shared<Faults>();

@@ -78,6 +78,7 @@ class Target {
     engine_ = open_rocksdb(directory, options).or_throw();
     epoch_ = engine_->acquire().or_throw();
   }
+  std::uint64_t next_commit() const { return engine_->snapshot()->commit_number() + 1; }
   void put(std::string key, Bytes value) {
     bytes_ += key.size() + value.size();
     puts_.push_back({std::move(key), std::move(value)});
@@ -119,7 +120,7 @@ void put_state(Target& target, const MapState& state) {
 
 std::uint64_t copy_format1(const Engine& source, Target& target, const Progress& progress) {
   const auto snapshot = source.snapshot();
-  std::uint64_t total = 0, done = 0, commit = 0;
+  std::uint64_t total = 0, done = 0;
   SessionNumber sessions = 0;
   throw_if(snapshot->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
     const format1::SessionRecord record = format1::decode_session(value).or_throw();
@@ -141,7 +142,7 @@ std::uint64_t copy_format1(const Engine& source, Target& target, const Progress&
     }
     const auto reader = PartReader::open(value, part->part, part->chunk, format1::kPartVersion);
     if (!reader.ok()) lost(*part, reader.status().to_string());
-    PartWriter writer(part->part, part->chunk, ++commit);
+    PartWriter writer(part->part, part->chunk, target.next_commit());
     std::size_t frames = 0;
     for (std::size_t i = 0; i < reader->size(); ++i) {
       const auto body = reader->body(i);

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "storage/format/chunk_codec.h"
+#include "storage/format/keys.h"
 #include "storage/journal/journal_record.h"
 #include "storage/journal/journal_segment.h"
 #include "storage/maintenance/verify.h"
@@ -70,6 +72,13 @@ class Migrate : public ::testing::Test {
     ASSERT_TRUE(edge);
     EXPECT_NEAR(edge->T_ab.t.z(), 0.19244786469131184, 1e-8);
     expect_sound(*map);
+    const auto snapshot = engine->snapshot();
+    throw_if(snapshot->scan("", [&](std::string_view key, ByteSpan value) {
+      if (const auto part = keys::part_of(key); part && !part->slot) {
+        EXPECT_LE(PartReader::open(value, part->part, part->chunk).or_throw().commit(), snapshot->commit_number());
+      }
+      return true;
+    }));
     EXPECT_EQ(engine->allocate_session(epoch).or_throw(), 2U);
     EXPECT_EQ(engine->last_journal_sequence(), map->state().applied_sequence);
   }
