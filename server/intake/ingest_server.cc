@@ -178,11 +178,7 @@ struct IngestServer::Impl {
       return;
     }
     const MutexLock lock(queue_mutex);
-    PartQueue::Line line;
-    if (begun.contains(part.session))
-      line.session = part.session;
-    else
-      line.robot = sender.robot;
+    const PartQueue::Line line = line_of(part.session, sender, begun);
     queue.push(line, {std::move(part), std::move(sender)});
     queue_condition.notify_one();
   }
@@ -202,7 +198,7 @@ struct IngestServer::Impl {
         }
       }
       if (parts.empty()) return;
-      std::optional<std::set<SessionUuid>> changed;
+      std::optional<std::map<SessionUuid, Owner>> changed;
       std::vector<PartQueue::Sent> later;
       bool sooner = false;
       {
@@ -230,7 +226,7 @@ struct IngestServer::Impl {
       if (!changed) continue;
       const MutexLock lock(queue_mutex);
       begun = std::move(*changed);
-      queue.keep_only(begun);
+      queue.keep_only([&](const SessionUuid& session) { return begun.contains(session); });
     }
   }
 
@@ -254,8 +250,8 @@ struct IngestServer::Impl {
   mutable Mutex queue_mutex;
   ConditionVariable queue_condition;
   PartQueue queue RELMAP_GUARDED_BY(queue_mutex);
-  std::set<SessionUuid> begun RELMAP_GUARDED_BY(queue_mutex);  // each has a queue of its own
-  ReasonCounts unsound RELMAP_GUARDED_BY(queue_mutex){};       // parts that check_part() refused
+  std::map<SessionUuid, Owner> begun RELMAP_GUARDED_BY(queue_mutex);  // each has a queue of its own
+  ReasonCounts unsound RELMAP_GUARDED_BY(queue_mutex){};              // parts that check_part() refused
   bool queue_stopping RELMAP_GUARDED_BY(queue_mutex) = false;
 
   Mutex waiting_mutex;

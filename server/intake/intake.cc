@@ -52,17 +52,14 @@ Intake::~Intake() {
 
 // Whether the sender may send for the session. What has not begun is of the robot that first proved to send for it.
 Status Intake::check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const {
-  const bool proved = !entry.intake.has_begun() && entry.sender && !entry.sender->robot.empty();
-  const std::string& owner = entry.intake.has_begun() ? entry.intake.header().robot
-                             : proved                 ? entry.sender->robot
-                                                      : sender.robot;
-  if (!sender.robot.empty() && sender.robot != owner)
-    return {Reason::NOT_ALLOWED,
-            sender.robot + " may not send to session " + session.to_string() + ", which is another robot's"};
-  if (sender.anyone && (proved || (entry.intake.has_begun() && options_.proving.contains(owner))))
-    return {Reason::NOT_ALLOWED,
-            "nobody may send to session " + session.to_string() + " who does not prove to be robot " + owner};
-  return {};
+  if (entry.intake.has_begun()) return may_send(sender, session, owner_of(entry));
+  const bool proved = entry.sender && !entry.sender->robot.empty();
+  return proved ? may_send(sender, session, {entry.sender->robot, true}) : Status();
+}
+
+Owner Intake::owner_of(const Entry& entry) const {
+  const std::string& robot = entry.intake.header().robot;
+  return {robot, options_.proving.contains(robot)};
 }
 
 std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::optional<std::uint32_t> sequence) const {
@@ -674,10 +671,10 @@ std::vector<RobotStats> Intake::robots(SteadyTime now) {
   return all;
 }
 
-std::set<SessionUuid> Intake::begun() const {
-  std::set<SessionUuid> begun;
+std::map<SessionUuid, Owner> Intake::begun() const {
+  std::map<SessionUuid, Owner> begun;
   for (const auto& [session, entry] : sessions_)
-    if (entry.intake.has_begun()) begun.insert(begun.end(), session);
+    if (entry.intake.has_begun()) begun.emplace_hint(begun.end(), session, owner_of(entry));
   return begun;
 }
 

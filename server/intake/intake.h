@@ -79,8 +79,8 @@ class Intake {
   IngestStats stats(SteadyTime now) const;
   // All sessions that are being taken in, and robots that fell silent without an end, in no particular order.
   std::vector<RobotStats> robots(SteadyTime now);
-  // Sessions that have begun. Only these have memory and queues of their own.
-  std::set<SessionUuid> begun() const;
+  // Sessions that have begun, with their robots. Only these have memory and queues of their own.
+  std::map<SessionUuid, Owner> begun() const;
   // Changes whenever begun() may have changed.
   std::uint64_t begun_version() const { return begun_version_; }
 
@@ -139,6 +139,7 @@ class Intake {
   Known known(const SessionUuid& session);
   Result<Entry*> open(const SessionUuid& session, SteadyTime now, const Sender& sender);
   Status check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const;
+  Owner owner_of(const Entry& entry) const;  // of one that has begun
   void forget(const SessionUuid& session);
   bool make_room(SteadyTime now);
   bool drop_waiting(std::size_t more_than);

@@ -66,9 +66,15 @@ PartQueue::Facts PartQueue::of(const SessionUuid& session) const {
   return {static_cast<std::uint32_t>(found->second.parts.size()), found->second.dropped};
 }
 
-void PartQueue::keep_only(const std::set<SessionUuid>& known) {
+void PartQueue::keep_only(const std::function<bool(const SessionUuid&)>& is_known) {
   std::erase_if(queues_,
-                [&](const auto& entry) { return entry.second.parts.empty() && !known.contains(entry.first.session); });
+                [&](const auto& entry) { return entry.second.parts.empty() && !is_known(entry.first.session); });
+}
+
+PartQueue::Line line_of(const SessionUuid& session, const Sender& sender, const std::map<SessionUuid, Owner>& begun) {
+  const auto owner = begun.find(session);
+  const bool takes_its_turn = owner != begun.end() && may_send(sender, session, owner->second).ok();
+  return takes_its_turn ? PartQueue::Line{session, {}} : PartQueue::Line{{}, sender.robot};
 }
 
 }  // namespace relmap::intake

@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <list>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 
 #include "proto/keyframe/ingest_messages.h"
@@ -21,8 +21,8 @@ class PartQueue {
  public:
   explicit PartQueue(std::size_t capacity_bytes) : capacity_(capacity_bytes) {}
 
-  // Whose queue it is: that of a session that has begun, or of the others of one robot, if the robot is proved, or else
-  // of all others together.
+  // Whose queue it is: that of a session that has begun, of who may send for it; or that of all else that one proved
+  // robot sends; or that of all others together.
   struct Line {
     SessionUuid session;
     std::string robot;
@@ -46,8 +46,8 @@ class PartQueue {
     std::uint64_t dropped = 0;
   };
   Facts of(const SessionUuid& session) const;
-  // Forgets the counts of sessions that are not `known` and have nothing waiting.
-  void keep_only(const std::set<SessionUuid>& known);
+  // Forgets the counts of sessions of which `is_known` is false and that have nothing waiting.
+  void keep_only(const std::function<bool(const SessionUuid&)>& is_known);
 
  private:
   struct Queue {
@@ -64,5 +64,8 @@ class PartQueue {
   std::map<Line, Queue> queues_;
   std::list<Line> turns_;  // those with non-empty queues; the first is being served
 };
+
+// The queue for what the sender sends to the session. `begun`: the sessions that have begun.
+PartQueue::Line line_of(const SessionUuid& session, const Sender& sender, const std::map<SessionUuid, Owner>& begun);
 
 }  // namespace relmap::intake

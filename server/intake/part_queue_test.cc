@@ -97,9 +97,22 @@ TEST(PartQueue, ForgetsUnknownSenders) {
   for (const std::uint8_t n : {1, 2, 3}) push(queue, n, part(n, 0));
   for (int i = 0; i < 200; ++i) push(queue, 3, part(3, 1));
   for (int i = 0; i < 2; ++i) (void)queue.pop();
-  queue.keep_only({sender(2)});
+  queue.keep_only([&](const SessionUuid& session) { return session == sender(2); });
   EXPECT_EQ(queue.of(sender(1)).waiting, 0u);
   EXPECT_GT(queue.of(sender(3)).waiting, 0u) << "what waits is not forgotten";
+}
+
+// A robot that sends to another's session takes nothing of the other's queue.
+TEST(PartQueue, OnlyWhoMaySendForASessionIsInItsQueue) {
+  const std::map<SessionUuid, Owner> begun{{sender(1), {"cart", true}}, {sender(2), {"trolley", false}}};
+  const PartQueue::Line carts{sender(1), {}}, trolleys{sender(2), {}}, others{};
+  const Sender cart{"cart"}, thief{"thief"}, anyone{{}, true}, operators{};
+  EXPECT_EQ(line_of(sender(1), cart, begun), carts);
+  EXPECT_EQ(line_of(sender(1), operators, begun), carts);
+  EXPECT_EQ(line_of(sender(1), thief, begun), (PartQueue::Line{{}, "thief"}));
+  EXPECT_EQ(line_of(sender(1), anyone, begun), others) << "the cart proves who it is";
+  EXPECT_EQ(line_of(sender(2), anyone, begun), trolleys);
+  EXPECT_EQ(line_of(sender(3), cart, begun), (PartQueue::Line{{}, "cart"})) << "it has not begun";
 }
 
 }  // namespace

@@ -38,6 +38,16 @@ Status check_clock(std::int64_t time_us) {
 
 }  // namespace
 
+Status may_send(const Sender& sender, const SessionUuid& session, const Owner& owner) {
+  if (!sender.robot.empty() && sender.robot != owner.robot)
+    return {Reason::NOT_ALLOWED,
+            sender.robot + " may not send to session " + session.to_string() + ", which is another robot's"};
+  if (sender.anyone && owner.proves)
+    return {Reason::NOT_ALLOWED,
+            "nobody may send to session " + session.to_string() + " who does not prove to be robot " + owner.robot};
+  return {};
+}
+
 SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, const KnownSession& known, Submit submit,
                              Begin begin, IngestStats& stats, const std::set<std::string>& robots,
                              const std::set<std::string>& proving)

@@ -31,6 +31,14 @@ struct Sender {
   std::string from = {};  // the address of one who proves nothing and may do everything; empty: another, or not known
 };
 
+// The robot of a session.
+struct Owner {
+  std::string robot;
+  bool proves = false;  // that it is this robot: nobody else may send for it who proves nothing
+};
+// NOT_ALLOWED: the sender may not send for the session of this owner.
+Status may_send(const Sender& sender, const SessionUuid& session, const Owner& owner);
+
 class SessionIntake {
  public:
   // Journals a record as KeyframeSink::submit() does; the caller passes the outcome to settle() with this ticket.
