@@ -44,7 +44,8 @@ void write_keyframe_files(const std::string& root);
 void write_keyframes(const std::string& root);
 void write_ingest_parts(const std::string& root);
 void write_lcm_messages(const std::string& root);
-void write_known_requests(const std::string& root);
+void write_questions(const std::string& root);
+void write_edits(const std::string& root);
 void write_replies(const std::string& root);
 
 }  // namespace relmap::testing

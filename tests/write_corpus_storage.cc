@@ -22,7 +22,7 @@ using namespace storage;
 void write_journal_segments(const std::string& root) {
   enum Mode { kSalted = 2, kUnsalted = 3 };
   enum Before { kNext = 0, kMissing = 3, kSegment = 4, kDamaged = 8, kTwoBehind = 32 };
-  enum Kind {
+  enum {
     kSession = 0,
     kKeyframe = 1,
     kGap = 3,
@@ -74,7 +74,7 @@ void write_journal_records(const std::string& root) {
   }
   // Version, kind, length before a sealed body, its checksum behind it. The fuzzer seals bodies as each version.
   const auto body = [](const Bytes& sealed) { return Bytes(sealed.begin() + 8, sealed.end() - 4); };
-  enum Kind { kSession = 1, kState, kSkipped, kPending, kEdit };
+  enum { kSession = 1, kState, kSkipped, kPending, kEdit };
   Session session = random.session(3);
   session.unknown = {{99, {1, 2}}};
   session.before_frozen = SessionState::kEnded;
