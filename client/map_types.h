@@ -394,7 +394,10 @@ struct DaemonStatus {
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;
   bool deterministic = false;
-  Status storage, lcm;  // not ok: why the daemon accepts nothing, or nothing over LCM
+  // Not ok: why the daemon accepts nothing, nothing over LCM, or fewer connections than was configured.
+  Status storage, lcm, connections;
+  std::uint64_t connections_open = 0, connections_refused = 0,
+                connections_displaced = 0;  // the last two: since the start
 
   std::uint32_t sessions = 0, labels = 0;
   std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0, places_left_out = 0;

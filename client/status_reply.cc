@@ -30,6 +30,10 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.deterministic = m.deterministic();
   s.storage = read_state(m.storage_reason(), m.storage_message());
   s.lcm = read_state(m.lcm_reason(), m.lcm_message());
+  s.connections = read_state(m.connections().reason(), m.connections().message());
+  s.connections_open = m.connections().open();
+  s.connections_refused = m.connections().refused();
+  s.connections_displaced = m.connections().displaced();
   s.sessions = m.sessions();
   s.labels = m.labels();
   s.frames = m.frames();

@@ -186,10 +186,11 @@ void limit_connections(Config& config) {
   const std::size_t files = relmap::ops::raise_file_limit();
   const std::size_t most = std::max(kFewConnections, (files - std::min(files, kOwnFiles)) / 2);
   if (config.connections.total <= most) return;
-  spdlog::warn(
-      "TOO_MANY_FILES: {} files may be open, too few for {} connections; {} are taken. Raise the hard limit "
-      "(LimitNOFILE=)",
-      files, config.connections.total, most);
+  config.connections.lowered = {Reason::TOO_MANY_FILES, std::to_string(files) + " files may be open, too few for " +
+                                                            std::to_string(config.connections.total) +
+                                                            " connections; " + std::to_string(most) +
+                                                            " are taken. Raise the hard limit (LimitNOFILE=)"};
+  spdlog::warn("{}", config.connections.lowered.to_string());
   config.connections.total = most;
   config.connections.per_peer = std::min(config.connections.per_peer, most);
 }

@@ -1,11 +1,13 @@
 // Callers that take a daemon's connections, calls or memory and give nothing back keep nobody else out.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 #include <vector>
@@ -190,7 +192,38 @@ TEST_F(LimitsTest, ConnectionsLeaveTheMapItsFiles) {
   const auto idle = connect(300, 65535);
   drive();
   expect_answers(5);
-  EXPECT_EQ(client_->status().or_throw().storage.reason(), Reason::OK);
+  const auto status = client_->status().or_throw();
+  EXPECT_TRUE(status.storage.ok()) << status.storage.to_string();
+  EXPECT_EQ(status.connections.reason(), Reason::TOO_MANY_FILES);
+  EXPECT_THAT(status.connections.message(), HasSubstr("160 files may be open"));
+  EXPECT_GT(status.connections_displaced + status.connections_refused, 200u) << "of 300, " << status.connections_open;
+  EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
+}
+
+// A process that has run out of files refuses connections at once, says so, and takes them again when it has some.
+TEST_F(LimitsTest, WithoutAFileForAConnectionTheDaemonSaysSoAndGoesOn) {
+  serve("");
+  drive();
+  EXPECT_TRUE(client_->status().or_throw().connections.ok());
+  const pid_t pid = daemon_->process().pid();
+  rlim_t files = 0;  // as many as reach to the last that is open
+  for (const auto& file : std::filesystem::directory_iterator("/proc/" + std::to_string(pid) + "/fd"))
+    files = std::max<rlim_t>(files, std::stoul(file.path().filename()) + 1);
+  rlimit before{};
+  ASSERT_EQ(prlimit(pid, RLIMIT_NOFILE, nullptr, &before), 0);
+  const rlimit full{files, before.rlim_max};
+  ASSERT_EQ(prlimit(pid, RLIMIT_NOFILE, &full, nullptr), 0);
+  {
+    auto some = connect(200, 65535), more = connect(200, 65535, "127.0.0.2");  // the first find numbers that are free
+    EXPECT_TRUE(eventually([&] { return open(more) < 190; }));
+    const auto status = client_->status();
+    ASSERT_TRUE(status.ok()) << "over the connection that it has: " << status.status().to_string();
+    EXPECT_EQ(status->connections.reason(), Reason::TOO_MANY_FILES) << status->connections.to_string();
+  }
+  ASSERT_EQ(prlimit(pid, RLIMIT_NOFILE, &before, nullptr), 0);
+  auto taken = connect(30, 65535);
+  expect_answers(5);
+  EXPECT_EQ(open(taken), 30);
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 

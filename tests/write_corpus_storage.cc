@@ -22,15 +22,7 @@ using namespace storage;
 void write_journal_segments(const std::string& root) {
   enum Mode { kSalted = 2, kUnsalted = 3 };
   enum Before { kNext = 0, kMissing = 3, kSegment = 4, kDamaged = 8, kTwoBehind = 32 };
-  enum {
-    kSession = 0,
-    kKeyframe = 1,
-    kGap = 3,
-    kRefusal = 4,
-    kIdle = 5,
-    kNoKeyframe = 6 + 8 * 4,
-    kNone = 7 + 8 * 4
-  };
+  enum { kSession = 0, kKeyframe = 1, kGap = 3, kRefusal = 4, kIdle = 5, kNoKeyframe = 6 + 8 * 4, kNone = 7 + 8 * 4 };
   const Corpus corpus(root, "journal_segment_fuzz");
   for (const bool salted : {true, false}) {
     const int mode = salted ? kSalted : kUnsalted;

@@ -226,7 +226,7 @@ struct IngestServer::Impl {
       if (!changed) continue;
       const MutexLock lock(queue_mutex);
       begun = std::move(*changed);
-      queue.keep_only([&](const SessionUuid& session) { return begun.contains(session); });
+      queue.keep_only([&](const SessionUuid& session) RELMAP_REQUIRES(queue_mutex) { return begun.contains(session); });
     }
   }
 

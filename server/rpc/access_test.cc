@@ -395,5 +395,33 @@ TEST_F(AccessTest, FilesThatDoNotBelongTogetherAreRefusedByName) {
   EXPECT_EQ(RpcServer::start(*map_.core, gatekeeper, options).reason(), Reason::BAD_CONFIG);
 }
 
+// The first message of a handshake (RFC 5246, 7.4.1.2), with ECDSA and RSA over P-256 and X25519.
+std::string client_hello(char minor) {
+  std::string body{'\3', minor};
+  body += std::string(32, 'r') + std::string(1, '\0');
+  body += std::string("\0\x08\xc0\x09\xc0\x2b\xc0\x13\xc0\x2f\x01\0", 12);    // suites; no compression
+  body += std::string("\0\x1e\0\x0a\0\6\0\4\0\x17\0\x1d\0\x0b\0\2\1\0", 18);  // extensions: groups, point formats,
+  body += std::string("\0\x0d\0\x0a\0\x08\4\3\4\1\x08\4\2\3", 14);            // signature algorithms
+  const auto framed = [](const std::string& head, const std::string& content) {
+    return head + static_cast<char>(content.size() >> 8) + static_cast<char>(content.size()) + content;
+  };
+  return framed("\x16\3\1", framed(std::string("\1\0", 2), body));
+}
+
+TEST_F(AccessTest, NoTlsBefore1_2IsSpoken) {
+  start();
+  const auto is_answered = [&](char minor) {
+    const int fd = connect_stranger();
+    const std::string hello = client_hello(minor);
+    EXPECT_EQ(send(fd, hello.data(), hello.size(), 0), static_cast<ssize_t>(hello.size()));
+    char kind = 0;
+    const bool any = recv(fd, &kind, 1, MSG_WAITALL) == 1;
+    close(fd);
+    return any && kind == 0x16;  // the next message of the handshake
+  };
+  EXPECT_TRUE(is_answered(3));
+  for (const char minor : {'\2', '\1', '\0'}) EXPECT_FALSE(is_answered(minor)) << "TLS 1." << minor - 1;
+}
+
 }  // namespace
 }  // namespace relmap::rpc

@@ -196,10 +196,11 @@ Result<Producer<v1::Progress>> compact(const v1::CompactRequest&, const Deadline
 
 Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest&, const Deadline& deadline, map::Mapper& mapper,
                                     const DaemonFacts& facts, const Routes& routes, const Intake& intake,
-                                    const ProcessProbe& process, const Metrics& metrics) {
+                                    const ProcessProbe& process, const Transport& transport, const Metrics& metrics) {
   const auto stats = mapper.engine().stats();
   if (!stats.ok()) return stats.status();
-  auto status = get_status(v1::GetStatusRequest(), deadline, mapper, facts, routes, intake, process, metrics);
+  auto status =
+      get_status(v1::GetStatusRequest(), deadline, mapper, facts, routes, intake, process, transport, metrics);
   if (!status.ok()) return status.status();
   v1::GetStatsReply reply;
   *reply.mutable_status() = std::move(status).value();

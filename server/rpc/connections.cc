@@ -8,11 +8,13 @@
 #include <array>
 #include <cstring>
 
-#include "proto/base/hex.h"
+#include "proto/base/percent.h"
 
 namespace relmap::rpc {
 
 namespace {
+
+constexpr std::chrono::minutes kTold{1};  // for how long a failure is told
 
 // Device and inode, which no other open file has.
 std::pair<dev_t, ino_t> identity_of(int descriptor) {
@@ -56,12 +58,9 @@ Side side_of(int connection) {
 // The same of a peer as gRPC names it: "ipv4:10.0.0.1:5", "ipv6:%5Bfe80::1%25eth0%5D:5". Empty if it is no TCP.
 std::string peer_of(const std::string& name) {
   if (!name.starts_with("ipv4:") && !name.starts_with("ipv6:")) return {};
-  std::string text;
-  for (std::size_t i = 5; i < name.size(); ++i) {
-    const bool coded = name[i] == '%' && i + 2 < name.size() && hex_digit(name[i + 1]) >= 0;
-    text += coded ? static_cast<char>(hex_digit(name[i + 1]) * 16 + hex_digit(name[i + 2])) : name[i];
-    if (coded) i += 2;
-  }
+  const auto decoded = percent_decoded(std::string_view(name).substr(5));
+  if (!decoded) return {};
+  const std::string& text = *decoded;
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos) return {};
   std::string host = text.substr(0, colon);
@@ -77,7 +76,11 @@ Connections::Added Connections::add(int connection) {
   if (const auto former = open_.find(connection); former != open_.end()) forget(former);
   if (!has_room(side.source)) forget_closed();
   const bool full = !has_room(side.source);
-  if (full && !make_room(side.source)) return Added::kNo;
+  if (full && !make_room(side.source)) {
+    ++refused_;
+    return Added::kNo;
+  }
+  displaced_ += full;
   ++by_source_[side.source];
   if (!side.source.empty()) by_peer_[side.peer] = connection;
   open_.emplace(connection, Open{identity_of(connection), std::move(side.source), std::move(side.peer), Clock::now()});
@@ -139,9 +142,16 @@ void Connections::close_quiet(Clock::time_point now) {
   }
 }
 
-std::size_t Connections::open() const {
+void Connections::not_accepted(const Status& why, Clock::time_point now) {
   const MutexLock lock(mutex_);
-  return open_.size();
+  not_accepted_ = why;
+  not_accepted_at_ = now;
+}
+
+ConnectionCounts Connections::counts(Clock::time_point now) const {
+  const MutexLock lock(mutex_);
+  const bool lately = !not_accepted_.ok() && now - not_accepted_at_ < kTold;
+  return {open_.size(), refused_, displaced_, lately ? not_accepted_ : limits_.lowered};
 }
 
 // gRPC does not tell when it closes a connection: then its descriptor is closed, or is another file's by now.

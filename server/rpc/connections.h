@@ -6,11 +6,13 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
 
 #include "proto/base/mutex.h"
+#include "proto/base/status.h"
 
 namespace relmap::rpc {
 
@@ -20,6 +22,13 @@ struct ConnectionLimits {
   // A connection over TCP is closed over which no known caller has had a call for so long. gRPC closes one without any
   // call a minute before.
   double quiet_s = 660;
+  Status lowered = {};  // TOO_MANY_FILES: why `total` is less than was configured
+};
+
+struct ConnectionCounts {
+  std::size_t open = 0;
+  std::uint64_t refused = 0, displaced = 0;  // since the start; displaced: closed to make room
+  Status trouble;                            // not ok: fewer connections are taken than was configured
 };
 
 // Thread-safe. Connections are closed by shutdown(2) alone: whoever has taken a descriptor over closes it.
@@ -39,7 +48,10 @@ class Connections {
   // Closes those that have been quiet for too long at `now`.
   void close_quiet(Clock::time_point now);
 
-  std::size_t open() const;
+  // Notes that a connection could not be accepted at `now`. Told by counts() for a minute.
+  void not_accepted(const Status& why, Clock::time_point now);
+
+  ConnectionCounts counts(Clock::time_point now) const;
   const ConnectionLimits& limits() const { return limits_; }
 
  private:
@@ -65,6 +77,9 @@ class Connections {
   std::map<int, Open> open_ RELMAP_GUARDED_BY(mutex_);                      // by descriptor
   std::map<std::string, std::size_t> by_source_ RELMAP_GUARDED_BY(mutex_);  // how many of them
   std::map<std::string, int> by_peer_ RELMAP_GUARDED_BY(mutex_);            // descriptors; of TCP only
+  std::uint64_t refused_ RELMAP_GUARDED_BY(mutex_) = 0, displaced_ RELMAP_GUARDED_BY(mutex_) = 0;
+  Status not_accepted_ RELMAP_GUARDED_BY(mutex_);
+  Clock::time_point not_accepted_at_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::rpc

@@ -17,6 +17,7 @@
 #include "server/route/overlay/route_index.h"
 #include "server/route/overlay/route_search.h"
 #include "server/rpc/charge.h"
+#include "server/rpc/connections.h"
 #include "server/rpc/deadline.h"
 #include "server/rpc/edit_log.h"
 #include "server/rpc/limits.h"
@@ -53,6 +54,11 @@ struct ProcessFacts {
   std::size_t resident_bytes = 0, peak_resident_bytes = 0;
 };
 using ProcessProbe = std::function<ProcessFacts()>;
+
+// The connections of the server; null while none serves.
+struct Transport {
+  const Connections* connections = nullptr;
+};
 
 // The intake of keyframes.
 struct Intake {
@@ -105,7 +111,7 @@ struct Core {
         edits(m.remembered_edits()) {}
 
   auto parts() {
-    return std::tie(mapper, facts, limits, intake, process, routes, metrics, views, edits, imports, pictures,
+    return std::tie(mapper, facts, limits, intake, process, transport, routes, metrics, views, edits, imports, pictures,
                     maintenance);
   }
 
@@ -114,6 +120,7 @@ struct Core {
   RpcLimits limits;
   Intake intake;
   ProcessProbe process;  // empty if not known
+  Transport transport;
   Routes routes;
   Metrics metrics;
   ViewKeeper views;

@@ -149,7 +149,8 @@ void Listener::run() {
       connections_.close_quiet(now);
       looked = now;
     }
-    if (ready <= 0) continue;  // EINTR
+    if (ready < 0 && errno != EINTR) std::this_thread::sleep_for(kPause);  // too little memory, or too few files
+    if (ready <= 0) continue;
     if (waiting.back().revents != 0) return;
     for (std::size_t i = 0; i < sources_.size(); ++i)
       if (waiting[i].revents != 0) accept_from(sources_[i]);
@@ -160,12 +161,12 @@ void Listener::accept_from(const Source& source) {
   const int connection = accept4(source.socket.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (connection < 0) {
     if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;  // it has gone already
-    const int why = errno;
-    if (tells())
-      spdlog::error("{}: no connection can be accepted: {}",
-                    reason_name(why == EMFILE || why == ENFILE ? Reason::TOO_MANY_FILES : Reason::IO_ERROR),
-                    std::strerror(why));
-    if ((why == EMFILE || why == ENFILE) && turn_away(source.socket.fd())) return;
+    const bool no_file = errno == EMFILE || errno == ENFILE;
+    const Status why(no_file ? Reason::TOO_MANY_FILES : Reason::IO_ERROR,
+                     "no connection can be accepted: " + error_text());
+    connections_.not_accepted(why, Connections::Clock::now());
+    if (tells()) spdlog::error("{}", why.to_string());
+    if (no_file && turn_away(source.socket.fd())) return;
     pollfd wake{wake_, POLLIN, 0};
     poll(&wake, 1, static_cast<int>(kPause.count()));
     return;
@@ -175,7 +176,7 @@ void Listener::accept_from(const Source& source) {
     spdlog::warn(
         "connections {}: {} are open",
         added == Connections::Added::kNo ? "are refused" : "of callers that are not known make room for others",
-        connections_.open());
+        connections_.counts(Connections::Clock::now()).open);
   if (added == Connections::Added::kNo) {
     close(connection);
     return;

@@ -94,9 +94,14 @@ Status check_files(const TlsFiles& files) {
 struct RpcServer::Impl {
   // The mapper's budget outlives the server: the core holds both.
   Impl(Core& core, const Gatekeeper& gatekeeper, const ServerOptions& options)
-      : connections(options.connections),
-        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {}
+      : transport(core.transport),
+        connections(options.connections),
+        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {
+    transport.connections = &connections;
+  }
+  ~Impl() { transport.connections = nullptr; }
 
+  Transport& transport;
   Connections connections;
   Gateway gateway;
   std::vector<std::unique_ptr<grpc::Service>> services;

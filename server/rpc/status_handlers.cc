@@ -125,6 +125,17 @@ void put_ingest(const IngestFacts& facts, v1::GetStatusReply& reply) {
   for (const auto& [reason, count] : facts.not_taken) add_count(*counts.mutable_not_taken(), reason, count);
 }
 
+void put_connections(const Connections& connections, v1::GetStatusReply& reply) {
+  const ConnectionCounts now = connections.counts(Connections::Clock::now());
+  v1::ConnectionCounts& counts = *reply.mutable_connections();
+  counts.set_open(now.open);
+  counts.set_limit(connections.limits().total);
+  counts.set_refused(now.refused);
+  counts.set_displaced(now.displaced);
+  counts.set_reason(to_wire(now.trouble.reason()));
+  counts.set_message(now.trouble.message());
+}
+
 void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
   for (const auto& [name, counted] : metrics.methods()) {
     v1::MethodCount& method = *reply.add_methods();
@@ -145,7 +156,7 @@ void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
 
 Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadline&, map::Mapper& mapper,
                                       const DaemonFacts& facts, const Routes& routes, const Intake& intake,
-                                      const ProcessProbe& process, const Metrics& metrics) {
+                                      const ProcessProbe& process, const Transport& transport, const Metrics& metrics) {
   v1::GetStatusReply reply;
   put_daemon(facts, reply);
   const auto view = mapper.view();
@@ -160,6 +171,7 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadlin
   reply.set_vocabulary_words(vocabulary.size());
   reply.set_vocabulary_source(vocabulary.source());
   if (intake.facts) put_ingest(intake.facts(), reply);
+  if (transport.connections) put_connections(*transport.connections, reply);
   put_methods(metrics, reply);
   return reply;
 }
