@@ -45,5 +45,20 @@ TEST(TurnQueue, WhatIsErasedHasNoTurn) {
   EXPECT_EQ(rest_of(queue), (std::vector<int>{2}));
 }
 
+TEST(TurnQueue, WhoHasMostMakesRoomForWhoHasLess) {
+  TurnQueue<int> queue;
+  EXPECT_FALSE(queue.make_room("little"));
+  for (int i = 0; i < 4; ++i) queue.push("much", i);
+  queue.push("little", 10);
+  EXPECT_FALSE(queue.make_room("much")) << "he is the one";
+  EXPECT_EQ(queue.make_room("little"), 3);
+  queue.push("little", 11);
+  EXPECT_FALSE(queue.make_room("little")) << "then he had as many";
+  EXPECT_EQ(queue.make_room("new"), 2);
+  EXPECT_EQ(queue.size(), 4u);
+  EXPECT_EQ(rest_of(queue), (std::vector<int>{0, 10, 1, 11}));
+  EXPECT_EQ(queue.size(), 0u);
+}
+
 }  // namespace
 }  // namespace relmap

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -22,6 +21,7 @@ SteadyTime now() { return std::chrono::steady_clock::now(); }
 constexpr int kPartsAtOnce = 64;  // taken in under one lock
 constexpr std::size_t kMaxNews = 4096;
 constexpr std::size_t kMaxWaiting = 1024;  // messages for which the map is read first
+constexpr char kTooManyWait[] = "too many messages wait until the map was read";
 const Status kStopped{Reason::SHUTTING_DOWN, "the daemon takes nothing more in"};
 
 // Locks are taken in the order subscribers_mutex, mutex, and wake_mutex or queue_mutex last.
@@ -98,6 +98,7 @@ struct IngestServer::Impl {
   struct Waiting {
     SessionUuid session;
     std::optional<std::uint32_t> sequence;
+    Sender sender;
     std::function<Status(Intake&)> action;  // returns what the sender is to know
     Taken taken;
 
@@ -107,7 +108,7 @@ struct IngestServer::Impl {
   };
 
   // Takes the message in, unless something has to be read of the map first: then that.
-  std::optional<MapQuestion> try_to_take(const Waiting& message, Status& status) {
+  std::optional<MapQuestion> try_to_take(const Waiting& message, Status& status, Party* party = nullptr) {
     bool sooner = false;
     {
       const MutexLock lock(mutex);
@@ -115,7 +116,10 @@ struct IngestServer::Impl {
         status = kStopped;
         return std::nullopt;
       }
-      if (auto unread = intake.question(message.session, message.sequence)) return unread;
+      if (auto unread = intake.question(message.session, message.sequence, message.sender)) {
+        if (party) *party = intake.party(message.session, message.sender);
+        return unread;
+      }
       status = message.action(intake);
       sooner = plan();
     }
@@ -125,18 +129,24 @@ struct IngestServer::Impl {
 
   void take(Waiting message) {
     Status status;
-    if (try_to_take(message, status)) {
+    Party party;
+    std::optional<Waiting> refused;
+    if (!try_to_take(message, status, &party)) return message.done(status);
+    {
       const MutexLock lock(waiting_mutex);
+      const bool full = waiting.size() >= kMaxWaiting;
+      if (full) refused = waiting.make_room(party);
       if (waiting_stopping) {
         status = kStopped;
-      } else if (waiting.size() >= kMaxWaiting) {
-        status = {Reason::BUDGET_EXCEEDED, "too many messages wait until the map was read"};
+      } else if (full && !refused) {
+        status = {Reason::BUDGET_EXCEEDED, kTooManyWait};
       } else {
-        waiting.push_back(std::move(message));
-        return waiting_condition.notify_one();
+        waiting.push(party, std::move(message));
+        waiting_condition.notify_one();
       }
     }
-    message.done(status);
+    if (refused) refused->done({Reason::BUDGET_EXCEEDED, kTooManyWait});
+    if (!status.ok()) message.done(status);
   }
 
   // Whether the thread has to poll sooner than it plans to.
@@ -156,8 +166,7 @@ struct IngestServer::Impl {
         waiting_condition.wait(
             waiting_mutex, [this]() RELMAP_REQUIRES(waiting_mutex) { return waiting_stopping || !waiting.empty(); });
         if (waiting.empty()) return;
-        message = std::move(waiting.front());
-        waiting.pop_front();
+        message = waiting.pop();
       }
       Status status;
       while (const auto unread = try_to_take(message, status)) read(*unread);
@@ -178,8 +187,8 @@ struct IngestServer::Impl {
       return;
     }
     const MutexLock lock(queue_mutex);
-    const PartQueue::Line line = line_of(part.session, sender, begun);
-    queue.push(line, {std::move(part), std::move(sender)});
+    const Party party = party_of(part.session, sender, begun);
+    queue.push(party, {std::move(part), std::move(sender)});
     queue_condition.notify_one();
   }
 
@@ -204,7 +213,7 @@ struct IngestServer::Impl {
       {
         const MutexLock lock(mutex);
         for (PartQueue::Sent& sent : parts)
-          if (intake.question(sent.part.session, sent.part.sequence))
+          if (intake.question(sent.part.session, sent.part.sequence, sent.sender))
             later.push_back(std::move(sent));
           else
             intake.take_part(sent.part, now(), sent.sender);
@@ -217,6 +226,7 @@ struct IngestServer::Impl {
         const std::uint32_t sequence = sent.part.sequence;
         take({session,
               sequence,
+              sent.sender,
               [sent = std::make_shared<const PartQueue::Sent>(std::move(sent))](Intake& i) {
                 i.take_part(sent->part, now(), sent->sender);
                 return Status();
@@ -226,7 +236,11 @@ struct IngestServer::Impl {
       if (!changed) continue;
       const MutexLock lock(queue_mutex);
       begun = std::move(*changed);
-      queue.keep_only([&](const SessionUuid& session) RELMAP_REQUIRES(queue_mutex) { return begun.contains(session); });
+      std::set<std::string> robots;
+      for (const auto& [session, owner] : begun) robots.insert(owner.robot);
+      queue.keep_only([&](const Party& party) RELMAP_REQUIRES(queue_mutex) {
+        return begun.contains(party.session) || robots.contains(party.robot);
+      });
     }
   }
 
@@ -256,7 +270,7 @@ struct IngestServer::Impl {
 
   Mutex waiting_mutex;
   ConditionVariable waiting_condition;
-  std::deque<Waiting> waiting RELMAP_GUARDED_BY(waiting_mutex);
+  TurnQueue<Waiting, Party> waiting RELMAP_GUARDED_BY(waiting_mutex);
   bool waiting_stopping RELMAP_GUARDED_BY(waiting_mutex) = false;
 
   mutable Mutex mutex;
@@ -296,24 +310,24 @@ void IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequen
                                 const Sender& sender, Taken taken) {
   auto bytes = std::make_shared<Bytes>(std::move(payload));
   impl_->take(
-      {session, sequence,
+      {session, sequence, sender,
        [=](Intake& intake) { return intake.take_payload(session, sequence, crc, std::move(*bytes), now(), sender); },
        std::move(taken)});
 }
 
 void IngestServer::take_gap(const Gap& gap, const Sender& sender, Taken taken) {
-  impl_->take({gap.session, std::nullopt, [=](Intake& intake) { return intake.take_gap(gap, now(), sender); },
+  impl_->take({gap.session, std::nullopt, sender, [=](Intake& intake) { return intake.take_gap(gap, now(), sender); },
                std::move(taken)});
 }
 
 void IngestServer::take_end(const SessionEnd& end, const Sender& sender, Taken taken) {
-  impl_->take({end.session, std::nullopt, [=](Intake& intake) { return intake.take_end(end, now(), sender); },
+  impl_->take({end.session, std::nullopt, sender, [=](Intake& intake) { return intake.take_end(end, now(), sender); },
                std::move(taken)});
 }
 
 void IngestServer::claim(const SessionUuid& session, const Sender& sender, Taken taken) {
-  impl_->take(
-      {session, std::nullopt, [=](Intake& intake) { return intake.claim(session, now(), sender); }, std::move(taken)});
+  impl_->take({session, std::nullopt, sender, [=](Intake& intake) { return intake.claim(session, now(), sender); },
+               std::move(taken)});
 }
 
 void IngestServer::count_foreign(Reason reason) {
@@ -354,9 +368,12 @@ std::vector<RobotStats> IngestServer::robots() const {
   }
   const MutexLock lock(impl_->queue_mutex);
   for (RobotStats& robot : robots) {
-    const PartQueue::Facts facts = impl_->queue.of(robot.uuid);
-    robot.queued = facts.waiting;
-    robot.dropped = facts.dropped;
+    for (const Party& party : {Party{robot.uuid, {}}, Party{{}, robot.robot}}) {
+      if (party == Party{}) continue;  // what it has not begun waits among others'
+      const PartQueue::Facts facts = impl_->queue.of(party);
+      robot.queued += facts.waiting;
+      robot.dropped += facts.dropped;
+    }
   }
   return robots;
 }

@@ -29,7 +29,8 @@ class IngestServerTest : public testing::Test {
     server_.reset();
     server_ = std::make_unique<IngestServer>(sink_, budget_, BootId{++boot_});
   }
-  std::future<Status> send(const SessionUuid& uuid, std::uint32_t sequence, std::int64_t later_us = 0) {
+  std::future<Status> send(const SessionUuid& uuid, std::uint32_t sequence, std::int64_t later_us = 0,
+                           const Sender& sender = {}) {
     Keyframe k = KeyframeSampler(4).keyframe();
     k.session.uuid = uuid;
     k.sequence = sequence;
@@ -37,7 +38,7 @@ class IngestServerTest : public testing::Test {
     for (TrackMeasurement& t : k.tracks) t.track.sequence = std::min(t.track.sequence, sequence);
     const Bytes payload = encode_keyframe(k);
     auto taken = std::make_shared<std::promise<Status>>();
-    server_->take_payload(uuid, sequence, crc32c(payload), payload, {},
+    server_->take_payload(uuid, sequence, crc32c(payload), payload, sender,
                           [taken](const Status& status) { taken->set_value(status); });
     return taken->get_future();
   }
@@ -89,6 +90,24 @@ TEST_F(IngestServerTest, AnOldSequenceIsReadWhileOthersGoOn) {
   EXPECT_TRUE(repeated.get().ok() && other.get().ok());
   EXPECT_EQ(server_->stats().repeated_parts, 1u);
   EXPECT_EQ(server_->stats().parts_refused[index_of(Reason::SEQUENCE_CONFLICT)], 1u);
+}
+
+// Of the messages that wait until the map was read, a robot that sends many loses some of its own.
+TEST_F(IngestServerTest, WhoAsksTheMapForMuchKeepsNobodyElseOut) {
+  const SessionUuid other = *SessionUuid::parse("33333333-2222-3333-4444-555555555555");
+  EXPECT_TRUE(send(other, 0).get().ok());
+  EXPECT_TRUE(is_acknowledged(other, 1));
+  restart();
+  sink_.let_hang(1);
+  std::vector<std::future<Status>> flood;
+  for (int i = 0; i < 1500; ++i) flood.push_back(send(kOld, 3, i, {"hog"}));
+  auto honest = send(other, 1, 0, {"cart"});
+  EXPECT_TRUE(waits(honest)) << "it is in line, and not refused";
+  sink_.let_hang(0);
+  EXPECT_NE(honest.get().reason(), Reason::BUDGET_EXCEEDED);
+  int refused = 0;
+  for (auto& one : flood) refused += one.get().reason() == Reason::BUDGET_EXCEEDED;
+  EXPECT_GE(refused, 1500 - 1024);
 }
 
 // Each message is answered, also those that wait when the server stops.

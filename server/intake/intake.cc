@@ -62,10 +62,19 @@ Owner Intake::owner_of(const Entry& entry) const {
   return {robot, options_.proving.contains(robot)};
 }
 
-std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::optional<std::uint32_t> sequence) const {
+Party Intake::party(const SessionUuid& session, const Sender& sender) const {
+  if (!sender.robot.empty()) return {{}, sender.robot};
+  const auto entry = sessions_.find(session);
+  const bool takes_its_turn =
+      entry != sessions_.end() && entry->second.intake.has_begun() && check_sender(session, entry->second, sender).ok();
+  return takes_its_turn ? Party{session, {}} : Party{};
+}
+
+std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::optional<std::uint32_t> sequence,
+                                            const Sender& sender) const {
   if (const auto entry = sessions_.find(session); entry != sessions_.end()) {
     const SessionIntake& intake = entry->second.intake;
-    if (!sequence || intake.knows(*sequence)) return std::nullopt;
+    if (!sequence || intake.knows(*sequence) || !check_sender(session, entry->second, sender).ok()) return std::nullopt;
     return MapQuestion{session, intake.number(), sequence};
   }
   const auto at = known_.find(session);
@@ -109,12 +118,12 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
   // What anyone has sent must not stand in the way of the robot itself.
   if (it != sessions_.end() && !it->second.intake.has_begun() && it->second.sender && it->second.sender->anyone &&
       !sender.anyone) {
-    forget(session);
+    forget(it);
     it = sessions_.end();
   }
   const bool fresh = it == sessions_.end();
   if (fresh) {
-    if (sessions_.size() >= options_.max_sessions && !make_room(now))
+    if (sessions_.size() >= options_.max_sessions && !make_room(party(session, sender), now))
       return Status(Reason::BUDGET_EXCEEDED, "as many sessions as can be are being taken in");
     auto submit = [this, session, outcomes = outcomes_](storage::JournalRecord record, std::uint64_t ticket) {
       return sink_.submit(std::move(record), [outcomes, session, ticket](const Result<std::uint64_t>& result) {
@@ -137,13 +146,14 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
                                                    stats_, options_.robots, options_.proving),
                                      AcknowledgementSchedule(options_.times)})
              .first;
+    ++places_[it->second.party];
     for (const auto& [sequence, judged] : from.judged) it->second.intake.know(sequence, judged);
     it->second.schedule.news();  // tells the robot what the daemon has
     it->second.heard_first = now;
   }
   Entry& entry = it->second;
   if (Status may = check_sender(session, entry, sender); !may.ok()) {
-    if (fresh) sessions_.erase(it);
+    if (fresh) erase(it);
     return may;
   }
   if (fresh) {
@@ -151,35 +161,72 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
     ++begun_version_;
   }
   if (!entry.sender) entry.sender = sender;
+  if (entry.party.robot.empty()) count(entry, party(session, sender));
   entry.schedule.heard(now);
   return &entry;
 }
 
-void Intake::forget(const SessionUuid& session) {
-  reassembly_.forget(session, UINT64_MAX);
-  leave_line(session);
-  sessions_.erase(session);
+// Counts the entry's place as this party's.
+void Intake::count(Entry& entry, const Party& party) {
+  if (party == entry.party) return;
+  ++places_[party];
+  if (const auto former = places_.find(entry.party); --former->second == 0) places_.erase(former);
+  entry.party = party;
+}
+
+Intake::Sessions::iterator Intake::erase(Sessions::iterator at) {
+  if (const auto place = places_.find(at->second.party); --place->second == 0) places_.erase(place);
+  return sessions_.erase(at);
+}
+
+void Intake::forget(Sessions::iterator at) {
+  reassembly_.forget(at->first, UINT64_MAX);
+  leave_line(at->first);
+  erase(at);
   ++begun_version_;
 }
 
-bool Intake::make_room(SteadyTime now) {
-  auto oldest = sessions_.end();
-  for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
-    if (oldest != sessions_.end() && it->second.schedule.last_heard() >= oldest->second.schedule.last_heard()) continue;
-    if (!(it->second.intake.has_begun() || it->second.intake.begins()) || it->second.intake.idle()) oldest = it;
+bool Intake::make_room(const Party& newcomer, SteadyTime now) {
+  const auto longest_silent = [this](auto may_go) {
+    auto oldest = sessions_.end();
+    for (auto it = sessions_.begin(); it != sessions_.end(); ++it)
+      if ((oldest == sessions_.end() || it->second.schedule.last_heard() < oldest->second.schedule.last_heard()) &&
+          may_go(it->second))
+        oldest = it;
+    return oldest;
+  };
+  auto goes = longest_silent(
+      [](Entry& entry) { return !(entry.intake.has_begun() || entry.intake.begins()) || entry.intake.idle(); });
+  if (goes == sessions_.end()) {
+    const auto most = std::max_element(places_.begin(), places_.end(),
+                                       [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto own = places_.find(newcomer);
+    if (most->second <= (own == places_.end() ? 0 : own->second) + 1) return false;
+    goes = longest_silent([&](Entry& entry) { return entry.party == most->first && entry.intake.is_let_go_idle(); });
+    if (goes == sessions_.end()) return false;
   }
-  if (oldest == sessions_.end()) return false;
-  remember(oldest->first, oldest->second, now);
-  forget(SessionUuid(oldest->first));
+  remember(goes->first, goes->second, now);
+  forget(goes);
   return true;
 }
 
 bool Intake::drop_waiting(std::size_t more_than) {
-  SessionIntake* largest = nullptr;
-  for (auto& [session, entry] : sessions_)
-    if (!largest || entry.intake.waiting_bytes() > largest->waiting_bytes()) largest = &entry.intake;
-  if (!largest || largest->waiting_bytes() <= more_than) return false;
-  largest->drop_last_waiting();
+  struct Waiting {
+    std::size_t bytes = 0;
+    SessionIntake* largest = nullptr;
+  };
+  std::map<Party, Waiting> waiting;
+  for (auto& [session, entry] : sessions_) {
+    const std::size_t bytes = entry.intake.waiting_bytes();
+    if (bytes == 0) continue;
+    Waiting& all = waiting[entry.party];
+    all.bytes += bytes;
+    if (!all.largest || bytes > all.largest->waiting_bytes()) all.largest = &entry.intake;
+  }
+  const auto most = std::max_element(waiting.begin(), waiting.end(),
+                                     [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
+  if (most == waiting.end() || most->second.bytes <= more_than) return false;
+  most->second.largest->drop_last_waiting();
   return true;
 }
 
@@ -199,7 +246,7 @@ void Intake::forget_silent(SteadyTime now) {
       remember(session, entry, now);
       leave_line(session);
     }
-    it = gone ? sessions_.erase(it) : std::next(it);
+    it = gone ? erase(it) : std::next(it);
   }
   std::erase_if(allowances_, [&](const auto& item) { return item.second.at + std::chrono::minutes(1) <= now; });
   std::erase_if(silent_, [&](const auto& item) { return item.second.heard + options_.remember <= now; });
@@ -297,7 +344,7 @@ void Intake::take_part(const KeyframePart& part, SteadyTime now, const Sender& s
   entry->bytes.add(now, static_cast<double>(part.data.size()));
   if (!wanted(*entry, part.sequence, part.payload_crc) || !paced(*entry, part.sequence, now)) return;
   entry->intake.seen(part.sequence);
-  auto whole = reassembly_.add(part, entry->intake.has_begun() ? part.session : SessionUuid{});
+  auto whole = reassembly_.add(part, entry->party);
   if (!whole.ok()) return count_part(*entry, whole.reason());
   if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now, sender);
 } catch (const StatusError& error) {
@@ -383,8 +430,16 @@ Status Intake::take_end(const SessionEnd& end, SteadyTime now, const Sender& sen
 
 Status Intake::claim(const SessionUuid& session, SteadyTime now, const Sender& sender) {
   if (session.is_nil()) return {Reason::INVALID_ARGUMENT, "the nil session"};
-  const auto opened = open(session, now, sender);
-  return opened.ok() ? Status() : count_not_opened(stats_.messages_refused, opened.status());
+  const auto at = sessions_.find(session);
+  const bool claimed = at == sessions_.end()
+                           ? sink_.find_session(session).has_value()
+                           : at->second.intake.has_begun() || (at->second.sender && !at->second.sender->anyone);
+  Status may;
+  if (!claimed)
+    may = open(session, now, sender).status();
+  else if (at != sessions_.end())  // it is not heard: anyone may send again what the robot announced long ago
+    may = check_sender(session, at->second, sender);
+  return may.ok() ? may : count_not_opened(stats_.messages_refused, may);
 }
 
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
@@ -451,6 +506,7 @@ void Intake::take_outcomes(SteadyTime now) {
       continue;
     }
     ++begun_version_;
+    if (entry.party.robot.empty()) count(entry, {session, {}});
     if (!std::exchange(entry.announced, true)) note(RobotEvent::Kind::kHeard, session, entry, now);
     join_line(session, entry);
   }
@@ -582,7 +638,7 @@ bool Intake::imperfect(const SessionUuid& session, const Entry& entry) const {
   return entry.intake.has_begun() && (entry.intake.has_missing() || reassembly_.has_incomplete(session));
 }
 
-// The keyframes that have come already, and as many more as there is room for, shared among the sessions. At least one
+// The keyframes that have come already, and as many more as there is room for, shared among the parties. At least one
 // unless the sink fails or the rate limit is reached; otherwise nothing would ever be sent again.
 std::uint32_t Intake::credits(const SessionUuid& session, const Entry& entry) const {
   const Reason reason = blocked(entry).reason();
@@ -590,7 +646,8 @@ std::uint32_t Intake::credits(const SessionUuid& session, const Entry& entry) co
   const std::size_t reserved = budget_.used(storage::Share::kReassembly);
   const std::size_t allowed = budget_.allowance(storage::Share::kReassembly);
   const std::size_t room = std::min(sink_.free_bytes(), allowed - std::min(allowed, reserved));
-  const double more = static_cast<double>(room) / static_cast<double>(sessions_.size()) / entry.payload_bytes;
+  const auto shares = static_cast<double>(places_.size()) * static_cast<double>(places_.at(entry.party));
+  const double more = static_cast<double>(room) / shares / entry.payload_bytes;
   const std::size_t there = entry.intake.pending() + reassembly_.incomplete(session).size();
   double credits =
       std::clamp(static_cast<double>(there) + std::min<double>(more, kIntakeWindow), 1.0, double{kIntakeWindow});

@@ -24,7 +24,8 @@ inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // of one gap mess
 
 struct IntakeOptions {
   AcknowledgementTimes times;
-  // Sessions at a time. A new one replaces the longest silent of those that have not begun or have nothing pending.
+  // Sessions at a time. A new one replaces the longest silent of those that have not begun or have nothing pending, or
+  // else of a party that has more of them than its own.
   std::size_t max_sessions = 1024;
   std::chrono::seconds patience{60};   // after so long a silence a robot's unfinished keyframes are dropped
   std::chrono::seconds remember{600};  // robots() lists a robot that did not end for so long after it was last heard
@@ -49,7 +50,11 @@ class Intake {
   // What must be read of the map before a message of this session, or of a keyframe with this sequence, can be taken in
   // without waiting for the disk; nullopt: nothing. The answer is passed to know(). What was not asked for is read when
   // it is needed.
-  std::optional<MapQuestion> question(const SessionUuid& session, std::optional<std::uint32_t> sequence) const;
+  // Nothing is read for a sender who may not send for a session that is being taken in.
+  std::optional<MapQuestion> question(const SessionUuid& session, std::optional<std::uint32_t> sequence,
+                                      const Sender& sender = {}) const;
+  // With whom a message of this sender to this session shares its turn.
+  Party party(const SessionUuid& session, const Sender& sender) const;
   void know(const MapQuestion& question, MapAnswer answer);
 
   // Errors are counted by reason, and the next acknowledgement tells the robot what to do. NOT_ALLOWED, and nothing is
@@ -89,6 +94,7 @@ class Intake {
     SessionIntake intake;
     AcknowledgementSchedule schedule;
     std::optional<Sender> sender{};    // of the first message, while it has not begun
+    Party party{};                     // counted in places_
     double payload_bytes = 64 * 1024;  // running mean of keyframe sizes
     RateMeter keyframes{}, bytes{};
     std::int64_t lag_us = -1;
@@ -140,8 +146,11 @@ class Intake {
   Result<Entry*> open(const SessionUuid& session, SteadyTime now, const Sender& sender);
   Status check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const;
   Owner owner_of(const Entry& entry) const;  // of one that has begun
-  void forget(const SessionUuid& session);
-  bool make_room(SteadyTime now);
+  void count(Entry& entry, const Party& party);
+  using Sessions = std::map<SessionUuid, Entry>;
+  Sessions::iterator erase(Sessions::iterator at);
+  void forget(Sessions::iterator at);
+  bool make_room(const Party& newcomer, SteadyTime now);
   bool drop_waiting(std::size_t more_than);
   void forget_silent(SteadyTime now);
   void remember(const SessionUuid& session, Entry& entry, SteadyTime now);
@@ -180,7 +189,8 @@ class Intake {
   const std::shared_ptr<Outcomes> outcomes_;
   IngestStats stats_;
   Reassembly reassembly_;
-  std::map<SessionUuid, Entry> sessions_;
+  Sessions sessions_;
+  std::map<Party, std::size_t> places_;   // how many of sessions_ each party has
   std::map<SessionUuid, Known> known_;    // disjoint from sessions_, until they are taken in
   std::map<SessionUuid, Silent> silent_;  // disjoint from sessions_
   SteadyTime looked_for_namesakes_{};

@@ -512,6 +512,99 @@ TEST_F(IntakeTest, SilentSessionsMakeRoomForOthers) {
   EXPECT_GT(part_refused(Reason::BUDGET_EXCEEDED), 0u);
 }
 
+// A gap ahead of what has come takes no memory, is never settled, and would hold a place for good.
+TEST_F(IntakeTest, ARobotThatHoldsManyPlacesMakesRoomForOneThatHoldsFewer) {
+  IntakeOptions options;
+  options.max_sessions = 8;
+  restart(options);
+  const auto send_from = [&](std::uint8_t session, const std::string& robot) {
+    now_ += milliseconds(1);
+    uuid_.bytes.fill(session);
+    Keyframe k = keyframe(0);
+    k.session.robot = robot;
+    const Bytes payload = encode_keyframe(k);
+    EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_, {robot}).ok());
+    sink_.sync();
+    (void)intake_->poll(now_);
+    EXPECT_TRUE(intake_->take_gap({uuid_, 5, 6, Reason::DROPPED_BY_ROBOT}, now_, {robot}).ok());
+    return intake_->begun().contains(uuid_);
+  };
+  for (std::uint8_t session = 1; session <= 8; ++session) EXPECT_TRUE(send_from(session, "hog"));
+  EXPECT_FALSE(send_from(9, "hog")) << "it has them all";
+  for (std::uint8_t session = 11; session <= 14; ++session) EXPECT_TRUE(send_from(session, "cart"));
+  EXPECT_FALSE(send_from(15, "cart")) << "it has as many";
+  EXPECT_TRUE(send_from(21, "trolley"));
+  EXPECT_EQ(intake_->stats(now_).sessions, 8u);
+  std::map<std::string, int> places;
+  for (const auto& [session, owner] : intake_->begun()) ++places[owner.robot];
+  EXPECT_EQ(places["trolley"], 1);
+  EXPECT_LE(std::abs(places["hog"] - places["cart"]), 1);
+}
+
+// By the memory of what waits for an earlier keyframe, too, a robot is one, however many sessions it sends.
+TEST_F(IntakeTest, TheRobotThatHoldsMostMemoryLosesSome) {
+  restart({});
+  const auto wait_for_an_earlier_one = [&](std::uint8_t session, const std::string& robot, std::uint32_t sequences) {
+    uuid_.bytes.fill(session);
+    for (std::uint32_t s = 1; s <= sequences; ++s) {
+      Keyframe k = keyframe(s);
+      k.session.robot = robot;
+      const Bytes payload = encode_keyframe(k);
+      EXPECT_TRUE(intake_->take_payload(uuid_, s, crc32c(payload), payload, now_, {robot}).ok());
+    }
+  };
+  wait_for_an_earlier_one(100, "cart", 12);
+  const std::size_t carts = budget_.used(storage::Share::kReassembly);
+  const std::size_t others = budget_.allowance(storage::Share::kReassembly) - 4 * carts;
+  budget_.charge(storage::Share::kReassembly, others);  // so that the two have room for four times the cart's
+  // Sessions of another robot, each of which holds less than the cart's, until there is no room for more.
+  for (std::uint8_t session = 1; session <= 90 && intake_->stats(now_).evicted == 0; ++session)
+    wait_for_an_earlier_one(session, "hog", 8);
+  EXPECT_GT(intake_->stats(now_).evicted, 0u);
+  uuid_.bytes.fill(100);
+  EXPECT_EQ(acknowledge().held, (std::vector<SequenceRange>{{1, 12}}));
+  budget_.release(storage::Share::kReassembly, others);
+}
+
+TEST_F(IntakeTest, SessionsOfOneRobotShareItsCredits) {
+  restart({});
+  const auto credits_of = [&](std::uint8_t session) {
+    uuid_.bytes.fill(session);
+    return acknowledge().credits;
+  };
+  const auto begin = [&](std::uint8_t session, const std::string& robot) {
+    uuid_.bytes.fill(session);
+    Keyframe k = keyframe(0);
+    k.session.robot = robot;
+    const Bytes payload = encode_keyframe(k);
+    EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_, {robot}).ok());
+    settle();
+  };
+  sink_.capacity = 8;  // of 256 kB each
+  begin(1, "cart");
+  for (std::uint8_t session = 11; session <= 14; ++session) begin(session, "hog");
+  const std::uint32_t few = credits_of(11), many = credits_of(1);
+  EXPECT_GE(few, 1u);
+  EXPECT_NEAR(many, 4 * few, 4);
+}
+
+// A hello may be one of long ago that anyone sends again.
+TEST_F(IntakeTest, AnAnnouncementKeepsNoSessionFromFallingSilent) {
+  Keyframe k = keyframe(0);
+  k.session.robot = "cart";
+  const Bytes payload = encode_keyframe(k);
+  EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_, {"cart"}).ok());
+  settle();
+  const auto stop = now_ + std::chrono::seconds(70);
+  for (; now_ < stop; now_ += std::chrono::seconds(1)) {
+    EXPECT_TRUE(intake_->claim(uuid_, now_, {"cart"}).ok());
+    (void)intake_->poll(now_);
+  }
+  EXPECT_EQ(intake_->stats(now_).sessions, 0u);
+  ASSERT_EQ(intake_->robots(now_).size(), 1u);
+  EXPECT_TRUE(intake_->robots(now_)[0].silent);
+}
+
 TEST_F(IntakeTest, WholePayloadsAreCheckedAndAcknowledgedLikePartsOfThem) {
   const Bytes payload = encode_keyframe(keyframe(0));
   EXPECT_TRUE(intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_).ok());

@@ -19,8 +19,8 @@ void PartQueue::drop_last(Queue& queue) {
   if (queue.parts.empty()) turns_.erase(queue.turn);
 }
 
-void PartQueue::push(const Line& line, Sent sent) {
-  Queue& queue = queues_[line];
+void PartQueue::push(const Party& party, Sent sent) {
+  Queue& queue = queues_[party];
   const std::size_t bytes = cost(sent);
   while (bytes_ + bytes > capacity_) {
     const auto longest = std::max_element(queues_.begin(), queues_.end(),
@@ -32,7 +32,7 @@ void PartQueue::push(const Line& line, Sent sent) {
     drop_last(longest->second);
   }
   if (queue.parts.empty()) {
-    queue.turn = turns_.insert(turns_.end(), line);
+    queue.turn = turns_.insert(turns_.end(), party);
     queue.deficit = 0;
   }
   queue.parts.push_back(std::move(sent));
@@ -60,21 +60,14 @@ std::optional<PartQueue::Sent> PartQueue::pop() {
   }
 }
 
-PartQueue::Facts PartQueue::of(const SessionUuid& session) const {
-  const auto found = queues_.find({session, {}});
+PartQueue::Facts PartQueue::of(const Party& party) const {
+  const auto found = queues_.find(party);
   if (found == queues_.end()) return {};
   return {static_cast<std::uint32_t>(found->second.parts.size()), found->second.dropped};
 }
 
-void PartQueue::keep_only(const std::function<bool(const SessionUuid&)>& is_known) {
-  std::erase_if(queues_,
-                [&](const auto& entry) { return entry.second.parts.empty() && !is_known(entry.first.session); });
-}
-
-PartQueue::Line line_of(const SessionUuid& session, const Sender& sender, const std::map<SessionUuid, Owner>& begun) {
-  const auto owner = begun.find(session);
-  const bool takes_its_turn = owner != begun.end() && may_send(sender, session, owner->second).ok();
-  return takes_its_turn ? PartQueue::Line{session, {}} : PartQueue::Line{{}, sender.robot};
+void PartQueue::keep_only(const std::function<bool(const Party&)>& is_known) {
+  std::erase_if(queues_, [&](const auto& entry) { return entry.second.parts.empty() && !is_known(entry.first); });
 }
 
 }  // namespace relmap::intake

@@ -1,5 +1,5 @@
-// Parts that wait to be taken in, in one queue per sender. Queues are served in turn by bytes; when there is no room,
-// the longest queue loses its last part. So a sender that sends too much delays and loses only its own parts. (Deficit
+// Parts that wait to be taken in, in one queue for each party. Queues are served in turn by bytes; when there is no
+// room, the longest queue loses its last part. So one that sends too much delays and loses only its own parts. (Deficit
 // round robin, Shreedhar and Varghese 1995; longest queue drop, Suter et al. 1998.)
 #pragma once
 
@@ -13,7 +13,7 @@
 #include <string>
 
 #include "proto/keyframe/ingest_messages.h"
-#include "server/intake/session_intake.h"
+#include "server/intake/sender.h"
 
 namespace relmap::intake {
 
@@ -21,20 +21,13 @@ class PartQueue {
  public:
   explicit PartQueue(std::size_t capacity_bytes) : capacity_(capacity_bytes) {}
 
-  // Whose queue it is: that of a session that has begun, of who may send for it; or that of all else that one proved
-  // robot sends; or that of all others together.
-  struct Line {
-    SessionUuid session;
-    std::string robot;
-    auto operator<=>(const Line&) const = default;
-  };
   struct Sent {
     KeyframePart part;
     Sender sender;
   };
 
   // Adds a part to its queue, or drops it if that queue would become the longest.
-  void push(const Line& line, Sent sent);
+  void push(const Party& party, Sent sent);
   // The next part; nullopt if all queues are empty.
   std::optional<Sent> pop();
 
@@ -45,9 +38,9 @@ class PartQueue {
     std::uint32_t waiting = 0;
     std::uint64_t dropped = 0;
   };
-  Facts of(const SessionUuid& session) const;
-  // Forgets the counts of sessions of which `is_known` is false and that have nothing waiting.
-  void keep_only(const std::function<bool(const SessionUuid&)>& is_known);
+  Facts of(const Party& party) const;
+  // Forgets the counts of parties of which `is_known` is false and that have nothing waiting.
+  void keep_only(const std::function<bool(const Party&)>& is_known);
 
  private:
   struct Queue {
@@ -55,17 +48,14 @@ class PartQueue {
     std::size_t bytes = 0;
     std::size_t deficit = 0;  // bytes that it may still send in this turn
     std::uint64_t dropped = 0;
-    std::list<Line>::iterator turn;  // valid while the queue is not empty
+    std::list<Party>::iterator turn;  // valid while the queue is not empty
   };
   void drop_last(Queue& queue);
 
   const std::size_t capacity_;
   std::size_t bytes_ = 0;
-  std::map<Line, Queue> queues_;
-  std::list<Line> turns_;  // those with non-empty queues; the first is being served
+  std::map<Party, Queue> queues_;
+  std::list<Party> turns_;  // those with non-empty queues; the first is being served
 };
-
-// The queue for what the sender sends to the session. `begun`: the sessions that have begun.
-PartQueue::Line line_of(const SessionUuid& session, const Sender& sender, const std::map<SessionUuid, Owner>& begun);
 
 }  // namespace relmap::intake

@@ -30,7 +30,7 @@ void push(PartQueue& queue, std::uint8_t from, KeyframePart sent) {
 TEST(PartQueue, IsFirstInFirstOutForOneSender) {
   PartQueue queue(100 * kPart);
   for (std::uint32_t s = 0; s < 50; ++s) push(queue, 1, part(1, s));
-  EXPECT_EQ(queue.of(sender(1)).waiting, 50u);
+  EXPECT_EQ(queue.of({sender(1), {}}).waiting, 50u);
   for (std::uint32_t s = 0; s < 50; ++s) EXPECT_EQ(queue.pop()->part.sequence, s);
   EXPECT_FALSE(queue.pop());
   EXPECT_TRUE(queue.empty());
@@ -57,10 +57,10 @@ TEST(PartQueue, TheLongestQueueGivesWay) {
   for (std::uint32_t s = 0; s < 1000; ++s) push(queue, 1, part(1, s));
   for (std::uint32_t s = 10; s < 20; ++s) push(queue, 2, part(2, s));
   EXPECT_LE(queue.bytes(), 100 * kPart);
-  EXPECT_EQ(queue.of(sender(2)).waiting, 20u);
-  EXPECT_EQ(queue.of(sender(2)).dropped, 0u);
-  EXPECT_EQ(queue.of(sender(1)).waiting, 80u);
-  EXPECT_EQ(queue.of(sender(1)).dropped, 920u);
+  EXPECT_EQ(queue.of({sender(2), {}}).waiting, 20u);
+  EXPECT_EQ(queue.of({sender(2), {}}).dropped, 0u);
+  EXPECT_EQ(queue.of({sender(1), {}}).waiting, 80u);
+  EXPECT_EQ(queue.of({sender(1), {}}).dropped, 920u);
   for (std::uint32_t s = 0, mine = 0, others = 0; s < 100; ++s) {
     const auto next = queue.pop();
     if (next->part.session == sender(1))
@@ -77,7 +77,7 @@ TEST(PartQueue, APartLargerThanTheQueueIsDropped) {
   push(queue, 2, part(2, 0));
   push(queue, 1, part(1, 1));  // as long a queue as the other's: who came first stays
   EXPECT_EQ(queue.pop()->part.session, sender(2));
-  EXPECT_EQ(queue.of(sender(1)).dropped, 1u + 1u);
+  EXPECT_EQ(queue.of({sender(1), {}}).dropped, 1u + 1u);
 }
 
 // Who floods with sessions that have not begun delays only what else is his.
@@ -97,22 +97,23 @@ TEST(PartQueue, ForgetsUnknownSenders) {
   for (const std::uint8_t n : {1, 2, 3}) push(queue, n, part(n, 0));
   for (int i = 0; i < 200; ++i) push(queue, 3, part(3, 1));
   for (int i = 0; i < 2; ++i) (void)queue.pop();
-  queue.keep_only([&](const SessionUuid& session) { return session == sender(2); });
-  EXPECT_EQ(queue.of(sender(1)).waiting, 0u);
-  EXPECT_GT(queue.of(sender(3)).waiting, 0u) << "what waits is not forgotten";
+  queue.keep_only([&](const Party& party) { return party.session == sender(2); });
+  EXPECT_EQ(queue.of({sender(1), {}}).waiting, 0u);
+  EXPECT_GT(queue.of({sender(3), {}}).waiting, 0u) << "what waits is not forgotten";
 }
 
-// A robot that sends to another's session takes nothing of the other's queue.
-TEST(PartQueue, OnlyWhoMaySendForASessionIsInItsQueue) {
+// A robot gets no more by sending more sessions, and takes nothing of the share of another whose session it sends to.
+TEST(Party, IsARobotWithAllThatItSendsOrASessionOfOneWhoMaySendIt) {
   const std::map<SessionUuid, Owner> begun{{sender(1), {"cart", true}}, {sender(2), {"trolley", false}}};
-  const PartQueue::Line carts{sender(1), {}}, trolleys{sender(2), {}}, others{};
-  const Sender cart{"cart"}, thief{"thief"}, anyone{{}, true}, operators{};
-  EXPECT_EQ(line_of(sender(1), cart, begun), carts);
-  EXPECT_EQ(line_of(sender(1), operators, begun), carts);
-  EXPECT_EQ(line_of(sender(1), thief, begun), (PartQueue::Line{{}, "thief"}));
-  EXPECT_EQ(line_of(sender(1), anyone, begun), others) << "the cart proves who it is";
-  EXPECT_EQ(line_of(sender(2), anyone, begun), trolleys);
-  EXPECT_EQ(line_of(sender(3), cart, begun), (PartQueue::Line{{}, "cart"})) << "it has not begun";
+  const Party cart{{}, "cart"}, thief{{}, "thief"}, others{};
+  const Sender anyone{{}, true}, operators{};
+  EXPECT_EQ(party_of(sender(1), {"cart"}, begun), cart);
+  EXPECT_EQ(party_of(sender(3), {"cart"}, begun), cart) << "also of what has not begun";
+  EXPECT_EQ(party_of(sender(1), {"thief"}, begun), thief);
+  EXPECT_EQ(party_of(sender(1), operators, begun), (Party{sender(1), {}}));
+  EXPECT_EQ(party_of(sender(2), anyone, begun), (Party{sender(2), {}}));
+  EXPECT_EQ(party_of(sender(1), anyone, begun), others) << "the cart proves who it is";
+  EXPECT_EQ(party_of(sender(3), anyone, begun), others) << "it has not begun";
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ ReassemblyCharge Reassembly::take_room(std::size_t bytes) {
 }
 
 Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part,
-                                                            const SessionUuid& holder) {
+                                                            const Party& holder) {
   const std::size_t bytes = part.total_bytes + kOverhead;
   auto charge = take_room(bytes);
   if (!charge) return assemblies_.end();
@@ -46,7 +46,7 @@ Reassembly::Assemblies::iterator Reassembly::drop(Assemblies::iterator it) {
   return assemblies_.erase(it);
 }
 
-Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& part, const SessionUuid& holder) {
+Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& part, const Party& holder) {
   const Key key{part.session, part.sequence, part.payload_crc};
   auto it = assemblies_.find(key);
   if (it != assemblies_.end() && !it->second.parts.fits(part)) {

@@ -14,13 +14,14 @@
 #include "proto/keyframe/ingest_messages.h"
 #include "proto/keyframe/part_assembly.h"
 #include "server/intake/reassembly_charge.h"
+#include "server/intake/sender.h"
 
 namespace relmap::intake {
 
 // Versions of a keyframe with different checksums are reassembled separately; the caller decides which of them counts.
 class Reassembly {
  public:
-  // Drops a complete keyframe that waits elsewhere and is charged to the same share: one of the session with most such
+  // Drops a complete keyframe that waits elsewhere and is charged to the same share: one of the party with most such
   // bytes, if these are more than `more_than`. Returns whether one was dropped.
   using GiveWay = std::function<bool(std::size_t more_than)>;
   Reassembly(storage::Budget& budget, GiveWay others = nullptr) : budget_(budget), others_(std::move(others)) {}
@@ -32,9 +33,9 @@ class Reassembly {
   };
 
   // Adds a part that has passed check_part(). Returns the payload if this was its last part, nullopt while others are
-  // missing. `holder` is charged with the memory: the session itself once it has begun, nil for all others together.
+  // missing. `holder` is charged with the memory.
   // CORRUPT if the complete payload fails its checksum (it is dropped), BUDGET_EXCEEDED if there is no room.
-  Result<std::optional<Payload>> add(const KeyframePart& part, const SessionUuid& holder);
+  Result<std::optional<Payload>> add(const KeyframePart& part, const Party& holder);
 
   bool has_incomplete(const SessionUuid& session) const;
   // The session's incomplete sequences, ascending.
@@ -57,7 +58,7 @@ class Reassembly {
     std::size_t bytes = 0;
     std::list<Key> ages;  // assemblies, that which has waited longest for a part first
   };
-  using Holders = std::map<SessionUuid, Holder>;
+  using Holders = std::map<Party, Holder>;
   struct Assembly {
     PartAssembly parts;
     ReassemblyCharge charge;
@@ -67,7 +68,7 @@ class Reassembly {
   };
   using Assemblies = std::map<Key, Assembly>;
 
-  Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part, const SessionUuid& holder);
+  Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part, const Party& holder);
   Assemblies::iterator drop(Assemblies::iterator it);
 
   storage::Budget& budget_;

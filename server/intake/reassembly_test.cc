@@ -30,7 +30,7 @@ KeyframePart part(const SessionUuid& uuid, std::uint32_t sequence, const Bytes& 
 
 class ReassemblyTest : public testing::Test {
  protected:
-  Result<std::optional<Reassembly::Payload>> add(const KeyframePart& p) { return reassembly_.add(p, p.session); }
+  Result<std::optional<Reassembly::Payload>> add(const KeyframePart& p) { return reassembly_.add(p, {p.session, {}}); }
 
   storage::Budget budget_{std::size_t{16} << 20};  // 1 MiB of it for reassembly
   Reassembly reassembly_{budget_};

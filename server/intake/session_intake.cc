@@ -38,16 +38,6 @@ Status check_clock(std::int64_t time_us) {
 
 }  // namespace
 
-Status may_send(const Sender& sender, const SessionUuid& session, const Owner& owner) {
-  if (!sender.robot.empty() && sender.robot != owner.robot)
-    return {Reason::NOT_ALLOWED,
-            sender.robot + " may not send to session " + session.to_string() + ", which is another robot's"};
-  if (sender.anyone && owner.proves)
-    return {Reason::NOT_ALLOWED,
-            "nobody may send to session " + session.to_string() + " who does not prove to be robot " + owner.robot};
-  return {};
-}
-
 SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, const KnownSession& known, Submit submit,
                              Begin begin, IngestStats& stats, const std::set<std::string>& robots,
                              const std::set<std::string>& proving)
@@ -378,8 +368,12 @@ void SessionIntake::let_go() {
 }
 
 bool SessionIntake::idle() {
-  if (beginning_ || !submitted_.empty() || !held_.empty() || !given_up_.empty()) return false;
-  if (!number_) return before_begin_.empty();
+  return held_.empty() && given_up_.empty() && (number_ || before_begin_.empty()) && is_let_go_idle();
+}
+
+bool SessionIntake::is_let_go_idle() {
+  if (beginning_ || !submitted_.empty()) return false;
+  if (!number_) return true;
   const auto now = session();
   return now && now->next_sequence == durable_;
 }

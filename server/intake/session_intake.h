@@ -18,26 +18,12 @@
 #include "server/intake/keyframe_sink.h"
 #include "server/intake/known_session.h"
 #include "server/intake/reassembly.h"
+#include "server/intake/sender.h"
 
 namespace relmap::intake {
 
 inline constexpr std::uint32_t kIntakeWindow = 64;         // how far beyond the settled sequences keyframes are taken
 inline constexpr std::uint32_t kMaxSequence = 0xfffffffe;  // so that its successor fits in 32 bits, too
-
-// Who has sent a message, as far as that is proved.
-struct Sender {
-  std::string robot;      // proved to be this one; empty: an operator, who may send for any robot, or anyone
-  bool anyone = false;    // nothing is proved, and robots that must prove themselves are out of reach
-  std::string from = {};  // the address of one who proves nothing and may do everything; empty: another, or not known
-};
-
-// The robot of a session.
-struct Owner {
-  std::string robot;
-  bool proves = false;  // that it is this robot: nobody else may send for it who proves nothing
-};
-// NOT_ALLOWED: the sender may not send for the session of this owner.
-Status may_send(const Sender& sender, const SessionUuid& session, const Owner& owner);
 
 class SessionIntake {
  public:
@@ -112,6 +98,8 @@ class SessionIntake {
   const std::map<Reason, std::uint64_t>& refusals() const { return refusals_; }
   // Forgets everything that came and is neither in the journal nor submitted.
   void let_go();
+  // Whether it would be idle() after that.
+  bool is_let_go_idle();
   // Whether nothing is under way and the map shows everything settled, so that this object can be destroyed and made
   // again without loss.
   bool idle();
