@@ -85,14 +85,14 @@ struct LcmIngest::Impl {
       session = hello->session;
       sender.robot = opened->robot;
     }
+    if (welcome.empty()) return;
     // From now on its uuid is known to everyone on the network.
     server.claim(session, sender);
-    LcmLink* const out = opened_link;
-    if (out && !welcome.empty()) out->publish(kMapChannel, welcome);
+    if (LcmLink* const out = opened_link) out->publish(kMapChannel, welcome);
   }
 
   // Publishes what concerns a session: sealed for those who have sealed what they sent of it, and as it is where others
-  // may have sent it.
+  // may send it, since one that has sealed something of it need not be its robot.
   void tell(const SessionUuid& session, const char* channel, const Bytes& message) {
     std::vector<Bytes> for_robots;
     if (who != Who::kNobody) {
@@ -100,7 +100,7 @@ struct LcmIngest::Impl {
       for_robots = sealed.seal(session, channel, message, now());
     }
     for (const Bytes& one : for_robots) link->publish(channel, one);
-    if (who != Who::kAll && for_robots.empty()) link->publish(channel, message);
+    if (who != Who::kAll) link->publish(channel, message);
   }
 
   // Called by the server's thread. Robots believe no acknowledgement before they know which map it is about.

@@ -26,7 +26,7 @@ void SealedRobots::use(const access::AccessList& list) {
     if (const auto known = robots_.find(key.id); known != robots_.end()) {
       robot.runs = std::move(known->second.runs);
       robot.sessions = std::move(known->second.sessions);
-      robot.welcomed = known->second.welcomed;
+      robot.welcomed = std::move(known->second.welcomed);
     }
     robots.emplace(key.id, std::move(robot));
   }
@@ -105,8 +105,8 @@ std::vector<Bytes> SealedRobots::seal(const SessionUuid& session, std::string_vi
 
 Bytes SealedRobots::welcome(const Opened& from, const Bytes& message, Time now) {
   Robot& robot = robots_.at(from.key);
-  if (now - robot.welcomed < kWelcomeSpacing) return {};
-  robot.welcomed = now;
+  std::erase_if(robot.welcomed, [&](const auto& entry) { return now - entry.second >= kWelcomeSpacing; });
+  if (robot.welcomed.size() >= kMaxRuns || !robot.welcomed.emplace(from.run, now).second) return {};
   Bytes sealed = message;
   seal(robot, from.key, from.run, kMapChannel, now, sealed);
   return sealed;

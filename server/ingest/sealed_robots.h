@@ -53,7 +53,8 @@ class SealedRobots {
   void sends(const Opened& from, const SessionUuid& session);
   // The message, sealed for each process that sends the session.
   std::vector<Bytes> seal(const SessionUuid& session, std::string_view channel, const Bytes& message, Time now);
-  // The answer to a hello; at most one every 5 ms to one robot, empty otherwise.
+  // The answer to a hello; at most one every 5 ms to each of kMaxRuns processes of one robot, empty otherwise. Hellos
+  // of former processes, which anyone may send again, leave the present one its answers.
   Bytes welcome(const Opened& from, const Bytes& message, Time now);
 
  private:
@@ -67,8 +68,8 @@ class SealedRobots {
     std::string name;
     std::int64_t expires_s = 0;
     std::map<std::uint64_t, Run> runs;
-    std::vector<SessionUuid> sessions;  // those of which recipients_ has an entry, the oldest first
-    Time welcomed{};
+    std::vector<SessionUuid> sessions;       // those of which recipients_ has an entry, the oldest first
+    std::map<std::uint64_t, Time> welcomed;  // by process
   };
   using Recipient = std::pair<SessionUuid, access::SealKeyId>;
 

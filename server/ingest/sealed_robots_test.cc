@@ -188,8 +188,13 @@ TEST_F(SealedRobotsTest, AHelloIsAnsweredWhateverItsDaemonAndTime) {
   EXPECT_EQ(split->seal.run, 5u);
   EXPECT_TRUE(access::Sealer(cart.key.key).verify(SealedBy::kDaemon, kMapChannel, {}, *split));
   EXPECT_TRUE(robots_.welcome(*opened, {1}, now_).empty()) << "a replayed hello makes no flood of answers";
+  HandRun former = cart;
+  former.run = 4;
+  const Bytes old = former.seal({}, 0, kHelloChannel);  // which anyone may send again
+  EXPECT_FALSE(robots_.welcome(robots_.open_hello(old, kNow).or_throw(), {1}, now_).empty());
   now_ += milliseconds(5);
-  EXPECT_FALSE(robots_.welcome(*opened, {1}, now_).empty());
+  EXPECT_FALSE(robots_.welcome(robots_.open_hello(old, kNow).or_throw(), {1}, now_).empty());
+  EXPECT_FALSE(robots_.welcome(*opened, {1}, now_).empty()) << "it leaves the present process its answers";
   EXPECT_EQ(robots_.open_hello(stranger.seal({}, 0, kHelloChannel), kNow).reason(), Reason::UNAUTHENTICATED);
   EXPECT_EQ(robots_.open_hello(cart.seal({}, 0, kGapChannel), kNow).reason(), Reason::UNAUTHENTICATED);
   EXPECT_EQ(robots_.open_hello(Bytes(3), kNow).reason(), Reason::UNAUTHENTICATED);
