@@ -90,12 +90,14 @@ Status AuditLog::reopen() {
   return {};
 }
 
-// Moves the files on by one number.
+// Moves the files on by one number, up to the first that is free, so that nothing is lost where it is done again
+// because it failed half way.
 void AuditLog::rotate() {
-  for (int number = kOldFiles - 1; number > 0; --number)
-    (void)std::rename((file_ + "." + std::to_string(number)).c_str(),
-                      (file_ + "." + std::to_string(number + 1)).c_str());
-  (void)std::rename(file_.c_str(), (file_ + ".1").c_str());
+  const auto old = [this](int number) { return file_ + "." + std::to_string(number); };
+  int free = 1;
+  while (free < kOldFiles && ::access(old(free).c_str(), F_OK) == 0) ++free;
+  for (int number = free - 1; number > 0; --number) (void)std::rename(old(number).c_str(), old(number + 1).c_str());
+  (void)std::rename(file_.c_str(), old(1).c_str());
 }
 
 void AuditLog::write(const Entry& entry) {
@@ -177,6 +179,7 @@ void AuditLog::put(const std::string& line) {
   Status status;
   if (descriptor_ < 0 || written_ >= file_bytes_) {
     if (written_ >= file_bytes_) rotate();
+    written_ = 0;  // also where it cannot be opened now
     status = reopen();
   }
   if (status.ok() && !write_all(descriptor_, line))

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -80,6 +81,36 @@ TEST(AuditLog, IsRotatedAndBounded) {
     for (auto line = lines.rbegin(); line != lines.rend(); ++line)
       EXPECT_EQ((*line)["request"], std::to_string(--last)) << name;
   }
+}
+
+// Where the file cannot be opened again after it was moved, the old ones stay.
+TEST(AuditLog, OldFilesStayWhereNoNewOneCanBeOpened) {
+  const storage::TemporaryFolder folder;
+  const std::string file = folder / "audit.jsonl";
+  const auto log = AuditLog::open(file, 1000).or_throw();
+  const auto write = [&](int from, int to) {
+    for (int i = from; i < to; ++i)
+      log->write({"anna", "operator", "", "Admin.Commit", std::to_string(i), "", Status()});
+    log->flush();
+  };
+  write(0, 30);
+  ASSERT_TRUE(std::filesystem::exists(file + ".3"));
+  const auto oldest = lines_of(file + ".3");
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit none{0, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  write(30, 130);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+  write(130, 131);
+  int found = 0;
+  for (int i = 1; i <= AuditLog::kOldFiles; ++i)
+    if (const std::string name = file + "." + std::to_string(i); std::filesystem::exists(name))
+      found += static_cast<int>(lines_of(name).size());
+  EXPECT_GE(found, 30);
+  EXPECT_EQ(lines_of(file).back()["request"], "130");
+  EXPECT_TRUE(std::filesystem::exists(file + ".4"));
+  EXPECT_EQ(lines_of(file + ".4"), oldest) << "moved on once";
 }
 
 // A reader that is refused without end must not push out what operators did.

@@ -190,6 +190,7 @@ void Listener::accept_from(const Source& source) {
 // Where no file can be opened any more, a caller is told so at once, by the descriptor that is kept for this: it would
 // wait otherwise, and this thread would be woken for it again and again.
 bool Listener::turn_away(int listening) {
+  if (spare_ < 0) spare_ = open_spare();  // another thread may have been quicker the last time
   if (spare_ < 0) return false;
   close(spare_);
   const int connection = accept4(listening, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
