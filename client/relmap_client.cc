@@ -38,6 +38,20 @@ Status read_route_part(const v1::FindRouteReply& reply, Route& route) {
   return {};
 }
 
+// Why there is no connection, as gRPC puts it; empty if it does not know yet.
+std::string why_not(v1::Map::Stub& map) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
+  v1::GetStatusReply reply;
+  const grpc::Status status = map.GetStatus(&context, {}, &reply);
+  constexpr char kLast[] = "last error: ";
+  const std::string& text = status.error_message();
+  const std::size_t at = text.find(kLast);
+  return status.error_code() != grpc::StatusCode::UNAVAILABLE || at == std::string::npos
+             ? ""
+             : ": " + text.substr(at + sizeof kLast - 1);
+}
+
 }  // namespace
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -56,7 +70,8 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
                                      (where->is_socket() ? ""
                                       : impl->options.credentials.empty()
                                           ? ", or it serves TLS, and needs --credentials"
-                                          : ", or it and " + impl->options.credentials + " do not trust each other")};
+                                          : ", or it and " + impl->options.credentials + " do not trust each other") +
+                                     why_not(*impl->map)};
   if (where->boot_id.empty()) return std::unique_ptr<Client>(new Client(std::move(impl)));
 
   // After a crash the file `endpoint` remains, and another daemon may use its port by now.

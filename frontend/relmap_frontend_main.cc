@@ -3,6 +3,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <string>
 
@@ -216,6 +217,7 @@ int main_function(int argc, char** argv) {
 }  // namespace relmap::frontend
 
 int main(int argc, char** argv) {
+  setenv("GRPC_VERBOSITY", "NONE", 0);  // what it says of handshakes that fail, the program says in its own words
   try {
     return relmap::frontend::main_function(argc, argv);
   } catch (const std::exception& error) {

@@ -148,6 +148,7 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
   const auto add = [&](const char* option, const std::string& value) {
     if (!value.empty()) command.insert(command.end(), {option, value});
   };
+  add("--credentials", options_.credentials);
   if (sequence.recorded.empty()) {
     add("--uuid", sequence.uuid.to_string());
     const std::string recorded = sequence.robot.empty() ? kUsualRobot : sequence.robot;

@@ -18,7 +18,7 @@ namespace relmap::batch {
 struct BatchOptions {
   RecordingOptions recordings;
   std::string program = front_end_program();
-  std::string server;  // --server of relmap-frontend
+  std::string server, credentials;  // of relmap-frontend
   std::size_t jobs = 1;
   double patience_s = 60;      // a front-end gives up after so long without progress of the daemon
   bool despite_check = false;  // take recordings in even if their stereo pair is plainly wrong

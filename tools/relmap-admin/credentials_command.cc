@@ -48,7 +48,7 @@ struct Files {
 };
 
 Result<access::KeyPair> read_authority(const Files& files) {
-  auto certificate = access::read_file(files.authority), key = access::read_file(files.authority_key);
+  auto certificate = access::read_file(files.authority), key = access::read_private_file(files.authority_key);
   if (!certificate.ok()) return certificate.status();
   if (!key.ok()) return key.status();
   return access::KeyPair{std::move(*certificate), std::move(*key)};
@@ -133,7 +133,7 @@ Answer make_authority(const CaOptions& options, Context& context) {
   if (fresh) context.say("a new authority: keep " + files.authority_key + " secret; whoever has it can let anyone in");
   context.say("the daemon's certificate is for " + hosts + ", and expires in " + std::to_string(options.days) +
               " days");
-  context.say("start it with: relmapd --listen 0.0.0.0:50070 --credentials " + options.folder + " ...");
+  context.say("start it with: relmapd --data DIR --listen 0.0.0.0:50070 --credentials " + options.folder);
   Answer answer;
   answer.json.add("folder", options.folder).add("new_authority", fresh).add("hosts", wish.hosts);
   answer.json.add("expires", access::time_text(now_s() + options.days * kSecondsOfADay));
@@ -189,12 +189,15 @@ Answer make_credentials(const NewOptions& options, Context& context) {
   if (fs::exists(out))
     return {Status(Reason::INVALID_ARGUMENT, out + " exists already; --out names another file"), false, {}};
   // The list first, so that nothing is in use that cannot be revoked.
+  const std::string former = list->text();
   list->add(grant);
   if (key) list->add(*key);
-  if (Status written = write_all({{files.access, list->text()}, {out, access::text_of(credentials)}}); !written.ok())
+  if (Status written = write_all({{files.access, list->text()}, {out, access::text_of(credentials)}}); !written.ok()) {
+    (void)write_all({{files.access, former}});  // nobody has them
     return {written, false, {}};
-  context.say(options.role + " " + options.name + " may call until " + access::time_text(grant.expires_s) + " with " +
-              out);
+  }
+  context.say(options.role + " " + options.name + " may call with " + out + ", a second from now and until " +
+              access::time_text(grant.expires_s));
   if (grant.principal.role == access::Role::kRobot && !key)
     context.say("it has no key for LCM: credentials ca makes the secret that keys need");
   context.say("bring it there by a safe way, and use it with --credentials " + out);

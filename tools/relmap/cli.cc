@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <ostream>
 
+#include "client/server_address.h"
 #include "tools/relmap/commands.h"
 #include "tools/terminal/command_line.h"
 
@@ -94,6 +95,10 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   client_options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(options.deadline_s * 1e3));
   client_options.credentials = options.credentials;
   if (options.json) client_options.on_reply = [&](const std::string& document) { console.reply(document); };
+  const char* const usual = std::getenv("RELMAP_CREDENTIALS");
+  if (const auto where = client::resolve_server(options.server);
+      where.ok() && where->is_socket() && !options.credentials.empty() && (!usual || options.credentials != usual))
+    err << "the credentials are not used: whoever can open the socket of " << options.server << " is an operator\n";
   const auto client = client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();
   if (!status.ok()) err << status.to_string() << '\n';

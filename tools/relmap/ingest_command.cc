@@ -336,6 +336,8 @@ void add_ingest(CLI::App& app, Action& action) {
       "pair is plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD) fails before any of it is in the map.");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
+    if (const CLI::Option* shown = app.get_option("--credentials"); shown->count() > 0)
+      options->batch.credentials = shown->as<std::string>();
     if (options->deterministic) options->batch.jobs = 1;
     action = [options](client::Client& client, terminal::Console& console) {
       return ingest(*options, client, console);

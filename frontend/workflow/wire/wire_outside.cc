@@ -13,30 +13,43 @@
 #include "frontend/recording/keyframe_log.h"
 #include "frontend/recording/recorded_sessions.h"
 #include "frontend/sink.h"
+#include "proto/access/certificate.h"
 #include "proto/access/credentials.h"
+#include "proto/access/principal.h"
 
 namespace relmap::workflow {
 
 namespace {
 
-// The key for LCM in a file of credentials; none without credentials.
-Result<std::optional<access::RobotKey>> robot_key(const std::string& file) {
-  if (file.empty()) return std::optional<access::RobotKey>();
+// The credentials in a file; none without one. BAD_CONFIG if the daemon would refuse this robot's keyframes with them.
+Result<std::optional<access::Credentials>> credentials_of(const std::string& file, const std::string& robot,
+                                                          bool over_lcm) {
+  if (file.empty()) return std::optional<access::Credentials>();
   const auto credentials = access::read_credentials(file);
   if (!credentials.ok()) return credentials.status();
-  if (!credentials->robot_key)
+  if (!credentials->certificate.empty())
+    if (const auto facts = access::read_certificate(credentials->certificate); facts.ok() && facts->principal) {
+      const auto& [role, name] = *facts->principal;
+      const bool may_send = role == access::Role::kOperator ? !over_lcm : role == access::Role::kRobot && name == robot;
+      if (!may_send)
+        return Status(Reason::BAD_CONFIG, file + " is for the " + std::string(access::role_name(role)) + " " + name +
+                                              ", and this is the robot " + robot + " (--robot)");
+    }
+  if (over_lcm && !credentials->robot_key)
     return Status(Reason::BAD_CONFIG,
                   file + " has no key for LCM; relmap-admin credentials new makes one for --role robot");
-  return credentials->robot_key;
+  return std::optional(*credentials);
 }
 
 Result<std::unique_ptr<frontend::KeyframeSink>> open_daemon_sink(const RunOptions& options,
                                                                  const publishing::PublisherOptions& publisher,
                                                                  const SessionHeader& session) {
-  if (options.to != "grpc") {
-    const auto key = robot_key(options.credentials);
-    if (!key.ok()) return key.status();
-    auto lcm = publishing::LcmTransport::open(publisher.lcm_url, {*key});
+  const bool over_lcm = options.to != "grpc";
+  const auto credentials = credentials_of(options.credentials, session.robot, over_lcm);
+  if (!credentials.ok()) return credentials.status();
+  if (over_lcm) {
+    const auto key = *credentials ? (*credentials)->robot_key : std::nullopt;
+    auto lcm = publishing::LcmTransport::open(publisher.lcm_url, {key});
     if (!lcm.ok()) return lcm.status();
     return frontend::sink_of(publishing::Publisher::start(publisher, session, std::move(*lcm)));
   }
