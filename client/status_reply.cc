@@ -31,6 +31,7 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.storage = read_state(m.storage_reason(), m.storage_message());
   s.lcm = read_state(m.lcm_reason(), m.lcm_message());
   s.connections = read_state(m.connections().reason(), m.connections().message());
+  s.access = read_state(m.access_reason(), m.access_message());
   s.connections_open = m.connections().open();
   s.connections_refused = m.connections().refused();
   s.connections_displaced = m.connections().displaced();

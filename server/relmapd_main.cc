@@ -169,14 +169,16 @@ int fail(const Status& status) {
 // At SIGHUP: what can change while the daemon runs is read again. Nothing of it can end the daemon.
 void reload(const CommandLine& line, relmap::ops::Daemon& daemon) try {
   Config fresh;
-  if (const Status status = line.apply(fresh); status.ok())
+  const Status status = line.apply(fresh);
+  if (status.ok())
     spdlog::set_level(spdlog::level::from_str(fresh.log_level));
   else
     spdlog::error("SIGHUP: the log level stays as it was: {}", status.to_string());
-  daemon.reload();
-  spdlog::info(
-      "SIGHUP: access list and log level were read again, and the files of TLS are within ten seconds; other settings "
-      "need a restart");
+  if (daemon.reload() && status.ok())
+    spdlog::info(
+        "SIGHUP: access list and log level were read again, and the files of TLS are within ten seconds; other "
+        "settings "
+        "need a restart");
 } catch (const std::exception& error) {
   spdlog::error("SIGHUP: not everything was read again: {}", error.what());
 }

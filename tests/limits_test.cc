@@ -227,5 +227,40 @@ TEST_F(LimitsTest, WithoutAFileForAConnectionTheDaemonSaysSoAndGoesOn) {
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 
+class LongLimits : public LimitsTest {};
+
+TEST_F(LongLimits, ThousandsAtOnceKeepNobodyOut) {
+  rlimit files{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &files), 0);
+  files.rlim_cur = files.rlim_max;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &files), 0);
+  ASSERT_GT(files.rlim_cur, 8000u) << "this test needs a higher hard limit of files";
+  std::filesystem::create_directory(folder_ / "backups");
+  serve("rpc: {max_connections: 7000, max_connections_per_peer: 7000}\nbackup: {roots: [" + (folder_ / "backups") +
+        "]}\n");
+  drive();
+  auto idle = connect(5000, 65535, "127.0.0.3"), halves = connect(100, 65535, "127.0.0.2");
+  for (RawHttp2& one : halves) one.call(kStatus, std::string(20, 'x'), 10);
+  auto stalled = connect(1000, 0);
+  for (RawHttp2& one : stalled) one.call(kExport, kGraph);
+  std::atomic<bool> done = false;
+  std::vector<std::thread> waits;
+  for (int i = 0; i < 16; ++i)
+    waits.emplace_back([&] {
+      const auto client = client::Client::connect(folder_ / "map").or_throw();
+      while (!done) (void)client->wait_idle();
+    });
+  expect_answers(500);
+  const auto backup = client_->backup(folder_ / "backups/one", [](const auto&) { return true; });
+  EXPECT_TRUE(backup.ok()) << backup.status().to_string();
+  expect_answers(500);
+  EXPECT_EQ(open(idle), 5000);
+  EXPECT_EQ(running(halves), 100);
+  EXPECT_EQ(open(stalled), 1000);
+  done = true;
+  for (std::thread& wait : waits) wait.join();
+  EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
+}
+
 }  // namespace
 }  // namespace relmap::testing

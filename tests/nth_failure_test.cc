@@ -183,6 +183,8 @@ class FaultyRun {
   // Null: the daemon ends. Whoever it lets in must be answered.
   std::unique_ptr<client::Client> connect(RunningDaemon& daemon) {
     auto client = client::Client::connect(options_.data);
+    if (!client.ok() && may_refuse() && client.reason() != Reason::UNREACHABLE)
+      client = client::Client::connect(options_.data);
     if (client.ok()) return std::move(*client);
     if (!daemon.process().wait(kPatience)) wrong("nobody can connect: " + client.status().to_string());
     return nullptr;
@@ -220,15 +222,18 @@ class FaultyRun {
   }
 
   void judge(const Reader& reader) {
-    // Memory may run out where a question is answered, and a file that answers it may not open: once.
-    const bool may_refuse = fault_.kind == FaultKind::kAllocation || fault_.kind == FaultKind::kOpen;
-    if (reader.refusals().size() > (may_refuse && fault_.error != 0 ? 1 : 0))
+    if (reader.refusals().size() > (may_refuse() ? 1 : 0))
       wrong(std::to_string(reader.refusals().size()) +
             " answers to readers, the first of them: " + reader.refusals().front());
     if (fault_.hang.count() == 0 || !course_.hit_at_work) return;
     if (course_.meanwhile == 0) wrong("no reader was answered meanwhile");
     if (course_.slowest > fault_.hang / 2)
       wrong("a reader waited for " + std::to_string(course_.slowest.count()) + " ms");
+  }
+
+  // Memory may run out where a question is answered, and a file that answers it may not open: once.
+  bool may_refuse() const {
+    return (fault_.kind == FaultKind::kAllocation || fault_.kind == FaultKind::kOpen) && fault_.error != 0;
   }
 
   bool done(const Status& work) {
@@ -299,7 +304,8 @@ class FaultyRun {
     if (const std::uint64_t frames = frames_of(*client, world_); frames < course_.acknowledged)
       wrong(std::to_string(course_.acknowledged) + " keyframes were acknowledged, " + std::to_string(frames) +
             " are there");
-    if (frames_of(*client, other_) > 0) {
+    // It may have begun without a frame.
+    if (const auto other = find_session(*client, other_); other && other->state != client::SessionState::kDeleting) {
       if (deleted_) wrong("the deleted session is back");
       throw_if(delete_other(*client));
     }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <future>
 #include <mutex>
 #include <random>
 #include <set>
@@ -636,8 +637,14 @@ TEST(Mapper, AnUnreadablePartIsReportedWithAdvice) {
   }
   const auto mapper = open_mapper(storage::open_fault_engine(disk, faults).or_throw());
   ASSERT_TRUE(mapper->begin_session(world.keyframe(0).session).ok());  // its record is in memory from now on
+  // As an edit does, and before the map fails.
+  auto waits = std::async(std::launch::async, [&, next = mapper->stats().durable_sequence + 1] {
+    return mapper->wait_applied(next, soon());
+  });
+  EXPECT_EQ(waits.wait_for(20ms), std::future_status::timeout);
   faults->reads = 1000;
   EXPECT_EQ(feed(*mapper, world, 20, 21).reason(), Reason::READ_ONLY);
+  EXPECT_EQ(waits.get().reason(), Reason::READ_ONLY);
   const Status storage = mapper->stats().storage;
   EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
   EXPECT_THAT(storage.message(), testing::HasSubstr("relmap-admin repair"));

@@ -359,12 +359,12 @@ void Daemon::tick() {
   }
 }
 
-void Daemon::reload() {
-  impl_->access_problem.clear();
-  if (const Status read = impl_->gatekeeper->reload(); !read.ok())
-    spdlog::error("the access list stays as it was: {}", read.to_string());
-  if (const Status sound = rpc::check_files(impl_->config.tls); !sound.ok())
-    spdlog::error("the certificate stays as it was: {}", sound.to_string());
+bool Daemon::reload() {
+  const Status read = impl_->gatekeeper->reload(), sound = rpc::check_files(impl_->config.tls);
+  if (!read.ok()) spdlog::error("the access list stays as it was: {}", read.to_string());
+  if (!sound.ok()) spdlog::error("the certificate stays as it was: {}", sound.to_string());
+  impl_->access_problem = read.message();
+  return read.ok() && sound.ok();
 }
 
 Status Daemon::stop() { return impl_->stop(); }

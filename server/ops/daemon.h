@@ -29,8 +29,9 @@ class Daemon {
   // Periodic work. Call about once a second. Reads the access list again if it has changed.
   void tick();
   // Reads the files of tokens and revocations again, and says in the log whether those of TLS, which are read again
-  // when they change, can be used. Settings are as they were at the start.
-  void reload();
+  // when they change, can be used. Settings are as they were at the start. False if something stays as it was, of which
+  // the log says why.
+  bool reload();
 
   // Takes nothing more in, ends running calls, applies what is durable, and commits. Not OK if the last commit failed;
   // acknowledged keyframes are in the journal even then.

@@ -1,6 +1,7 @@
 // Who gets in: callers with and without credentials, over TLS and at the Unix socket, against a real server.
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
+#include <grp.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -197,6 +198,19 @@ TEST_F(AccessTest, WhoeverCanOpenTheSocketIsAnOperator) {
   EXPECT_FALSE(std::filesystem::exists(fleet_.file("socket.new")));
 }
 
+TEST_F(AccessTest, MembersOfAGroupCanOpenASocketThatIsForThem) {
+  const group* const own = getgrgid(getegid());
+  ASSERT_TRUE(own);
+  const auto listening = ListeningSocket::at_path(fleet_.file("group"), own->gr_name);
+  ASSERT_TRUE(listening.ok()) << listening.status().to_string();
+  struct stat facts {};
+  ASSERT_EQ(stat(fleet_.file("group").c_str(), &facts), 0);
+  EXPECT_EQ(facts.st_mode & 0777, 0660u);
+  EXPECT_EQ(facts.st_gid, getegid());
+  EXPECT_EQ(ListeningSocket::at_path(fleet_.file("none"), "no-such-group").reason(), Reason::BAD_CONFIG);
+  EXPECT_FALSE(std::filesystem::exists(fleet_.file("none")));
+}
+
 TEST_F(AccessTest, ARevokedCallerLosesHisStreamsToo) {
   const access::Credentials cart = fleet_.certificate(Role::kRobot, "cart");
   start();
@@ -382,6 +396,19 @@ TEST_F(AccessTest, NewCertificatesOfTheDaemonAreServedWithoutARestart) {
   EXPECT_EQ(call(channel(boss), kHealth).error_code(), StatusCode::UNAVAILABLE);
 }
 
+TEST_F(AccessTest, AnotherAuthorityOfCallersIsBelievedWithoutARestart) {
+  start();
+  const access::KeyPair later = access::new_authority("later", 1);
+  const auto pair = access::issue(later, {"chief", {}, access::Principal{Role::kOperator, "chief"}, 1}).or_throw();
+  const access::Credentials chief{fleet_.authority().certificate, pair.certificate, pair.key, ""};
+  EXPECT_EQ(call(channel(chief), kHealth).error_code(), StatusCode::UNAVAILABLE);
+  fleet_.write("ca.crt", later.certificate);
+  const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(2);
+  while (!call(channel(chief), kStatus).ok() && std::chrono::steady_clock::now() < until)
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_TRUE(call(channel(chief), kStatus).ok());
+}
+
 TEST_F(AccessTest, FilesThatDoNotBelongTogetherAreRefusedByName) {
   start();
   Gatekeeper gatekeeper;
@@ -391,6 +418,10 @@ TEST_F(AccessTest, FilesThatDoNotBelongTogetherAreRefusedByName) {
   const auto mixed = RpcServer::start(*map_.core, gatekeeper, options);
   EXPECT_EQ(mixed.reason(), Reason::BAD_CONFIG);
   EXPECT_THAT(mixed.status().message(), HasSubstr("another.key"));
+  ASSERT_EQ(chmod(fleet_.file("server.pem").c_str(), 0644), 0);
+  const auto open = RpcServer::start(*map_.core, gatekeeper, {.host = "127.0.0.1", .tls = fleet_.tls()});
+  EXPECT_EQ(open.reason(), Reason::BAD_CONFIG);
+  EXPECT_THAT(open.status().message(), HasSubstr("others can read"));
   options.tls.certificate = fleet_.file("nowhere.crt");
   EXPECT_EQ(RpcServer::start(*map_.core, gatekeeper, options).reason(), Reason::BAD_CONFIG);
 }

@@ -20,6 +20,7 @@
 #include "server/rpc/connections.h"
 #include "server/rpc/deadline.h"
 #include "server/rpc/edit_log.h"
+#include "server/rpc/gatekeeper.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/maintenance_turn.h"
 #include "server/rpc/metrics.h"
@@ -55,9 +56,10 @@ struct ProcessFacts {
 };
 using ProcessProbe = std::function<ProcessFacts()>;
 
-// The connections of the server; null while none serves.
+// What lets callers in; null while no server runs.
 struct Transport {
   const Connections* connections = nullptr;
+  const Gatekeeper* gatekeeper = nullptr;
 };
 
 // The intake of keyframes.

@@ -29,8 +29,9 @@ Status Gatekeeper::reload() {
   if (file_.empty()) return {};
   const Stamp before = stamp();  // if the file changes while it is read, it is read again next time
   auto list = access::read_access_list(file_);
-  if (!list.ok()) return list.status();
   const MutexLock lock(mutex_);
+  problem_ = list.status();
+  if (!list.ok()) return list.status();
   read_ = before;
   list_ = std::make_shared<const access::AccessList>(std::move(*list));
   ++version_;

@@ -57,6 +57,12 @@ class Gatekeeper {
   // Raised by each reload, after which identities may have been revoked.
   std::uint64_t version() const { return version_; }
 
+  // Why the last attempt to read the list failed; ok if it did not.
+  Status problem() const {
+    const MutexLock lock(mutex_);
+    return problem_;
+  }
+
   // The list in force.
   std::shared_ptr<const access::AccessList> list() const {
     const MutexLock lock(mutex_);
@@ -83,6 +89,7 @@ class Gatekeeper {
   std::shared_ptr<const access::AccessList> list_ RELMAP_GUARDED_BY(mutex_) =
       std::make_shared<const access::AccessList>();
   Stamp read_ RELMAP_GUARDED_BY(mutex_);
+  Status problem_ RELMAP_GUARDED_BY(mutex_);
   std::atomic<std::uint64_t> version_ = 0;
   // Certificates that were shown lately, so that each is parsed once and not with each call.
   mutable std::map<std::string, access::CertificateFacts, std::less<>> seen_ RELMAP_GUARDED_BY(mutex_);

@@ -270,5 +270,18 @@ TEST_F(IngestStreamTest, StreamsHaveALimitOfTheirOwnAndEndWithTheDaemon) {
   }
 }
 
+TEST_F(IngestStreamTest, OneCallerHasSoManyStreams) {
+  start({.max_ingest_streams = 10, .max_ingest_streams_per_caller = 2});
+  grpc::ClientContext contexts[3];
+  std::unique_ptr<Stream> streams[2];
+  v1::IngestReply reply;
+  for (int i = 0; i < 2; ++i) {
+    streams[i] = open(contexts[i]);
+    ASSERT_TRUE(streams[i]->Read(&reply));
+  }
+  EXPECT_EQ(reason_of(open(contexts[2])->Finish()), Reason::BUDGET_EXCEEDED);
+  for (grpc::ClientContext& context : contexts) context.TryCancel();
+}
+
 }  // namespace
 }  // namespace relmap::rpc

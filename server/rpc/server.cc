@@ -6,6 +6,7 @@
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/security/tls_certificate_provider.h>
 #include <grpcpp/security/tls_credentials_options.h>
+#include <sys/stat.h>
 
 #include <mutex>
 #include <thread>
@@ -81,6 +82,9 @@ Status check_files(const TlsFiles& files) {
   const auto certificate = access::read_file(files.certificate), key = access::read_file(files.key);
   for (const auto* text : {&certificate, &key})
     if (!text->ok()) return {Reason::BAD_CONFIG, text->status().message()};
+  struct stat file {};
+  if (stat(files.key.c_str(), &file) == 0 && (file.st_mode & S_IRWXO) != 0)
+    return {Reason::BAD_CONFIG, "others can read " + files.key + ": chmod o= " + files.key};
   if (const Status fits = access::check_key_pair({*certificate, *key}); !fits.ok())
     return {Reason::BAD_CONFIG, files.certificate + " with " + files.key + ": " + fits.message()};
   if (files.client_authority.empty()) return {};
@@ -97,9 +101,9 @@ struct RpcServer::Impl {
       : transport(core.transport),
         connections(options.connections),
         gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {
-    transport.connections = &connections;
+    transport = {&connections, &gatekeeper};
   }
-  ~Impl() { transport.connections = nullptr; }
+  ~Impl() { transport = {}; }
 
   Transport& transport;
   Connections connections;

@@ -172,6 +172,11 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadlin
   reply.set_vocabulary_source(vocabulary.source());
   if (intake.facts) put_ingest(intake.facts(), reply);
   if (transport.connections) put_connections(*transport.connections, reply);
+  if (transport.gatekeeper) {
+    const Status problem = transport.gatekeeper->problem();
+    reply.set_access_reason(to_wire(problem.reason()));
+    reply.set_access_message(problem.message());
+  }
   put_methods(metrics, reply);
   return reply;
 }

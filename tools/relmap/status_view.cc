@@ -98,6 +98,7 @@ Facts needs_attention(const StatusMoment& now) {
   if (!s.storage.ok()) facts.emplace_back("storage", s.storage.to_string());
   if (!s.lcm.ok()) facts.emplace_back("lcm", s.lcm.to_string());
   if (!s.connections.ok()) facts.emplace_back("connections", s.connections.to_string());
+  if (!s.access.ok()) facts.emplace_back("access list", "it stays as it was: " + s.access.to_string());
   add_robots(now, true, facts);
   for (const client::DoubtfulCamera& camera : s.doubtful_cameras)
     facts.emplace_back("session " + std::to_string(camera.session), doubt_text(camera));
