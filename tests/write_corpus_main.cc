@@ -313,7 +313,7 @@ void write_requests(const std::string& root) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  if (argc != 2) {
+  if (argc != 2 || argv[1][0] == '-') {
     std::fprintf(stderr, "usage: write_corpus FOLDER\n");
     return 2;
   }

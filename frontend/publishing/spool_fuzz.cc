@@ -33,10 +33,10 @@ SessionHeader session() {
 // Segments of records, each with its length before it in a byte.
 void write_segments(const std::string& folder, ByteReader in) {
   static constexpr std::uint8_t kHead[] = {'S', 'L', 'P', 'G', 1, 0};
-  for (int number = 0; number == 0 || in.remaining() > 0; ++number) {
+  for (int number = 0; number == 0 || (in.ok() && in.remaining() > 0); ++number) {
     ByteWriter w;
     w.put_bytes(kHead);
-    while (in.remaining() > 0) {
+    while (in.ok() && in.remaining() > 0) {
       const auto length = in.get<std::uint8_t>();
       if (length == kNextSegment) break;
       const ByteSpan record = fuzzing::take_up_to(in, length);

@@ -150,7 +150,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   read_all({bytes.begin(), bytes.end()});
 
   Log made;
-  for (ByteReader in(bytes); in.remaining() > 0;) record_message(made, in);
+  for (ByteReader in(bytes); in.ok() && in.remaining() > 0;) record_message(made, in);
   read_all(made.bytes());
 
   static const storage::TemporaryFolder kFolder;

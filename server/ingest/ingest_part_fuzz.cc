@@ -111,7 +111,7 @@ void take_parts(Ingest& ingest, ByteReader& in) {
 }
 
 void take_several(Ingest& ingest, ByteReader in) {
-  while (in.remaining() > 0) {
+  while (in.ok() && in.remaining() > 0) {
     const auto what = in.get<std::uint8_t>();
     SessionUuid session;
     session.bytes.fill(static_cast<std::uint8_t>(1 + what / 16u % kRobots));

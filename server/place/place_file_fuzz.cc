@@ -33,7 +33,7 @@ Bytes whole_blocks(ByteSpan bytes) {
   w.put_bytes(as_bytes("RELMAPPL"));
   w.put(PlaceFile::kVersion);
   w.put(kVocabularyCrc);
-  for (ByteReader in(bytes); in.remaining() > 0;) {
+  for (ByteReader in(bytes); in.ok() && in.remaining() > 0;) {
     const auto length = in.get<std::uint16_t>();
     const ByteSpan block = fuzzing::take_up_to(in, length);
     w.put(static_cast<std::uint32_t>(block.size()));

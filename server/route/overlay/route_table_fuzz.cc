@@ -101,14 +101,14 @@ void write_changed(const SmallTown& town, unsigned kind, ByteReader in) {
     table.assign(all.begin(), all.end());
   } else if (kind == 1) {
     Bytes body(table.begin() + kTableHeader, table.end());
-    while (in.remaining() > 0) storage::patch(body, in);
+    while (in.ok() && in.remaining() > 0) storage::patch(body, in);
     table.resize(kTableHeader);
     const std::uint32_t crc = crc32c(body);
     std::memcpy(table.data() + kTableHeader - 4, &crc, sizeof crc);
     table.insert(table.end(), body.begin(), body.end());
   } else {
     const bool sealed = kind == 2;
-    while (in.remaining() > 0) storage::patch(cells, in);
+    while (in.ok() && in.remaining() > 0) storage::patch(cells, in);
     for (const auto& part : town.parts) {
       if (!sealed || part.offset + part.bytes > cells.size()) continue;
       const std::uint32_t crc = crc32c(ByteSpan(cells).subspan(part.offset, part.bytes));
