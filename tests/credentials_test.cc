@@ -77,6 +77,8 @@ TEST_F(CredentialsTest, LetEachDoWhatItsRoleMayUntilTheyAreRevoked) {
   for (const std::string& file : {cart, anna, dash}) expect_done(relmap(file, {"status"}));
   const Finished edit = relmap(dash, {"label", "1:0", "kitchen"});
   EXPECT_EQ(edit.exit_code, 1);
+  EXPECT_THAT(daemon.log(), AllOf(HasSubstr("tram may not send keyframes as train"),
+                                  HasSubstr("Map.SetLabel is for the role operator, and dash has the role reader")));
   EXPECT_THAT(edit.standard_error,
               HasSubstr("NOT_ALLOWED: Map.SetLabel is for the role operator, and dash has the role reader"));
   expect_done(relmap(anna, {"label", "1:0", "kitchen"}));

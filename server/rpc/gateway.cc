@@ -23,6 +23,8 @@ constexpr std::size_t kMaxRequestId = 64;
 constexpr int kEditThreads = 4;  // edits take turns (EditLog); others may wait until what they wrote is visible
 constexpr int kWaitThreads = 4;  // all wait for the same, so more would gain nothing
 constexpr std::chrono::milliseconds kWatchInterval{500};
+constexpr std::chrono::minutes kTold{1};  // between lines in the log of what one caller may not call
+constexpr std::size_t kMaxTold = 256;     // lines in that time
 
 // Whose calls are counted together. Those who prove nothing are told apart by their address.
 std::string counted_as(const Identity& caller, std::string peer) {
@@ -186,6 +188,13 @@ void Gateway::leave(const std::string& caller, Lane lane, std::size_t bytes) {
   if (load->second.calls == decltype(Load::calls){}) callers_.erase(load);
 }
 
+bool Gateway::tells_of(const std::string& call) {
+  const auto now = std::chrono::steady_clock::now();
+  const MutexLock lock(mutex_);
+  std::erase_if(told_of_, [&](const auto& told) { return told.second + kTold <= now; });
+  return told_of_.size() < kMaxTold && told_of_.emplace(call, now).second;
+}
+
 Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane)
     : gateway_(gateway),
       context_(context),
@@ -307,6 +316,9 @@ grpc::Status Call::end(const Status& status) {
   if (status.reason() == Reason::INTERNAL || status.reason() == Reason::IO_ERROR ||
       status.reason() == Reason::DATA_LOSS)
     spdlog::error("{} [{}] from {}: {}", method_, request_id_, context_->peer(), status.to_string());
+  else if ((status.reason() == Reason::NOT_ALLOWED || status.reason() == Reason::UNAUTHENTICATED) &&
+           gateway_.tells_of(counted_as(caller_, context_->peer()) + " " + method_))
+    spdlog::warn("{} [{}] from {}: {}", method_, request_id_, context_->peer(), status.to_string());
   else
     spdlog::debug("{} [{}] from {}: {} in {} us", method_, request_id_, context_->peer(), status.to_string(),
                   took.count());

@@ -86,6 +86,8 @@ class Gateway {
   // Counts a call of this caller; BUDGET_EXCEEDED if it has as many as one may have, or half of the memory for replies.
   Status enter(const std::string& caller, Lane lane, std::size_t bytes);
   void leave(const std::string& caller, Lane lane, std::size_t bytes);
+  // Whether the log is to tell that the caller may not call what he did; once a minute for each.
+  bool tells_of(const std::string& call);
   TaskPool& threads_of(Lane lane);
 
   const RpcLimits limits_;
@@ -106,6 +108,7 @@ class Gateway {
   std::set<Call*> open_ RELMAP_GUARDED_BY(mutex_);                 // admitted, and not destroyed yet
   Call* cancelling_ RELMAP_GUARDED_BY(mutex_) = nullptr;           // by watch_, which is about to cancel it
   std::map<std::string, Load> callers_ RELMAP_GUARDED_BY(mutex_);  // those who have calls that run
+  std::map<std::string, std::chrono::steady_clock::time_point> told_of_ RELMAP_GUARDED_BY(mutex_);
   // Declared last, so that they are joined first.
   TaskPool general_, picture_thread_, maintenance_thread_, edit_threads_, wait_threads_;
   std::thread watch_;
