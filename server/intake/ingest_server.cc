@@ -234,10 +234,10 @@ struct IngestServer::Impl {
               {}});
       }
       if (!changed) continue;
-      const MutexLock lock(queue_mutex);
-      begun = std::move(*changed);
       std::set<std::string> robots;
-      for (const auto& [session, owner] : begun) robots.insert(owner.robot);
+      for (const auto& [session, owner] : *changed) robots.insert(owner.robot);
+      const MutexLock lock(queue_mutex);
+      begun.swap(*changed);
       queue.keep_only([&](const Party& party) RELMAP_REQUIRES(queue_mutex) {
         return begun.contains(party.session) || robots.contains(party.robot);
       });

@@ -123,7 +123,8 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
   }
   const bool fresh = it == sessions_.end();
   if (fresh) {
-    if (sessions_.size() >= options_.max_sessions && !make_room(party(session, sender), now))
+    const Party newcomer = party(session, sender);
+    if (sessions_.size() >= places_for(newcomer) && !make_room(newcomer, now))
       return Status(Reason::BUDGET_EXCEEDED, "as many sessions as can be are being taken in");
     auto submit = [this, session, outcomes = outcomes_](storage::JournalRecord record, std::uint64_t ticket) {
       return sink_.submit(std::move(record), [outcomes, session, ticket](const Result<std::uint64_t>& result) {
@@ -184,6 +185,14 @@ void Intake::forget(Sessions::iterator at) {
   leave_line(at->first);
   erase(at);
   ++begun_version_;
+}
+
+// A party that has a quarter of the places takes none of the last quarter, so that one is free for others even while
+// nothing can be let go of all that it has under way.
+std::size_t Intake::places_for(const Party& newcomer) const {
+  const std::size_t quarter = options_.max_sessions / 4;
+  const auto own = places_.find(newcomer);
+  return options_.max_sessions - (own != places_.end() && own->second >= quarter ? quarter : 0);
 }
 
 bool Intake::make_room(const Party& newcomer, SteadyTime now) {

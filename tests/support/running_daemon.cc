@@ -1,6 +1,9 @@
 #include "tests/support/running_daemon.h"
 
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <random>
 #include <sstream>
@@ -19,8 +22,19 @@ std::string log_file(const DaemonOptions& options) { return options.data + ".log
 std::string random_lcm_url() {
   std::random_device random;
   const auto byte = [&] { return std::to_string(random() % 254 + 1); };
-  return "udpm://239." + byte() + "." + byte() + "." + byte() + ":" + std::to_string(20000 + random() % 12000) +
-         "?ttl=0";
+  // A socket gets what is sent to its port, whatever the group, so a port is sought that nobody has.
+  unsigned port = 0;
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    port = 20000 + random() % 12000;
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_in any{};
+    any.sin_family = AF_INET;
+    any.sin_port = htons(static_cast<std::uint16_t>(port));
+    const bool free = bind(socket, reinterpret_cast<const sockaddr*>(&any), sizeof any) == 0;
+    close(socket);
+    if (free) break;
+  }
+  return "udpm://239." + byte() + "." + byte() + "." + byte() + ":" + std::to_string(port) + "?ttl=0";
 }
 
 std::vector<std::string> daemon_arguments(const DaemonOptions& options) {
