@@ -76,7 +76,7 @@ void expect_one_map(const std::vector<std::size_t>& robots) {
   EXPECT_EQ(joined_sessions(map), (std::vector<std::vector<SessionNumber>>{all}));
   const FleetClosures closures = closures_of(map, truth);
   closures.print();
-  EXPECT_EQ(closures.wrong, 0);
+  EXPECT_EQ(closures.wrong + closures.vague, 0u);
   EXPECT_GT(closures.between_robots, 10 * (robots.size() - 1));
 
   // A later pass adds little, and measures what it passes as exactly as the first (docs/decisions/refinement.md).
@@ -126,7 +126,9 @@ TEST(SimulatedFleet, RobotsThatDriveAtOnceShareOneMap) {
   EXPECT_EQ(joined_sessions(map), (std::vector<std::vector<SessionNumber>>{{1, 2, 3}}));
   const FleetClosures closures = closures_of(map, truth);
   closures.print();
-  EXPECT_EQ(closures.wrong, 0);
+  // Which frames see a place first differs from run to run, and so do closures from afar, which say how vague they are.
+  EXPECT_EQ(closures.wrong, 0u);
+  EXPECT_LT(closures.vague, 0.03 * static_cast<double>(closures.accepted));
   EXPECT_GT(closures.between_robots, 40);
   EXPECT_GT(closures.accepted, frames / 3);
 }

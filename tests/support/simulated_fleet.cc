@@ -46,15 +46,21 @@ FleetClosures closures_of(const storage::Graph& map, const WorldTruth& truth) {
         continue;
       }
       ++closures.accepted;
-      closures.wrong += truth.error(edge).wrong;
+      if (const EdgeError error = truth.error(edge); error.wrong) {
+        ++(is_wrong(error.off, edge.covariance) ? closures.wrong : closures.vague);
+        std::printf(
+            "closure %s from %s is off by %.2f m and %.1f degrees; its sigma is %.2f m, %u inliers, support %u\n",
+            edge.id.to_string().c_str(), edge.a.to_string().c_str(), error.metres, error.radians * 180 / M_PI,
+            std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace()), unsigned{edge.inliers}, edge.support);
+      }
       closures.between_robots += edge.a.session != edge.b.session;
     }
   return closures;
 }
 
 void FleetClosures::print() const {
-  std::printf("fleet: %zu closures accepted, %zu of them between robots, %zu wrong; %zu not accepted\n", accepted,
-              between_robots, wrong, not_accepted);
+  std::printf("fleet: %zu closures accepted, %zu of them between robots, %zu wrong, %zu vague; %zu not accepted\n",
+              accepted, between_robots, wrong, vague, not_accepted);
 }
 
 }  // namespace relmap::testing

@@ -22,7 +22,7 @@ void WorldTruth::add(const storage::Graph& graph, SessionNumber number, const Dr
 
 EdgeError WorldTruth::error(const storage::Edge& edge) const {
   const SE3 off = (pose(edge.a).inverse() * pose(edge.b)).inverse() * edge.T_ab;
-  return {off.t.norm(), rotation_angle(off.R), is_wrong(off)};
+  return {off.t.norm(), rotation_angle(off.R), is_wrong(off), off};
 }
 
 std::vector<storage::Edge> edges_of(const storage::Graph& graph, SessionNumber number) {

@@ -15,6 +15,7 @@ namespace relmap::testing {
 struct EdgeError {
   double metres = 0, radians = 0;
   bool wrong = false;  // for a closure: is_wrong()
+  SE3 off;             // where the edge puts b, as seen from where b is
 };
 
 class WorldTruth {
