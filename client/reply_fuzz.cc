@@ -1,9 +1,13 @@
 // Any bytes as the replies of a daemon, which the client takes for what they say: it ends with values or CORRUPT. And
 // what the client asks can be read. The first byte chooses the message.
+#include <algorithm>
+#include <string>
 #include <utility>
+#include <variant>
 
 #include "client/replies.h"
 #include "proto/base/testing/fuzzing.h"
+#include "proto/base/utf8.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
 
@@ -74,6 +78,13 @@ void ask(ByteReader in) {
   if ((how & 2u) != 0) asked.or_from = {end_of(in)};
   if ((how & 4u) != 0) asked.or_to = {end_of(in)};
   asked.filter = {{how}, {FrameId{how, 1}}, {"hall"}, how, (how & 8u) != 0, (how & 16u) != 0, (how & 32u) != 0};
+  const auto is_text = [](const RouteEnd& end) {
+    const auto* label = std::get_if<std::string>(&end);
+    return !label || is_utf8(*label);
+  };
+  for (const auto* ends : {&asked.or_from, &asked.or_to})
+    if (!std::all_of(ends->begin(), ends->end(), is_text)) return;
+  if (!is_text(asked.from) || !is_text(asked.to)) return;  // the daemon cannot read it, and says so
   const v1::FindRouteRequest request = route_message(asked);
   v1::FindRouteRequest read;
   must(read.ParseFromString(request.SerializePartialAsString()));
