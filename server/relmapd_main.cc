@@ -177,8 +177,7 @@ void reload(const CommandLine& line, relmap::ops::Daemon& daemon) try {
   if (daemon.reload() && status.ok())
     spdlog::info(
         "SIGHUP: access list and log level were read again, and the files of TLS are within ten seconds; other "
-        "settings "
-        "need a restart");
+        "settings need a restart");
 } catch (const std::exception& error) {
   spdlog::error("SIGHUP: not everything was read again: {}", error.what());
 }

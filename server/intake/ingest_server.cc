@@ -187,7 +187,8 @@ struct IngestServer::Impl {
       return;
     }
     const MutexLock lock(queue_mutex);
-    const Party party = party_of(part.session, sender, begun);
+    const auto owner = begun.find(part.session);
+    const Party party = party_of(part.session, sender, owner == begun.end() ? nullptr : &owner->second);
     queue.push(party, {std::move(part), std::move(sender)});
     queue_condition.notify_one();
   }

@@ -63,11 +63,10 @@ Owner Intake::owner_of(const Entry& entry) const {
 }
 
 Party Intake::party(const SessionUuid& session, const Sender& sender) const {
-  if (!sender.robot.empty()) return {{}, sender.robot};
   const auto entry = sessions_.find(session);
-  const bool takes_its_turn =
-      entry != sessions_.end() && entry->second.intake.has_begun() && check_sender(session, entry->second, sender).ok();
-  return takes_its_turn ? Party{session, {}} : Party{};
+  if (entry == sessions_.end() || !entry->second.intake.has_begun()) return party_of(session, sender, nullptr);
+  const Owner owner = owner_of(entry->second);
+  return party_of(session, sender, &owner);
 }
 
 std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::optional<std::uint32_t> sequence,
@@ -191,8 +190,12 @@ void Intake::forget(Sessions::iterator at) {
 // nothing can be let go of all that it has under way.
 std::size_t Intake::places_for(const Party& newcomer) const {
   const std::size_t quarter = options_.max_sessions / 4;
-  const auto own = places_.find(newcomer);
-  return options_.max_sessions - (own != places_.end() && own->second >= quarter ? quarter : 0);
+  return options_.max_sessions - (places_of(newcomer) >= quarter ? quarter : 0);
+}
+
+std::size_t Intake::places_of(const Party& party) const {
+  const auto places = places_.find(party);
+  return places == places_.end() ? 0 : places->second;
 }
 
 bool Intake::make_room(const Party& newcomer, SteadyTime now) {
@@ -209,8 +212,7 @@ bool Intake::make_room(const Party& newcomer, SteadyTime now) {
   if (goes == sessions_.end()) {
     const auto most = std::max_element(places_.begin(), places_.end(),
                                        [](const auto& a, const auto& b) { return a.second < b.second; });
-    const auto own = places_.find(newcomer);
-    if (most->second <= (own == places_.end() ? 0 : own->second) + 1) return false;
+    if (most->second <= places_of(newcomer) + 1) return false;
     goes = longest_silent([&](Entry& entry) { return entry.party == most->first && entry.intake.is_let_go_idle(); });
     if (goes == sessions_.end()) return false;
   }

@@ -151,6 +151,7 @@ class Intake {
   Sessions::iterator erase(Sessions::iterator at);
   void forget(Sessions::iterator at);
   std::size_t places_for(const Party& newcomer) const;
+  std::size_t places_of(const Party& party) const;
   bool make_room(const Party& newcomer, SteadyTime now);
   bool drop_waiting(std::size_t more_than);
   void forget_silent(SteadyTime now);

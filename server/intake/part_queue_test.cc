@@ -104,16 +104,16 @@ TEST(PartQueue, ForgetsUnknownSenders) {
 
 // A robot gets no more by sending more sessions, and takes nothing of the share of another whose session it sends to.
 TEST(Party, IsARobotWithAllThatItSendsOrASessionOfOneWhoMaySendIt) {
-  const std::map<SessionUuid, Owner> begun{{sender(1), {"cart", true}}, {sender(2), {"trolley", false}}};
+  const Owner carts{"cart", true}, trolleys{"trolley", false};
   const Party cart{{}, "cart"}, thief{{}, "thief"}, others{};
   const Sender anyone{{}, true}, operators{};
-  EXPECT_EQ(party_of(sender(1), {"cart"}, begun), cart);
-  EXPECT_EQ(party_of(sender(3), {"cart"}, begun), cart) << "also of what has not begun";
-  EXPECT_EQ(party_of(sender(1), {"thief"}, begun), thief);
-  EXPECT_EQ(party_of(sender(1), operators, begun), (Party{sender(1), {}}));
-  EXPECT_EQ(party_of(sender(2), anyone, begun), (Party{sender(2), {}}));
-  EXPECT_EQ(party_of(sender(1), anyone, begun), others) << "the cart proves who it is";
-  EXPECT_EQ(party_of(sender(3), anyone, begun), others) << "it has not begun";
+  EXPECT_EQ(party_of(sender(1), {"cart"}, &carts), cart);
+  EXPECT_EQ(party_of(sender(3), {"cart"}, nullptr), cart) << "also of what has not begun";
+  EXPECT_EQ(party_of(sender(1), {"thief"}, &carts), thief);
+  EXPECT_EQ(party_of(sender(1), operators, &carts), (Party{sender(1), {}}));
+  EXPECT_EQ(party_of(sender(2), anyone, &trolleys), (Party{sender(2), {}}));
+  EXPECT_EQ(party_of(sender(1), anyone, &carts), others) << "the cart proves who it is";
+  EXPECT_EQ(party_of(sender(3), anyone, nullptr), others) << "it has not begun";
 }
 
 }  // namespace

@@ -12,10 +12,9 @@ Status may_send(const Sender& sender, const SessionUuid& session, const Owner& o
   return {};
 }
 
-Party party_of(const SessionUuid& session, const Sender& sender, const std::map<SessionUuid, Owner>& begun) {
+Party party_of(const SessionUuid& session, const Sender& sender, const Owner* owner) {
   if (!sender.robot.empty()) return {{}, sender.robot};
-  const auto owner = begun.find(session);
-  return owner != begun.end() && may_send(sender, session, owner->second).ok() ? Party{session, {}} : Party{};
+  return owner && may_send(sender, session, *owner).ok() ? Party{session, {}} : Party{};
 }
 
 }  // namespace relmap::intake

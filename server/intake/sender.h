@@ -1,7 +1,6 @@
 // Who sends a message, whether he may send it, and with whom he shares what the intake has to give.
 #pragma once
 
-#include <map>
 #include <string>
 
 #include "proto/base/ids.h"
@@ -32,7 +31,7 @@ struct Party {
   std::string robot;
   auto operator<=>(const Party&) const = default;
 };
-// The party of what the sender sends to the session. `begun`: the sessions that have begun.
-Party party_of(const SessionUuid& session, const Sender& sender, const std::map<SessionUuid, Owner>& begun);
+// The party of what the sender sends to the session. `owner`: its robot; null while it has not begun.
+Party party_of(const SessionUuid& session, const Sender& sender, const Owner* owner);
 
 }  // namespace relmap::intake

@@ -61,6 +61,15 @@ class IngestStreamTest : public testing::Test {
     stream->Write(hello);
     return stream;
   }
+  // Opens two streams, and expects that there is no room for a third.
+  void expect_two(grpc::ClientContext (&contexts)[3], std::unique_ptr<Stream> (&streams)[2]) {
+    v1::IngestReply reply;
+    for (int i = 0; i < 2; ++i) {
+      streams[i] = open(contexts[i]);
+      ASSERT_TRUE(streams[i]->Read(&reply));
+    }
+    EXPECT_EQ(reason_of(open(contexts[2])->Finish()), Reason::BUDGET_EXCEEDED);
+  }
   v1::IngestRequest keyframe(std::uint32_t i, const SessionUuid* uuid = nullptr) const {
     Keyframe k = world_.keyframe(i);
     if (uuid) k.session.uuid = *uuid;
@@ -249,12 +258,8 @@ TEST_F(IngestStreamTest, StreamsHaveALimitOfTheirOwnAndEndWithTheDaemon) {
   start({.max_concurrent = 1, .max_ingest_streams = 2});
   grpc::ClientContext contexts[3];
   std::unique_ptr<Stream> streams[2];
+  ASSERT_NO_FATAL_FAILURE(expect_two(contexts, streams));
   v1::IngestReply reply;
-  for (int i = 0; i < 2; ++i) {
-    streams[i] = open(contexts[i]);
-    ASSERT_TRUE(streams[i]->Read(&reply));
-  }
-  EXPECT_EQ(reason_of(open(contexts[2])->Finish()), Reason::BUDGET_EXCEEDED);
   v1::GetAcknowledgementRequest request;
   request.set_session_uuid(uuid_to_wire(SessionUuid::random()));
   grpc::ClientContext asked;
@@ -274,12 +279,7 @@ TEST_F(IngestStreamTest, OneCallerHasSoManyStreams) {
   start({.max_ingest_streams = 10, .max_ingest_streams_per_caller = 2});
   grpc::ClientContext contexts[3];
   std::unique_ptr<Stream> streams[2];
-  v1::IngestReply reply;
-  for (int i = 0; i < 2; ++i) {
-    streams[i] = open(contexts[i]);
-    ASSERT_TRUE(streams[i]->Read(&reply));
-  }
-  EXPECT_EQ(reason_of(open(contexts[2])->Finish()), Reason::BUDGET_EXCEEDED);
+  ASSERT_NO_FATAL_FAILURE(expect_two(contexts, streams));
   for (grpc::ClientContext& context : contexts) context.TryCancel();
 }
 
