@@ -57,10 +57,8 @@ Status Intake::check_sender(const SessionUuid& session, const Entry& entry, cons
   return proved ? may_send(sender, session, {entry.sender->robot, true}) : Status();
 }
 
-Owner Intake::owner_of(const Entry& entry) const {
-  const std::string& robot = entry.intake.header().robot;
-  return {robot, options_.proving.contains(robot)};
-}
+Owner Intake::owner_of(const std::string& robot) const { return {robot, options_.proving.contains(robot)}; }
+Owner Intake::owner_of(const Entry& entry) const { return owner_of(entry.intake.header().robot); }
 
 Party Intake::party(const SessionUuid& session, const Sender& sender) const {
   const auto entry = sessions_.find(session);
@@ -82,8 +80,7 @@ std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::opt
     return number ? std::optional(MapQuestion{session, *number, std::nullopt}) : std::nullopt;
   }
   const auto& [failed, known, judged] = at->second;
-  if (!failed.ok() || !known.session || !sequence || *sequence >= known.session->next_sequence ||
-      judged.contains(*sequence))
+  if (!failed.ok() || !sequence || *sequence >= known.session->next_sequence || judged.contains(*sequence))
     return std::nullopt;
   return MapQuestion{session, known.session->number, sequence};
 }
@@ -95,20 +92,30 @@ void Intake::know(const MapQuestion& question, MapAnswer answer) {
     if (question.sequence) entry->second.intake.know(*question.sequence, judged);
     return;
   }
-  if (!known_.contains(question.uuid) && known_.size() >= options_.max_sessions) known_.erase(known_.begin());
-  Known& known = known_[question.uuid];
+  auto known = known_.find(question.uuid);
   if (question.sequence) {
-    known.judged.emplace(*question.sequence, judged);
-  } else {
-    known.failed = answer.failed;
-    known.session = std::move(answer.session);
+    // If the session has been taken in and let go of meanwhile, it is asked for again.
+    if (known != known_.end()) known->second.judged.emplace(*question.sequence, judged);
+    return;
   }
+  if (known == known_.end()) {
+    if (known_.size() >= options_.max_sessions) known_.erase(known_.begin());
+    known = known_.try_emplace(question.uuid).first;
+  }
+  known->second.failed = answer.failed;
+  known->second.session = std::move(answer.session);
 }
 
-Intake::Known Intake::known(const SessionUuid& session) {
+// What the map knows of a session that is not taken in; null: it has none such. Stays there until it is taken in.
+Result<Intake::Known*> Intake::known(const SessionUuid& session) {
   if (const auto unread = question(session, std::nullopt)) know(*unread, answer(sink_, *unread));
-  auto known = known_.extract(session);
-  return known ? std::move(known.mapped()) : Known();
+  const auto at = known_.find(session);
+  if (at == known_.end()) return nullptr;
+  if (!at->second.failed.ok()) return known_.extract(at).mapped().failed;
+  // It may have changed since it was read. It is held in memory, so that it is there at once.
+  std::optional<storage::Session>& record = at->second.session.session;
+  if (auto present = sink_.view()->session(record->number)) record = std::move(present);
+  return &at->second;
 }
 
 // The session's entry, which is made if it is not there. BUDGET_EXCEEDED: there are too many. NOT_ALLOWED.
@@ -122,6 +129,12 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
   }
   const bool fresh = it == sessions_.end();
   if (fresh) {
+    const auto known = this->known(session);
+    if (!known.ok()) return known.status();
+    // Nobody else has it opened: what is opened and is not known to have begun would be his.
+    if (*known)
+      if (Status may = may_send(sender, session, owner_of((*known)->session.session->header.robot)); !may.ok())
+        return may;
     const Party newcomer = party(session, sender);
     if (sessions_.size() >= places_for(newcomer) && !make_room(newcomer, now))
       return Status(Reason::BUDGET_EXCEEDED, "as many sessions as can be are being taken in");
@@ -139,8 +152,7 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
         if (outcomes->wake) outcomes->wake();
       });
     };
-    const Known from = known(session);
-    if (!from.failed.ok()) return from.failed;
+    const Known from = *known ? known_.extract(session).mapped() : Known();
     it = sessions_
              .emplace(session, Entry{SessionIntake(session, sink_, from.session, std::move(submit), std::move(begin),
                                                    stats_, options_.robots, options_.proving),
@@ -152,10 +164,7 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
     it->second.heard_first = now;
   }
   Entry& entry = it->second;
-  if (Status may = check_sender(session, entry, sender); !may.ok()) {
-    if (fresh) erase(it);
-    return may;
-  }
+  if (Status may = check_sender(session, entry, sender); !may.ok()) return may;
   if (fresh) {
     silent_.erase(session);
     ++begun_version_;
@@ -676,9 +685,9 @@ Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const E
 
 Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try {
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
-  if (const auto unread = question(session, std::nullopt)) know(*unread, answer(sink_, *unread));
-  if (const auto at = known_.find(session);
-      at == known_.end() || (at->second.failed.ok() && !at->second.session.session))
+  if (const auto known = this->known(session); !known.ok())
+    return known.status();
+  else if (!*known)
     return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
   const auto entry = open(session, SteadyTime{}, {});
   return entry.ok() ? make_acknowledgement(session, **entry) : Result<Acknowledgement>(entry.status());

@@ -142,9 +142,10 @@ class Intake {
     std::function<void()> wake RELMAP_GUARDED_BY(mutex);
   };
 
-  Known known(const SessionUuid& session);
+  Result<Known*> known(const SessionUuid& session);
   Result<Entry*> open(const SessionUuid& session, SteadyTime now, const Sender& sender);
   Status check_sender(const SessionUuid& session, const Entry& entry, const Sender& sender) const;
+  Owner owner_of(const std::string& robot) const;
   Owner owner_of(const Entry& entry) const;  // of one that has begun
   void count(Entry& entry, const Party& party);
   using Sessions = std::map<SessionUuid, Entry>;

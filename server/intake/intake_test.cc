@@ -1215,5 +1215,54 @@ TEST_F(IntakeTest, NobodySpeaksForARobotThatProvesWhoItIs) {
   EXPECT_EQ(sink_.view()->sessions().size(), 2u);
 }
 
+// After a restart, what another robot sends while the session is read of the map must not make it look as if it had not
+// begun: then it would be the other's, and what is settled would be settled again.
+TEST_F(IntakeTest, ASessionStaysItsRobotsWhateverOthersSendWhileTheMapIsRead) {
+  const Sender own{keyframe(0).session.robot}, thief{"thief"};
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  settle();
+  restart();
+  const auto steals = [&](std::uint32_t sequence) {
+    const Bytes payload = encode_keyframe(keyframe(sequence));
+    return intake_->take_payload(uuid_, sequence, crc32c(payload), payload, now_, thief);
+  };
+  const auto of_session = intake_->question(uuid_, 0, own);
+  ASSERT_TRUE(of_session && !of_session->sequence);
+  intake_->know(*of_session, answer(sink_, *of_session));
+  const auto of_sequence = intake_->question(uuid_, 0, own);
+  ASSERT_TRUE(of_sequence && of_sequence->sequence);
+  const MapAnswer late = answer(sink_, *of_sequence);
+  EXPECT_EQ(steals(3).reason(), Reason::NOT_ALLOWED);
+  // Meanwhile the session has been taken in, and was silent until it was let go of.
+  send(0);
+  now_ += std::chrono::minutes(2);
+  (void)intake_->poll(now_);
+  ASSERT_EQ(intake_->stats(now_).sessions, 0u);
+  intake_->know(*of_sequence, late);
+  EXPECT_EQ(steals(3).reason(), Reason::NOT_ALLOWED);
+  EXPECT_EQ(intake_->take_gap({uuid_, 3, 9, Reason::DROPPED_BY_ROBOT}, now_, thief).reason(), Reason::NOT_ALLOWED);
+  EXPECT_EQ(intake_->stats(now_).sessions, 0u) << "who is refused takes no place";
+  const Bytes next = encode_keyframe(keyframe(3));
+  EXPECT_TRUE(intake_->take_payload(uuid_, 3, crc32c(next), next, now_, own).ok());
+  EXPECT_EQ(settle().next_sequence, 4u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, ASessionThatTheMapDoesNotShowYetIsNotTakenForANewOne) {
+  send(0);
+  sink_.sync();
+  sink_.freeze_view();
+  uuid_.bytes[0] ^= 1;
+  send(0);
+  sink_.sync();
+  restart();
+  send(1);
+  EXPECT_EQ(part_refused(Reason::BUDGET_EXCEEDED), count_parts(encode_keyframe(keyframe(1)).size(), 600));
+  EXPECT_EQ(intake_->acknowledgement(uuid_).reason(), Reason::BUDGET_EXCEEDED);
+  sink_.thaw_view();
+  send(1);
+  EXPECT_EQ(settle().next_sequence, 2u);
+}
+
 }  // namespace
 }  // namespace relmap::intake

@@ -1,6 +1,7 @@
 #include "server/intake/known_session.h"
 
 #include <algorithm>
+#include <string>
 
 namespace relmap::intake {
 
@@ -13,7 +14,9 @@ KnownSession read_session(KeyframeSink& sink, SessionNumber number) {
   known.held = sink.hold_session(number);
   const auto view = sink.view();
   known.session = view->session(number);
-  if (!known.session) return known;
+  // Whoever takes it for one that has not begun settles again what is settled.
+  if (!known.session)
+    throw StatusError({Reason::BUDGET_EXCEEDED, "the map does not show session " + std::to_string(number) + " yet"});
   const std::uint32_t end = known.session->next_sequence;
   view->visit_skipped(number, end - std::min(end, kNewest), [&](const storage::Skipped& settled) {
     known.skipped.push_back(settled);

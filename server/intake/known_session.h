@@ -21,7 +21,7 @@ struct Judged {
 
 // A session as the map shows it.
 struct KnownSession {
-  std::optional<storage::Session> session;  // nullopt: the map does not show it, at least not yet
+  std::optional<storage::Session> session;  // nullopt: it has not begun
   std::vector<storage::Skipped> skipped;    // of its newest sequences, ascending
   std::shared_ptr<const void> held;         // keeps its record in memory
 };
@@ -32,7 +32,7 @@ struct MapQuestion {
   std::optional<std::uint32_t> sequence;  // what became of it; nullopt: what is known of the session
 };
 struct MapAnswer {
-  Status failed;  // IO_ERROR, DATA_LOSS
+  Status failed;  // IO_ERROR, DATA_LOSS; BUDGET_EXCEEDED: the map does not show it yet
   KnownSession session;
   Judged judged;
 };
