@@ -112,7 +112,8 @@ class IngestThreadsTest : public ::testing::Test {
     BootId boot{};
     boot[0] = ++boots_;
     server_ = std::make_unique<intake::IngestServer>(sink_, budget_, boot);
-    subscription_ = server_->subscribe({[this](const Acknowledgement& ack) { listeners_.say(ack); }, {}, {}});
+    subscription_ =
+        server_->subscribe({[this](const Acknowledgement& ack, const auto&) { listeners_.say(ack); }, {}, {}});
     wire_.connect(server_.get());
   }
   void stop_daemon() {

@@ -219,8 +219,8 @@ class LcmForgery : public ::testing::Test {
     return text;
   }
 
-  // What was published, as it was published, once, and one end.
-  void check_journal(std::uint32_t count) const {
+  // What was published, as it was published, once, and so many ends.
+  void check_journal(std::uint32_t count, std::uint32_t expected_ends = 1) const {
     EXPECT_EQ(sink_.faults, std::vector<std::string>{});
     std::uint32_t next = 0, ends = 0, others = 0;
     for (const storage::JournalRecord& record : sink_.journal()) {
@@ -232,7 +232,7 @@ class LcmForgery : public ::testing::Test {
       }
     }
     EXPECT_EQ(next, count);
-    EXPECT_EQ(ends, 1u);
+    EXPECT_EQ(ends, expected_ends);
     EXPECT_EQ(others, 0u) << "gaps or refusals";
   }
 
@@ -250,6 +250,41 @@ class LcmForgery : public ::testing::Test {
   std::unique_ptr<ingest::LcmIngest> ingest_;
 };
 using LongLcmForgery = LcmForgery;
+
+// Who is faster than the robot itself has its session, and the robot keeps what it has: nothing that settles what the
+// other sends is said to it.
+TEST_F(LcmForgery, ARobotWhoseSessionAnotherHasTakenKeepsItsKeyframes) {
+  header_ = sample_keyframe().session;
+  header_.uuid = SessionUuid::random();
+  start_daemon();
+  header_.robot = "thief";
+  CountingLink taking(url_, thief_);
+  publishing::PublisherOptions options;
+  options.spool = (folder_ / "thief").string();
+  const auto thief = publishing::Publisher::start(options, header_, taking.take_transport()).or_throw();
+  EXPECT_TRUE(thief->push(keyframe(0)).ok());
+  while (thief->progress().unsettled > 0) std::this_thread::sleep_for(milliseconds(1));
+  header_.robot = "cart";
+  CountingLink robbed(url_, cart_);
+  options.spool = (folder_ / "cart").string();
+  const auto cart = publishing::Publisher::start(options, header_, robbed.take_transport()).or_throw();
+  constexpr std::uint32_t kKept = 30, kTaken = 20;
+  for (std::uint32_t s = 0; s < kKept; ++s) EXPECT_TRUE(cart->push(keyframe(s)).ok());
+  const auto until = steady_clock::now() + kPatience;
+  while (refused_by_daemon()[intake::index_of(Reason::NOT_ALLOWED)] == 0 && steady_clock::now() < until)
+    std::this_thread::sleep_for(milliseconds(1));
+  header_.robot = "thief";
+  for (std::uint32_t s = 1; s < kTaken; ++s) {  // each is acknowledged
+    EXPECT_TRUE(thief->push(keyframe(s)).ok());
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  EXPECT_TRUE(thief->finish(until).all_settled());
+  EXPECT_EQ(cart->progress().unsettled, kKept);
+  robbed.stop();
+  taking.stop();
+  kill_daemon();
+  check_journal(kTaken, 0);
+}
 
 TEST_F(LcmForgery, NothingThatAStrangerSendsIsBelieved) { run(100'000, 300, false); }
 TEST_F(LcmForgery, NothingThatAnotherRobotSendsIsBelieved) { run(30'000, 300, true); }

@@ -136,7 +136,8 @@ class SealedWorld final : public IngestWorld {
       carry(std::move(datagram));
   }
   void tell(const SessionUuid& session, const char* channel, const Bytes& message) {
-    for (Bytes& sealed : door_->seal(session, channel, message, now())) post(channel, std::move(sealed));
+    for (Bytes& sealed : door_->seal(session, intake().robot_of(session), channel, message, now()))
+      post(channel, std::move(sealed));
   }
 
   template <typename Message>

@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <optional>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -93,24 +95,25 @@ struct LcmIngest::Impl {
 
   // Publishes what concerns a session: sealed for those who have sealed what they sent of it, and as it is where others
   // may send it, since one that has sealed something of it need not be its robot.
-  void tell(const SessionUuid& session, const char* channel, const Bytes& message) {
+  void tell(const SessionUuid& session, const std::optional<std::string>& robot, const char* channel,
+            const Bytes& message) {
     std::vector<Bytes> for_robots;
     if (who != Who::kNobody) {
       const MutexLock lock(mutex);
-      for_robots = sealed.seal(session, channel, message, now());
+      for_robots = sealed.seal(session, robot, channel, message, now());
     }
     for (const Bytes& one : for_robots) link->publish(channel, one);
     if (who != Who::kAll) link->publish(channel, message);
   }
 
   // Called by the server's thread. Robots believe no acknowledgement before they know which map it is about.
-  void acknowledge(const Acknowledgement& ack) {
+  void acknowledge(const Acknowledgement& ack, const std::optional<std::string>& robot) {
     const auto time = now();
     if (time - map_said >= kMapInterval) {
       map_said = time;
       say_map();
     }
-    tell(ack.session, kAckChannel, encode_lcm(ack));
+    tell(ack.session, robot, kAckChannel, encode_lcm(ack));
   }
 
   void say_map() { link->publish(kMapChannel, encode_lcm(server.identity())); }
@@ -170,10 +173,11 @@ Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const LcmOptions& options, i
   if (!link.ok()) return link.status();
   impl->link = std::move(*link);
   impl->opened_link = impl->link.get();
-  impl->said = server.subscribe(
-      {[running](const Acknowledgement& ack) { running->acknowledge(ack); },
-       [running](const PoseNews& news) { running->tell(news.session, kPoseChannel, encode_lcm(news)); },
-       {}});
+  impl->said = server.subscribe({[running](const auto& ack, const auto& robot) { running->acknowledge(ack, robot); },
+                                 [running](const auto& news, const auto& robot) {
+                                   running->tell(news.session, robot, kPoseChannel, encode_lcm(news));
+                                 },
+                                 {}});
   if (impl->status) impl->status_thread = std::thread([running] { running->run(); });
   spdlog::info("LCM: listening on {}", options.url);
   if (const auto complete = complete_lcm_url(options.url); complete.ok())

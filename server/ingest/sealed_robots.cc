@@ -95,11 +95,14 @@ void SealedRobots::seal(Robot& robot, const access::SealKeyId& key, std::uint64_
   robot.sealer.seal(access::SealedBy::kDaemon, channel, {}, {key, run, time_us(now), ++sent_}, message);
 }
 
-std::vector<Bytes> SealedRobots::seal(const SessionUuid& session, std::string_view channel, const Bytes& message,
-                                      Time now) {
+std::vector<Bytes> SealedRobots::seal(const SessionUuid& session, const std::optional<std::string>& robot,
+                                      std::string_view channel, const Bytes& message, Time now) {
   std::vector<Bytes> sealed;
-  for (auto to = recipients_.lower_bound({session, {}}); to != recipients_.end() && to->first.first == session; ++to)
-    seal(robots_.at(to->first.second), to->first.second, to->second, channel, now, sealed.emplace_back(message));
+  for (auto to = recipients_.lower_bound({session, {}}); to != recipients_.end() && to->first.first == session; ++to) {
+    const auto& [key, run] = std::pair(to->first.second, to->second);
+    Robot& recipient = robots_.at(key);
+    if (!robot || recipient.name == *robot) seal(recipient, key, run, channel, now, sealed.emplace_back(message));
+  }
   return sealed;
 }
 

@@ -69,16 +69,18 @@ struct IngestServer::Impl {
     std::vector<Acknowledgement> due;
     std::vector<PoseNews> news;
     std::vector<RobotEvent> events;
+    std::vector<RobotOf> robots_of_due, robots_of_news;
+    {
+      const MutexLock lock(wake_mutex);
+      news.swap(told);
+    }
     {
       const MutexLock lock(mutex);
       due = intake.poll(now());
-      news = intake.take_news();
+      for (PoseNews& item : intake.take_news()) news.push_back(std::move(item));
       events = intake.take_events();
-    }
-    {
-      const MutexLock lock(wake_mutex);
-      news.insert(news.end(), told.begin(), told.end());
-      told.clear();
+      for (const Acknowledgement& ack : due) robots_of_due.push_back(intake.robot_of(ack.session));
+      for (const PoseNews& item : news) robots_of_news.push_back(intake.robot_of(item.session));
     }
     for (PoseNews& item : news) {
       item.boot = identity.boot;
@@ -86,9 +88,9 @@ struct IngestServer::Impl {
     }
     for (const auto& [id, listener] : subscribers) {
       if (listener.acknowledged)
-        for (const Acknowledgement& ack : due) listener.acknowledged(ack);
+        for (std::size_t i = 0; i < due.size(); ++i) listener.acknowledged(due[i], robots_of_due[i]);
       if (listener.news)
-        for (const PoseNews& item : news) listener.news(item);
+        for (std::size_t i = 0; i < news.size(); ++i) listener.news(news[i], robots_of_news[i]);
       if (listener.robot)
         for (const RobotEvent& event : events) listener.robot(event);
     }

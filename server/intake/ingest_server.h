@@ -50,10 +50,12 @@ class IngestServer {
 
   // Calls the listener from now on with everything that robots are to be told, from this object's thread, one call at a
   // time. The callbacks must neither block nor call back. None of them runs any more once the Subscription is
-  // destroyed. `stopping` is called once the server takes nothing more and has told everything.
+  // destroyed. `stopping` is called once the server takes nothing more and has told everything. `robot` is the robot
+  // whose session it is (Intake::robot_of): what it is told is not to be believed by others.
+  using RobotOf = std::optional<std::string>;
   struct Listener {
-    std::function<void(const Acknowledgement&)> acknowledged;
-    std::function<void(const PoseNews&)> news;
+    std::function<void(const Acknowledgement&, const RobotOf& robot)> acknowledged;
+    std::function<void(const PoseNews&, const RobotOf& robot)> news;
     std::function<void()> stopping;
     std::function<void(const RobotEvent&)> robot = {};
   };

@@ -60,6 +60,14 @@ Status Intake::check_sender(const SessionUuid& session, const Entry& entry, cons
 Owner Intake::owner_of(const std::string& robot) const { return {robot, options_.proving.contains(robot)}; }
 Owner Intake::owner_of(const Entry& entry) const { return owner_of(entry.intake.header().robot); }
 
+std::optional<std::string> Intake::robot_of(const SessionUuid& session) const {
+  const auto at = sessions_.find(session);
+  if (at == sessions_.end()) return std::nullopt;
+  const Entry& entry = at->second;
+  if (entry.intake.has_begun()) return entry.intake.header().robot;
+  return entry.sender ? entry.sender->robot : std::string();
+}
+
 Party Intake::party(const SessionUuid& session, const Sender& sender) const {
   const auto entry = sessions_.find(session);
   if (entry == sessions_.end() || !entry->second.intake.has_begun()) return party_of(session, sender, nullptr);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -69,6 +70,9 @@ class Intake {
   Status claim(const SessionUuid& session, SteadyTime now, const Sender& sender);
   // Counts bytes that are no message (CORRUPT) or a message of another protocol (UNKNOWN_PROTOCOL_VERSION).
   void count_foreign(Reason reason);
+
+  // The robot whose session it is, as far as that is proved; empty: nobody's; nullopt: it is not being taken in.
+  std::optional<std::string> robot_of(const SessionUuid& session) const;
 
   // Handles the outcomes of journalled records, retries what was blocked, and returns the acknowledgements to send now.
   std::vector<Acknowledgement> poll(SteadyTime now);

@@ -123,8 +123,8 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
     replies_.push_back(std::move(welcome));
     go_on();
   }
-  subscription_ = intake_->subscribe({[this](const Acknowledgement& ack) { hear(ack); },
-                                      [this](const PoseNews& news) { hear(news); },
+  subscription_ = intake_->subscribe({[this](const Acknowledgement& ack, const auto&) { hear(ack); },
+                                      [this](const PoseNews& news, const auto&) { hear(news); },
                                       [this] {
                                         end({Reason::SHUTTING_DOWN, "the daemon is stopping"});
                                       }});

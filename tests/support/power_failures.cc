@@ -118,7 +118,7 @@ class Life {
     mapper_ = map::Mapper::open(std::move(engine), budget_, vocabulary, options).or_throw();
     sink_ = std::make_unique<MapperSink>(*mapper_);
     ingest_ = std::make_unique<intake::IngestServer>(*sink_, *budget_, BootId{boot});
-    subscription_ = ingest_->subscribe({[this, watch = std::move(watch)](const Acknowledgement& ack) {
+    subscription_ = ingest_->subscribe({[this, watch = std::move(watch)](const Acknowledgement& ack, const auto&) {
                                           watch(ack);
                                           const std::lock_guard lock(mutex_);
                                           next_sequence_ = std::max(next_sequence_, ack.next_sequence);
