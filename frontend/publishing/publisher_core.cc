@@ -12,7 +12,10 @@ using std::chrono::milliseconds;
 constexpr milliseconds kAskedAgain{60}, kLosslessAsked{1000};
 // What the daemon neither holds nor asks for is sent again after this time, which grows over a lossy transport.
 constexpr milliseconds kFirstRetry{250}, kLastRetry{2000}, kLosslessRetry{10'000};
-constexpr milliseconds kSilence{1500};       // after this time without a message the daemon may be gone
+constexpr milliseconds kSilence{1500};  // after this time without a message the daemon may be gone
+// A daemon that has acknowledged less than before for so long has forgotten what it had settled before it took the
+// first keyframe. Such acknowledgements may also have been overtaken on their way, but not for so long.
+constexpr milliseconds kOvertaken{2000};
 constexpr std::ptrdiff_t kKeepSettled = 64;  // one acknowledgement settles at most so many (the daemon's window)
 constexpr std::uint64_t kMinWindow = std::uint64_t{128} << 10;
 constexpr std::uint64_t kMaxWindow = std::uint64_t{2} << 20;
@@ -210,7 +213,13 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (ack.session != session_ || past_boots_.count(ack.boot)) return;
   if (!maps_.believes(ack.boot, now)) return;
   const bool fresh_boot = !boot_ || *boot_ != ack.boot;
-  if (!fresh_boot && ack.next_sequence < acknowledged_) return;  // a newer one overtook it
+  if (fresh_boot || ack.next_sequence >= acknowledged_)
+    behind_since_.reset();
+  else if (!behind_since_)
+    behind_since_ = now;
+  const bool forgotten = behind_since_ && now - *behind_since_ >= kOvertaken;
+  if (behind_since_ && !forgotten) return;  // a newer one overtook it
+  behind_since_.reset();
   last_ack_ = now;
   if (fresh_boot) adopt_boot(ack.boot);
   closed_ = Reason::OK;
@@ -222,7 +231,7 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
     if (it->second.settled && it->second.refused == Reason::OK) ++counts_.refused[refused.reason];
     it->second.refused = refused.reason;
   }
-  if (fresh_boot) {
+  if (fresh_boot || forgotten) {
     unsettle_from(ack.next_sequence);
     fill_holes(ack.next_sequence, maps_.restored(ack.boot) ? Reason::MAP_RESTORED : Reason::DROPPED_BY_ROBOT);
   }

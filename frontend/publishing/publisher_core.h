@@ -143,6 +143,7 @@ class PublisherCore {
   std::optional<BootId> boot_;
   std::set<BootId> past_boots_;
   Time last_ack_{};
+  std::optional<Time> behind_since_;  // since when acknowledgements say less than the newest one
   Reason closed_ = Reason::OK;
   PublishCounts counts_;
 };

@@ -121,6 +121,28 @@ TEST_F(PublisherCoreTest, OutdatedAcknowledgementsAreIgnored) {
   EXPECT_EQ(core_.unsettled(), 2u);
 }
 
+// A daemon settles from memory what it refuses before it has taken a first keyframe, and forgets it after a silence.
+TEST_F(PublisherCoreTest, ADaemonThatHasForgottenWhatItSettledGetsItAgain) {
+  push(10);
+  core_.acknowledge(ack(0), now_);
+  (void)sent();
+  core_.acknowledge(ack(8), now_);
+  now_ += std::chrono::seconds(60);
+  core_.acknowledge(ack(0), now_);
+  EXPECT_EQ(core_.unsettled(), 2u) << "it may have been overtaken";
+  now_ += milliseconds(1000);
+  core_.acknowledge(ack(8), now_);  // it was
+  now_ += milliseconds(1500);
+  core_.acknowledge(ack(0), now_);
+  EXPECT_EQ(core_.unsettled(), 2u);
+  for (int i = 0; i < 10; ++i) core_.acknowledge(ack(0), now_ += milliseconds(250));
+  EXPECT_EQ(core_.unsettled(), 10u);
+  EXPECT_EQ(sent().size(), 10u);
+  core_.acknowledge(ack(10), now_);
+  EXPECT_EQ(core_.unsettled(), 0u);
+  EXPECT_EQ(core_.counts().gaps, 0u);
+}
+
 TEST_F(PublisherCoreTest, ARestartedDaemonGetsTheKeyframesItLost) {
   push(20);
   core_.acknowledge(ack(0), now_);

@@ -137,7 +137,7 @@ Result<std::string> complete_lcm_url(const std::string& url) {
 
 bool stays_on_this_machine(const std::string& complete_url) {
   const Result<LcmUrl> parsed = parse_lcm_url(complete_url);
-  return parsed.ok() && (parsed->provider != "udpm" || lcm_option(*parsed, "ttl") == "0");
+  return parsed.ok() && (parsed->provider != "udpm" || number<int>(lcm_option(*parsed, "ttl")) == 0);
 }
 
 }  // namespace relmap

@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -95,8 +94,7 @@ struct LcmIngest::Impl {
 
   // Publishes what concerns a session: sealed for those who have sealed what they sent of it, and as it is where others
   // may send it, since one that has sealed something of it need not be its robot.
-  void tell(const SessionUuid& session, const std::optional<std::string>& robot, const char* channel,
-            const Bytes& message) {
+  void tell(const SessionUuid& session, const std::string& robot, const char* channel, const Bytes& message) {
     std::vector<Bytes> for_robots;
     if (who != Who::kNobody) {
       const MutexLock lock(mutex);
@@ -107,7 +105,7 @@ struct LcmIngest::Impl {
   }
 
   // Called by the server's thread. Robots believe no acknowledgement before they know which map it is about.
-  void acknowledge(const Acknowledgement& ack, const std::optional<std::string>& robot) {
+  void acknowledge(const Acknowledgement& ack, const std::string& robot) {
     const auto time = now();
     if (time - map_said >= kMapInterval) {
       map_said = time;

@@ -150,14 +150,15 @@ struct Exchange {
 
   // What the daemon tells the robot of its session.
   void answer(unsigned kind, const Bytes& message, unsigned flags) {
-    const auto answers = robots.seal(kSession, {}, kAckChannel, message, kNow);
+    const auto answers = robots.seal(kSession, "cart", kAckChannel, message, kNow);
     must(answers.size() == ((flags & (kRevoked | kManySessions)) == 0 ? 1u : 0u));
     for (const Bytes& sealed : answers) {
       const auto heard = daemon.open(kAckChannel, sealed);
       must(heard && std::ranges::equal(heard->message, message) && daemon.heard(kBoot, heard->seal, kNow));
       decode_as(kind, heard->message);
     }
-    must(robots.seal(SessionUuid{{6}}, {}, kAckChannel, message, kNow).empty());
+    must(robots.seal(kSession, "dash", kAckChannel, message, kNow).empty());
+    must(robots.seal(SessionUuid{{6}}, "cart", kAckChannel, message, kNow).empty());
   }
 
   ingest::SealedRobots robots{kBoot, kSecret, kStart};

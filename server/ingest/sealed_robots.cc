@@ -95,13 +95,13 @@ void SealedRobots::seal(Robot& robot, const access::SealKeyId& key, std::uint64_
   robot.sealer.seal(access::SealedBy::kDaemon, channel, {}, {key, run, time_us(now), ++sent_}, message);
 }
 
-std::vector<Bytes> SealedRobots::seal(const SessionUuid& session, const std::optional<std::string>& robot,
-                                      std::string_view channel, const Bytes& message, Time now) {
+std::vector<Bytes> SealedRobots::seal(const SessionUuid& session, const std::string& robot, std::string_view channel,
+                                      const Bytes& message, Time now) {
   std::vector<Bytes> sealed;
   for (auto to = recipients_.lower_bound({session, {}}); to != recipients_.end() && to->first.first == session; ++to) {
     const auto& [key, run] = std::pair(to->first.second, to->second);
     Robot& recipient = robots_.at(key);
-    if (!robot || recipient.name == *robot) seal(recipient, key, run, channel, now, sealed.emplace_back(message));
+    if (recipient.name == robot) seal(recipient, key, run, channel, now, sealed.emplace_back(message));
   }
   return sealed;
 }

@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -52,9 +51,9 @@ class SealedRobots {
 
   // Notes that the robot's process sends the session.
   void sends(const Opened& from, const SessionUuid& session);
-  // The message, sealed for each process that sends the session; if its robot is known, for that robot's only: what is
-  // said to one that has taken another's session would be believed by the other.
-  std::vector<Bytes> seal(const SessionUuid& session, const std::optional<std::string>& robot, std::string_view channel,
+  // The message, sealed for each process of this robot that sends the session, and for no other robot: what is said to
+  // one that has taken another's session would be believed by the other.
+  std::vector<Bytes> seal(const SessionUuid& session, const std::string& robot, std::string_view channel,
                           const Bytes& message, Time now);
   // The answer to a hello; at most one every 5 ms to each of kMaxRuns processes of one robot, empty otherwise. Hellos
   // of former processes, which anyone may send again, leave the present one its answers.

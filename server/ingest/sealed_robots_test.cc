@@ -149,10 +149,10 @@ TEST_F(SealedRobotsTest, AnswersAreForTheProcessThatSendsTheSession) {
     const Bytes datagram = from.seal(boot_, time_us());
     robots_.sends(robots_.open(kGapChannel, datagram, now_, kNow).or_throw(), what);
   };
-  EXPECT_TRUE(robots_.seal(session, {}, kAckChannel, {5}, now_).empty());
+  EXPECT_TRUE(robots_.seal(session, "cart", kAckChannel, {5}, now_).empty());
   sends(cart, session);
   sends(other, SessionUuid::random());
-  auto sealed = robots_.seal(session, {}, kAckChannel, {5}, now_);
+  auto sealed = robots_.seal(session, "cart", kAckChannel, {5}, now_);
   ASSERT_EQ(sealed.size(), 1u);
   auto split = access::split_sealed(sealed[0]).value();
   EXPECT_EQ(split.seal.run, 11u);
@@ -162,22 +162,21 @@ TEST_F(SealedRobotsTest, AnswersAreForTheProcessThatSendsTheSession) {
   const std::uint64_t count = split.seal.count;
   cart.run = 12;  // the front-end was started again
   sends(cart, session);
-  sealed = robots_.seal(session, {}, kAckChannel, {5}, now_);
+  sealed = robots_.seal(session, "cart", kAckChannel, {5}, now_);
   ASSERT_EQ(sealed.size(), 1u);
   split = access::split_sealed(sealed[0]).value();
   EXPECT_EQ(split.seal.run, 12u);
   EXPECT_GT(split.seal.count, count);
   sends(other, session);  // whatever it sends is not taken, and takes nothing from the first
-  EXPECT_EQ(robots_.seal(session, {}, kAckChannel, {5}, now_).size(), 2u);
   sealed = robots_.seal(session, "cart", kAckChannel, {5}, now_);
-  ASSERT_EQ(sealed.size(), 1u) << "if it is known whose the session is, nobody else hears of it";
+  ASSERT_EQ(sealed.size(), 1u) << "nobody else hears of it";
   EXPECT_EQ(access::split_sealed(sealed[0])->seal.run, 12u);
   EXPECT_TRUE(robots_.seal(session, "", kAckChannel, {5}, now_).empty()) << "nobody's yet";
   for (std::size_t i = 0; i < 2 * SealedRobots::kMaxSessions; ++i) sends(other, SessionUuid::random());
-  EXPECT_EQ(robots_.seal(session, {}, kAckChannel, {5}, now_).size(), 1u) << "one robot's sessions are limited";
+  EXPECT_EQ(robots_.seal(session, "cart", kAckChannel, {5}, now_).size(), 1u) << "one robot's sessions are limited";
   list_.revoke("cart");
   use();
-  EXPECT_TRUE(robots_.seal(session, {}, kAckChannel, {5}, now_).empty());
+  EXPECT_TRUE(robots_.seal(session, "cart", kAckChannel, {5}, now_).empty());
 }
 
 TEST_F(SealedRobotsTest, AHelloIsAnsweredWhateverItsDaemonAndTime) {

@@ -69,7 +69,7 @@ struct IngestServer::Impl {
     std::vector<Acknowledgement> due;
     std::vector<PoseNews> news;
     std::vector<RobotEvent> events;
-    std::vector<RobotOf> robots_of_due, robots_of_news;
+    std::vector<std::string> robots_of_due, robots_of_news;
     {
       const MutexLock lock(wake_mutex);
       news.swap(told);

@@ -52,10 +52,9 @@ class IngestServer {
   // time. The callbacks must neither block nor call back. None of them runs any more once the Subscription is
   // destroyed. `stopping` is called once the server takes nothing more and has told everything. `robot` is the robot
   // whose session it is (Intake::robot_of): what it is told is not to be believed by others.
-  using RobotOf = std::optional<std::string>;
   struct Listener {
-    std::function<void(const Acknowledgement&, const RobotOf& robot)> acknowledged;
-    std::function<void(const PoseNews&, const RobotOf& robot)> news;
+    std::function<void(const Acknowledgement&, const std::string& robot)> acknowledged;
+    std::function<void(const PoseNews&, const std::string& robot)> news;
     std::function<void()> stopping;
     std::function<void(const RobotEvent&)> robot = {};
   };

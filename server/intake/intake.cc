@@ -24,7 +24,8 @@ constexpr double kSlowest = 0.1;                     // keyframes per second: th
 constexpr std::chrono::seconds kLive{5};             // a robot heard within this time is present
 constexpr std::chrono::minutes kLately{1};           // stats() counts the sessions that were heard within this time
 constexpr std::chrono::seconds kLookForNames{1};     // interval of looking for robots of the same name
-constexpr std::int64_t kNoLag = 86'400'000'000;      // us: so old a time stamp is a recording's and tells no lag
+constexpr std::size_t kMaxKnown = 64;            // sessions of which is known what the map has, before they are opened
+constexpr std::int64_t kNoLag = 86'400'000'000;  // us: so old a time stamp is a recording's and tells no lag
 
 // Counts why a message was not taken. Only NOT_ALLOWED is its sender's to know; the others pass.
 Status count_not_opened(ReasonCounts& counts, const Status& why) {
@@ -60,9 +61,12 @@ Status Intake::check_sender(const SessionUuid& session, const Entry& entry, cons
 Owner Intake::owner_of(const std::string& robot) const { return {robot, options_.proving.contains(robot)}; }
 Owner Intake::owner_of(const Entry& entry) const { return owner_of(entry.intake.header().robot); }
 
-std::optional<std::string> Intake::robot_of(const SessionUuid& session) const {
+std::string Intake::robot_of(const SessionUuid& session) const {
   const auto at = sessions_.find(session);
-  if (at == sessions_.end()) return std::nullopt;
+  if (at == sessions_.end()) {
+    const auto silent = silent_.find(session);
+    return silent == silent_.end() ? std::string() : silent->second.stats.robot;
+  }
   const Entry& entry = at->second;
   if (entry.intake.has_begun()) return entry.intake.header().robot;
   return entry.sender ? entry.sender->robot : std::string();
@@ -88,6 +92,7 @@ std::optional<MapQuestion> Intake::question(const SessionUuid& session, std::opt
     return number ? std::optional(MapQuestion{session, *number, std::nullopt}) : std::nullopt;
   }
   const auto& [failed, known, judged] = at->second;
+  if (failed.ok() && !may_send(sender, session, owner_of(known.session->header.robot)).ok()) return std::nullopt;
   if (!failed.ok() || !sequence || *sequence >= known.session->next_sequence || judged.contains(*sequence))
     return std::nullopt;
   return MapQuestion{session, known.session->number, sequence};
@@ -107,7 +112,7 @@ void Intake::know(const MapQuestion& question, MapAnswer answer) {
     return;
   }
   if (known == known_.end()) {
-    if (known_.size() >= options_.max_sessions) known_.erase(known_.begin());
+    if (known_.size() >= kMaxKnown) known_.erase(known_.begin());
     known = known_.try_emplace(question.uuid).first;
   }
   known->second.failed = answer.failed;
@@ -132,6 +137,8 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
   // What anyone has sent must not stand in the way of the robot itself.
   if (it != sessions_.end() && !it->second.intake.has_begun() && it->second.sender && it->second.sender->anyone &&
       !sender.anyone) {
+    // What begins would be taken for the beginning of what the robot sends.
+    if (it->second.intake.begins()) return Status(Reason::BUDGET_EXCEEDED, "the session is beginning");
     forget(it);
     it = sessions_.end();
   }
@@ -177,7 +184,7 @@ Result<Intake::Entry*> Intake::open(const SessionUuid& session, SteadyTime now, 
     silent_.erase(session);
     ++begun_version_;
   }
-  if (!entry.sender) entry.sender = sender;
+  if (!entry.sender || (entry.sender->robot.empty() && !sender.robot.empty())) entry.sender = sender;
   if (entry.party.robot.empty()) count(entry, party(session, sender));
   entry.schedule.heard(now);
   return &entry;
@@ -224,8 +231,11 @@ bool Intake::make_room(const Party& newcomer, SteadyTime now) {
         oldest = it;
     return oldest;
   };
-  auto goes = longest_silent(
-      [](Entry& entry) { return !(entry.intake.has_begun() || entry.intake.begins()) || entry.intake.idle(); });
+  // Whoever sends much must not make room for himself where another's robot has announced what it will send.
+  auto goes = longest_silent([&](Entry& entry) {
+    if (entry.intake.has_begun()) return entry.intake.idle();
+    return !entry.intake.begins() && (entry.party == Party{} || places_of(entry.party) >= places_of(newcomer));
+  });
   if (goes == sessions_.end()) {
     const auto most = std::max_element(places_.begin(), places_.end(),
                                        [](const auto& a, const auto& b) { return a.second < b.second; });
@@ -268,7 +278,7 @@ void Intake::forget_silent(SteadyTime now) {
       entry.intake.let_go();
       reassembly_.forget(session, UINT64_MAX);
     }
-    const bool gone = silent && entry.intake.idle();
+    const bool gone = silent && entry.intake.idle() && entry.claimed + options_.patience <= now;
     begun_version_ += gone;
     if (gone) {
       remember(session, entry, now);
@@ -461,12 +471,14 @@ Status Intake::claim(const SessionUuid& session, SteadyTime now, const Sender& s
   const auto at = sessions_.find(session);
   const bool claimed = at == sessions_.end()
                            ? sink_.find_session(session).has_value()
-                           : at->second.intake.has_begun() || (at->second.sender && !at->second.sender->anyone);
+                           : at->second.intake.has_begun() || (at->second.sender && !at->second.sender->robot.empty());
   Status may;
-  if (!claimed)
+  if (!claimed) {
     may = open(session, now, sender).status();
-  else if (at != sessions_.end())  // it is not heard: anyone may send again what the robot announced long ago
+  } else if (at != sessions_.end()) {  // it is not heard: anyone may send again what the robot announced long ago
     may = check_sender(session, at->second, sender);
+    if (may.ok() && !at->second.intake.has_begun()) at->second.claimed = now;
+  }
   return may.ok() ? may : count_not_opened(stats_.messages_refused, may);
 }
 

@@ -25,8 +25,9 @@ inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // of one gap mess
 
 struct IntakeOptions {
   AcknowledgementTimes times;
-  // Sessions at a time. A new one replaces the longest silent of those that have not begun or have nothing pending, or
-  // else of a party that has more of them than its own.
+  // Sessions at a time. A new one replaces the longest silent of those that have nothing pending or have not begun, but
+  // none that a robot has announced which has fewer than the newcomer; or else of a party that has more of them than
+  // its own.
   std::size_t max_sessions = 1024;
   std::chrono::seconds patience{60};   // after so long a silence a robot's unfinished keyframes are dropped
   std::chrono::seconds remember{600};  // robots() lists a robot that did not end for so long after it was last heard
@@ -71,8 +72,8 @@ class Intake {
   // Counts bytes that are no message (CORRUPT) or a message of another protocol (UNKNOWN_PROTOCOL_VERSION).
   void count_foreign(Reason reason);
 
-  // The robot whose session it is, as far as that is proved; empty: nobody's; nullopt: it is not being taken in.
-  std::optional<std::string> robot_of(const SessionUuid& session) const;
+  // The robot whose session it is; empty: nobody has proved yet to be that, or it is neither being taken in nor silent.
+  std::string robot_of(const SessionUuid& session) const;
 
   // Handles the outcomes of journalled records, retries what was blocked, and returns the acknowledgements to send now.
   std::vector<Acknowledgement> poll(SteadyTime now);
@@ -97,7 +98,7 @@ class Intake {
   struct Entry {
     SessionIntake intake;
     AcknowledgementSchedule schedule;
-    std::optional<Sender> sender{};    // of the first message, while it has not begun
+    std::optional<Sender> sender{};    // of the first message, or the first that is proved, while it has not begun
     Party party{};                     // counted in places_
     double payload_bytes = 64 * 1024;  // running mean of keyframe sizes
     RateMeter keyframes{}, bytes{};
@@ -110,6 +111,7 @@ class Intake {
     SteadyTime held_back_since{};  // since when it sends more than is taken; epoch: it does not
     SteadyTime slowed_at{};        // when it was last told to slow down; epoch: never, or told to resume
     SteadyTime heard_first{};
+    SteadyTime claimed{};      // before it has begun, when its robot announced it last
     SteadyTime begin_again{};  // when it may try to begin again, after it was refused that
     bool in_line = false;
     bool may_begin = false;      // counted among the new sessions of its sender

@@ -1264,5 +1264,79 @@ TEST_F(IntakeTest, ASessionThatTheMapDoesNotShowYetIsNotTakenForANewOne) {
   EXPECT_EQ(settle().next_sequence, 2u);
 }
 
+// What a robot has announced is its own until it sends, whatever another robot of the fleet does meanwhile.
+TEST_F(IntakeTest, AnAnnouncedSessionStaysItsRobots) {
+  IntakeOptions options;
+  options.max_sessions = 16;
+  restart(options);
+  const Sender cart{"cart"}, thief{"thief"};
+  EXPECT_TRUE(intake_->claim(uuid_, now_, cart).ok());
+  EXPECT_EQ(intake_->robot_of(uuid_), "cart");
+  const auto gap = [&](const SessionUuid& session, const Sender& from) {
+    return intake_->take_gap({session, 0, 5, Reason::DROPPED_BY_ROBOT}, now_, from);
+  };
+  for (int i = 0; i < 100; ++i) {
+    now_ += milliseconds(1);
+    EXPECT_TRUE(gap(SessionUuid::random(), thief).ok());
+  }
+  EXPECT_EQ(gap(uuid_, thief).reason(), Reason::NOT_ALLOWED) << "others made room for themselves";
+  for (int s = 0; s < 100; ++s) {
+    now_ += std::chrono::seconds(1);
+    EXPECT_TRUE(intake_->claim(uuid_, now_, cart).ok());
+    (void)intake_->poll(now_);
+    ASSERT_EQ(intake_->claim(uuid_, now_, thief).reason(), Reason::NOT_ALLOWED) << "after " << s << " s";
+  }
+  now_ += std::chrono::seconds(61);
+  (void)intake_->poll(now_);
+  EXPECT_EQ(intake_->stats(now_).sessions, 0u) << "nobody announces it any more";
+  EXPECT_EQ(intake_->robot_of(uuid_), "");
+}
+
+TEST_F(IntakeTest, TheFirstWhoProvesToBeItsRobotHasASessionThatHasNotBegun) {
+  const Sender cart{"cart"}, thief{"thief"}, anyone{{}, true}, operators{};
+  for (const Sender& unproved : {operators, anyone}) {
+    uuid_ = SessionUuid::random();
+    EXPECT_TRUE(intake_->take_gap({uuid_, 0, 5, Reason::DROPPED_BY_ROBOT}, now_, unproved).ok());
+    EXPECT_EQ(intake_->robot_of(uuid_), "");
+    EXPECT_TRUE(intake_->claim(uuid_, now_, cart).ok());
+    EXPECT_EQ(intake_->robot_of(uuid_), "cart");
+    EXPECT_EQ(intake_->claim(uuid_, now_, thief).reason(), Reason::NOT_ALLOWED);
+  }
+}
+
+// What somebody else began is over before the robot's own begins: it is not taken for its beginning.
+TEST_F(IntakeTest, WhatBeginsIsNotTakenForTheBeginningOfAnothers) {
+  sink_.begin_slowly = true;
+  const Sender cart{"cart"}, anyone{{}, true};
+  const auto sends = [&](const std::string& robot, const Sender& from) {
+    Keyframe k = keyframe(0);
+    k.session.robot = robot;
+    const Bytes payload = encode_keyframe(k);
+    return intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_, from);
+  };
+  EXPECT_TRUE(sends("bob", anyone).ok());
+  EXPECT_TRUE(sends("cart", cart).ok());
+  EXPECT_EQ(part_refused(Reason::BUDGET_EXCEEDED), 1u) << "until that has begun";
+  sink_.let_begin();
+  acknowledge();
+  settle();
+  EXPECT_EQ(sends("cart", cart).reason(), Reason::NOT_ALLOWED) << "it is bob's";
+  const auto records = journalled<storage::KeyframeRecord>();
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_EQ(decode_keyframe(records[0].payload)->session.robot, "bob");
+}
+
+TEST_F(IntakeTest, NothingIsReadForARobotThatMayNotSendToTheSession) {
+  send(0);
+  settle();
+  restart();
+  const Sender thief{"thief"};
+  const auto of_session = intake_->question(uuid_, 0, thief);
+  ASSERT_TRUE(of_session);
+  intake_->know(*of_session, answer(sink_, *of_session));
+  EXPECT_FALSE(intake_->question(uuid_, 0, thief));
+  EXPECT_TRUE(intake_->question(uuid_, 0, {keyframe(0).session.robot}));
+}
+
 }  // namespace
 }  // namespace relmap::intake

@@ -123,8 +123,8 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
     replies_.push_back(std::move(welcome));
     go_on();
   }
-  subscription_ = intake_->subscribe({[this](const Acknowledgement& ack, const auto&) { hear(ack); },
-                                      [this](const PoseNews& news, const auto&) { hear(news); },
+  subscription_ = intake_->subscribe({[this](const auto& ack, const auto& of) { hear(ack, of); },
+                                      [this](const auto& news, const auto& of) { hear(news, of); },
                                       [this] {
                                         end({Reason::SHUTTING_DOWN, "the daemon is stopping"});
                                       }});
@@ -146,17 +146,23 @@ Status IngestStream::join(const SessionUuid& session) {
   return {};
 }
 
-void IngestStream::hear(const Acknowledgement& ack) {
+// Until the intake has said that it may not send to a session, a robot hears nothing of another's, either.
+bool IngestStream::is_for_us(const SessionUuid& session, const std::string& robot) const {
+  const std::string own = call_.caller().robot();
+  return sessions_.contains(session) && (own.empty() || own == robot);
+}
+
+void IngestStream::hear(const Acknowledgement& ack, const std::string& robot) {
   const MutexLock lock(mutex_);
-  if (ending_ || !sessions_.contains(ack.session)) return;
+  if (ending_ || !is_for_us(ack.session, robot)) return;
   if (const Status known = call_.check_caller(); !known.ok()) ending_ = known;
   if (!ending_) acknowledgements_.insert_or_assign(ack.session, ack);
   go_on();
 }
 
-void IngestStream::hear(const PoseNews& news) {
+void IngestStream::hear(const PoseNews& news, const std::string& robot) {
   const MutexLock lock(mutex_);
-  if (ending_ || !sessions_.contains(news.session) || replies_.size() >= kMaxReplies) return;
+  if (ending_ || !is_for_us(news.session, robot) || replies_.size() >= kMaxReplies) return;
   if (const Status known = call_.check_caller(); !known.ok()) {
     ending_ = known;
     return go_on();

@@ -43,8 +43,9 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   intake::IngestServer::Taken then_go_on(const SessionUuid& session);
   void leave(const SessionUuid& session);
   void read_next();
-  void hear(const Acknowledgement& ack);
-  void hear(const PoseNews& news);
+  void hear(const Acknowledgement& ack, const std::string& robot);
+  void hear(const PoseNews& news, const std::string& robot);
+  bool is_for_us(const SessionUuid& session, const std::string& robot) const RELMAP_REQUIRES(mutex_);
   void end(const Status& status);
   void go_on() RELMAP_REQUIRES(mutex_);
 

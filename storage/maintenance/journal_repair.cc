@@ -254,9 +254,15 @@ Result<JournalCopy> repair_journal(const std::shared_ptr<FileSystem>& files, con
   // If all records from applied + 1 to the last durable one are whole, at most a tail that was not acknowledged is cut
   // off when the engine opens.
   if (contents->whole.size() == contents->durable - applied && !contents->left_out) {
-    JournalCopy copy;
-    copy.last = contents->durable;
-    return copy;
+    const auto log = JournalLog::open(files, from, applied, {.read_only = true});
+    if (!log.ok()) return log.status();
+    if ((*log)->loss().ok()) {
+      JournalCopy copy;
+      copy.last = contents->durable;
+      return copy;
+    }
+    // It has records of which nothing is known, for example in a segment that is not the one that its name says.
+    if (on_finding) on_finding({Reason::DATA_LOSS, {}, (*log)->loss().message(), true});
   }
   return JournalRepair(files, to, applied, *contents, on_finding, on_progress).run(sessions);
 }

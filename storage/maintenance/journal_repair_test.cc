@@ -86,6 +86,26 @@ TEST(JournalRepair, LeavesOutSegmentsThatCannotBelongToTheJournal) {
   EXPECT_NE(findings[0].find("is left out"), std::string::npos) << findings[0];
 }
 
+// Nothing is known of what such a segment holds, so a journal that a daemon would not write to is not called sound.
+TEST(JournalRepair, LeavesOutAFirstSegmentThatIsNotTheOneThatItsNameSays) {
+  const auto disk = ForgetfulFiles::create(1);
+  ASSERT_TRUE(disk->create_directory("j").ok());
+  const auto file = disk->open_append("j/" + SegmentName{1, 7}.to_string()).or_throw();
+  ByteWriter w;
+  w.put_bytes(segment_header(1, 5));
+  put_journal_record(w, 5, 1, 0, encode_record(IdleWorkRecord{1}, 0));
+  ASSERT_TRUE(file->append(w.bytes()).ok() && file->sync().ok());
+  EXPECT_FALSE(JournalLog::open(disk, "j", 0, {.read_only = true}).or_throw()->loss().ok());
+  std::vector<std::string> findings;
+  const auto tell = [&](const Finding& finding) { findings.push_back(finding.what); };
+  const auto copy = repair_journal(disk, "j", "mended", 0, {}, tell, {}).or_throw();
+  EXPECT_FALSE(copy.sound);
+  EXPECT_EQ(copy.last, 0U);
+  EXPECT_TRUE(JournalLog::open(disk, "mended", 0, {}).or_throw()->loss().ok());
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_NE(findings[0].find("is not the segment that its name says"), std::string::npos) << findings[0];
+}
+
 // Every other record of many sessions is lost: each session gets its gaps, before its next record, and nothing else
 // changes.
 TEST(JournalRepair, FillsManyHolesWithTheGapsOfManySessions) {

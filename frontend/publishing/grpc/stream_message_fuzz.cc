@@ -46,6 +46,7 @@ v1::IngestRequest sent(const v1::IngestRequest& request) {
 void say(ByteReader in) {
   SessionUuid session;
   session.bytes[0] = in.get<std::uint8_t>();
+  session.bytes[1] = 1;  // no session is nil
   const auto number = in.get<std::uint32_t>();
   const ByteSpan payload = in.get_bytes(in.remaining());
   KeyframePart whole;

@@ -288,7 +288,8 @@ void Search::enter(Direction direction, At at, double cost) {
 void Search::leave(Direction direction, std::uint32_t number, double cost) {
   Labels& labels = places_[number].labels[direction];
   if (cost > labels.min_pending) return;
-  take_pending(cost * (1 + kAhead), labels, due_);
+  // Costs from a damaged file may be negative; what is due must leave all the same.
+  take_pending(std::max(cost, cost * (1 + kAhead)), labels, due_);
   // Links are scattered in memory, so some are prefetched.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
   const CellFrames& cell = *places_[number].frames;
