@@ -67,6 +67,7 @@ const Options& options_of(const std::string& provider) {
 }
 
 Status check_options(const LcmUrl& url) {
+  if (url.options.ends_with('&')) return wrong("an option is missing behind the last '&'");
   const Options& known = options_of(url.provider);
   std::set<std::string> seen;
   std::istringstream options(url.options);

@@ -80,8 +80,11 @@ std::optional<CellFrames> get_frames(ByteSpan bytes, std::uint32_t nodes, std::u
     link.out = flags & kOutFlag;
     link.in = flags & kInFlag;
   }
+  const bool costs = std::ranges::none_of(frames.links, [](const Link& link) {
+    return link.metres < 0 || link.variance_m2 < 0 || link.driven_s < 0 || link.standing_s < 0;
+  });
   const bool whole =
-      frames.begin.front() == 0 && frames.begin.back() == links &&
+      costs && frames.begin.front() == 0 && frames.begin.back() == links &&
       std::is_sorted(frames.begin.begin(), frames.begin.end()) &&
       std::adjacent_find(frames.nodes.begin(), frames.nodes.end(), std::greater_equal<>()) == frames.nodes.end();
   if (!whole) return std::nullopt;
@@ -198,6 +201,7 @@ CellFrames CellStore::Impl::load_frames(std::uint64_t offset, std::uint32_t node
 SplitCostMatrix CellStore::Impl::load_matrix(std::uint64_t offset, std::uint32_t nodes) {
   SplitCostMatrix matrix(nodes);
   read_sealed(offset, matrix.bytes());
+  if (!matrix.valid()) throw_damaged();
   return matrix;
 }
 

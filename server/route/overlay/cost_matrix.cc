@@ -83,6 +83,13 @@ SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whol
     }
 }
 
+bool SplitCostMatrix::valid() const {
+  const auto* floors = reinterpret_cast<const std::uint32_t*>(bytes_.get());
+  std::uint32_t highest = 0;  // as numbers, the bits of all that is not valid are above those of infinity
+  for (std::size_t i = 0; i < n_ * n_; ++i) highest = std::max(highest, floors[i]);
+  return highest <= kExponentBits;
+}
+
 CostMatrix SplitCostMatrix::whole() const {
   CostMatrix whole(n_);
   for (std::size_t i = 0; i < n_; ++i)

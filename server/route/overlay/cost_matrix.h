@@ -63,6 +63,8 @@ class SplitCostMatrix {
   const std::uint16_t* rests(std::size_t i) const {
     return reinterpret_cast<const std::uint16_t*>(floors(n_)) + i * n_;
   }
+  // Whether no cost is negative or not a number: with such a cost, paths have no end.
+  bool valid() const;
   double operator()(std::size_t i, std::size_t j) const { return joined(floors(i)[j], rests(i)[j]); }
   // The cost. The unit of the rest is 2^-39 of the power of two below the floor.
   static double joined(float floor, std::uint16_t rest) {

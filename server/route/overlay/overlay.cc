@@ -267,10 +267,11 @@ std::optional<Overlay> Overlay::get(ByteReader& r, std::shared_ptr<CellStore> st
     overlay.waits_[number] = r.get<std::uint8_t>() != 0;
     if (overlay.waits_[number]) overlay.waiting_.insert({overlay.tree_->node(number).level, number});
     if (r.get<std::uint8_t>() != 0) overlay.outdated_.insert(number);
-    const bool wanted = number != overlay.tree_->root() && !overlay.waits_[number];
-    // Searches open chunks wherever larger cells are outdated, so a chunk never waits.
-    const bool waiting_chunk = overlay.waits_[number] && overlay.tree_->node(number).level == 0;
-    if (!r.ok() || waiting_chunk || (wanted && !overlay.cells_[number])) return std::nullopt;
+    const bool root = number == overlay.tree_->root();
+    const bool wanted = !root && !overlay.waits_[number];
+    // Searches open chunks wherever larger cells are outdated, so a chunk never waits; the root is no cell.
+    const bool may_wait = !root && overlay.tree_->node(number).level > 0;
+    if (!r.ok() || (overlay.waits_[number] && !may_wait) || (wanted && !overlay.cells_[number])) return std::nullopt;
   }
   return overlay;
 }

@@ -217,7 +217,7 @@ std::optional<Search::At> Search::end_of(const Link& link) {
 bool Search::offer(Direction direction, At at, double cost, At from) {
   Place& place = places_[at.place];
   Labels& labels = place.labels[direction];
-  if (cost >= labels.cost[at.node]) return false;
+  if (!(cost < labels.cost[at.node])) return false;  // nor is what is no number
   labels.cost[at.node] = cost;
   labels.came[at.node] = from.packed();
   const double whole = cost + place.labels[1 - direction].cost[at.node];
@@ -288,8 +288,7 @@ void Search::enter(Direction direction, At at, double cost) {
 void Search::leave(Direction direction, std::uint32_t number, double cost) {
   Labels& labels = places_[number].labels[direction];
   if (cost > labels.min_pending) return;
-  // Costs from a damaged file may be negative; what is due must leave all the same.
-  take_pending(std::max(cost, cost * (1 + kAhead)), labels, due_);
+  take_pending(cost * (1 + kAhead), labels, due_);
   // Links are scattered in memory, so some are prefetched.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
   const CellFrames& cell = *places_[number].frames;
