@@ -369,8 +369,8 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   while (count() == 0 && steady_clock::now() < deadline) {
     PoseNews foreign = news;
     foreign.session.bytes[0] ^= 1;
-    server_->tell(foreign);
-    server_->tell(news);
+    server_->tell(foreign, "other");
+    server_->tell(news, "cart");
     std::this_thread::sleep_for(milliseconds(20));
   }
   (*publisher)->hear({});

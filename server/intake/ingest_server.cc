@@ -72,15 +72,21 @@ struct IngestServer::Impl {
     std::vector<std::string> robots_of_due, robots_of_news;
     {
       const MutexLock lock(wake_mutex);
-      news.swap(told);
+      for (auto& [item, robot] : told) {
+        news.push_back(std::move(item));
+        robots_of_news.push_back(std::move(robot));
+      }
+      told.clear();
     }
     {
       const MutexLock lock(mutex);
       due = intake.poll(now());
-      for (PoseNews& item : intake.take_news()) news.push_back(std::move(item));
+      for (PoseNews& item : intake.take_news()) {
+        robots_of_news.push_back(intake.robot_of(item.session));
+        news.push_back(std::move(item));
+      }
       events = intake.take_events();
       for (const Acknowledgement& ack : due) robots_of_due.push_back(intake.robot_of(ack.session));
-      for (const PoseNews& item : news) robots_of_news.push_back(intake.robot_of(item.session));
     }
     for (PoseNews& item : news) {
       item.boot = identity.boot;
@@ -257,7 +263,7 @@ struct IngestServer::Impl {
   ConditionVariable wake_condition;
   bool woken RELMAP_GUARDED_BY(wake_mutex) = false;
   bool stopping RELMAP_GUARDED_BY(wake_mutex) = false;
-  std::vector<PoseNews> told RELMAP_GUARDED_BY(wake_mutex);
+  std::vector<std::pair<PoseNews, std::string>> told RELMAP_GUARDED_BY(wake_mutex);
 
   Mutex subscribers_mutex;
   std::map<std::uint64_t, Listener> subscribers RELMAP_GUARDED_BY(subscribers_mutex);
@@ -383,11 +389,11 @@ std::vector<RobotStats> IngestServer::robots() const {
 
 const DaemonIdentity& IngestServer::identity() const { return impl_->identity; }
 
-void IngestServer::tell(PoseNews news) {
+void IngestServer::tell(PoseNews news, std::string robot) {
   {
     const MutexLock lock(impl_->wake_mutex);
     if (impl_->told.size() >= kMaxNews) return;  // news are not reliable: transports may lose them too
-    impl_->told.push_back(std::move(news));
+    impl_->told.emplace_back(std::move(news), std::move(robot));
   }
   impl_->wake();
 }

@@ -44,14 +44,14 @@ class IngestServer {
   // What robots are told before anything else.
   const DaemonIdentity& identity() const;
 
-  // Passes news of a keyframe (a closure) on to the listeners, with boot id and time filled in. Returns at once. News
-  // are dropped if too many wait.
-  void tell(PoseNews news);
+  // Passes news of a keyframe (a closure) on to the listeners, with boot id and time filled in, for the robot whose
+  // session it is. Returns at once. News are dropped if too many wait.
+  void tell(PoseNews news, std::string robot);
 
   // Calls the listener from now on with everything that robots are to be told, from this object's thread, one call at a
   // time. The callbacks must neither block nor call back. None of them runs any more once the Subscription is
   // destroyed. `stopping` is called once the server takes nothing more and has told everything. `robot` is the robot
-  // whose session it is (Intake::robot_of): what it is told is not to be believed by others.
+  // whose session it is, empty while nobody has proved to be that: what it is told is not to be believed by others.
   struct Listener {
     std::function<void(const Acknowledgement&, const std::string& robot)> acknowledged;
     std::function<void(const PoseNews&, const std::string& robot)> news;

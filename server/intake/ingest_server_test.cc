@@ -5,7 +5,11 @@
 
 #include <algorithm>
 #include <future>
+#include <mutex>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "proto/base/crc32c.h"
 #include "proto/keyframe/keyframe_samples.h"
@@ -138,6 +142,27 @@ TEST_F(IngestServerTest, PartsOfASessionThatReturnsAreNotLost) {
   sink_.let_hang(0);
   EXPECT_TRUE(is_acknowledged(kOld, 4));
   EXPECT_EQ(server_->stats().parts, parts);
+}
+
+// News of closures may come long after the robot was heard, and its listeners must know whose they are.
+TEST_F(IngestServerTest, NewsAreForTheRobotOfTheirSession) {
+  std::mutex mutex;
+  std::vector<std::pair<SessionUuid, std::string>> heard;
+  const auto heard_by = server_->subscribe({{},
+                                            [&](const PoseNews& news, const std::string& robot) {
+                                              const std::lock_guard lock(mutex);
+                                              heard.emplace_back(news.session, robot);
+                                            },
+                                            {}});
+  PoseNews news;
+  news.session = SessionUuid::random();  // it is not being taken in
+  server_->tell(news, "cart");
+  ASSERT_TRUE(eventually([&] {
+    const std::lock_guard lock(mutex);
+    return !heard.empty();
+  }));
+  const std::lock_guard lock(mutex);
+  EXPECT_EQ(heard, (std::vector<std::pair<SessionUuid, std::string>>{{news.session, "cart"}}));
 }
 
 }  // namespace

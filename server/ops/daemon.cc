@@ -166,7 +166,8 @@ Status Daemon::Impl::open_map() {
   ingest = std::make_unique<intake::IngestServer>(*sink, *budget, boot, std::move(ingest_options));
   robot_log = ingest->subscribe({.acknowledged = {}, .news = {}, .stopping = {}, .robot = log});
   mapper->watch_closures([this](const storage::Graph& map, const storage::Edge& closure) {
-    if (auto news = ingest::closure_news(map, closure)) ingest->tell(std::move(*news));
+    if (auto news = ingest::closure_news(map, closure))
+      ingest->tell(std::move(*news), map.session(closure.b.session)->header.robot);
   });
   return {};
 }

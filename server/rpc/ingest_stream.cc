@@ -148,8 +148,9 @@ Status IngestStream::join(const SessionUuid& session) {
 
 // Until the intake has said that it may not send to a session, a robot hears nothing of another's, either.
 bool IngestStream::is_for_us(const SessionUuid& session, const std::string& robot) const {
+  if (!sessions_.contains(session)) return false;
   const std::string own = call_.caller().robot();
-  return sessions_.contains(session) && (own.empty() || own == robot);
+  return own.empty() || own == robot;
 }
 
 void IngestStream::hear(const Acknowledgement& ack, const std::string& robot) {

@@ -218,7 +218,7 @@ TEST_F(IngestStreamTest, NewsAreSentToTheirRobot) {
   slower.session = news.session;
   slower.kind = PoseNews::Kind::kSlowDown;
   slower.rate_hz = 2.5;
-  for (const PoseNews& one : {foreign, news, slower}) intake_->tell(one);
+  for (const PoseNews& one : {foreign, news, slower}) intake_->tell(one, world_.keyframe(0).session.robot);
   v1::IngestReply reply;
   while (stream->Read(&reply) && !reply.has_localisation()) {
   }

@@ -57,6 +57,7 @@ Status JournalLog::recover(std::uint64_t applied) {
     }
     if (reader->header_whole() && segments_[i].first == last_ + 1)
       tail = {i, reader->first_offset(), last_}, more = false;
+    previous = std::max(previous, segments_[i].first - 1);  // find_after() looks no further ahead than 2^24 records
     for (std::uint64_t offset = reader->first_offset();;) {
       auto record = reader->record_at(offset);
       if (record.ok() && !*record) record = reader->find_after(offset, previous);

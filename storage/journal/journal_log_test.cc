@@ -178,6 +178,18 @@ TEST_F(JournalLogTest, DamageToAppliedRecordsDoesNotMatter) {
   EXPECT_EQ(open(5)->last(), 31u);
 }
 
+// The search for records looks no further ahead than 2^24 of them, counted from where the segment begins.
+TEST_F(JournalLogTest, DamageToAppliedRecordsDoesNotMatterHoweverManyThereWere) {
+  const std::uint64_t before = std::uint64_t{1} << 25;
+  auto log = open(before);
+  append(*log, 5);
+  disk->damage(segment(0), kHeader + 50);
+  log = open(before + 1);
+  EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+  EXPECT_EQ(log->last(), before + 5);
+  EXPECT_EQ(read(*log, before + 2).size(), 4u);
+}
+
 TEST_F(JournalLogTest, AMissingSegmentInTheMiddleIsALoss) {
   auto log = open();
   append(*log, 50);

@@ -40,10 +40,12 @@ CellFrames frames_of(const storage::Graph& graph, storage::ChunkId chunk, const 
   std::array<std::vector<Link>, storage::kFramesPerChunk> links;  // by slot
   const auto take = [&](FrameId frame, const storage::Edge& edge, bool forward) {
     const EdgeCosts cost = costs(edge);
-    links[storage::slot_of(frame)].push_back({forward ? edge.b : edge.a, cost.metres, cost.variance_m2,
-                                              static_cast<float>(cost.driven_s), static_cast<float>(cost.standing_s),
-                                              edge.id.ordinal, edge.support, edge.kind == storage::EdgeKind::kLoop,
-                                              forward, open.open(edge, forward), open.open(edge, !forward)});
+    // The map may be damaged, too, and with negative costs a search has no end.
+    links[storage::slot_of(frame)].push_back({forward ? edge.b : edge.a, cost.metres, std::max(0.0, cost.variance_m2),
+                                              std::max(0.0f, static_cast<float>(cost.driven_s)),
+                                              std::max(0.0f, static_cast<float>(cost.standing_s)), edge.id.ordinal,
+                                              edge.support, edge.kind == storage::EdgeKind::kLoop, forward,
+                                              open.open(edge, forward), open.open(edge, !forward)});
   };
   const storage::Slots<storage::FrameHot> frames = graph.hot_frames(chunk);
   for (std::uint32_t slot = 0; slot < storage::kFramesPerChunk; ++slot) {

@@ -288,7 +288,7 @@ void Search::enter(Direction direction, At at, double cost) {
 void Search::leave(Direction direction, std::uint32_t number, double cost) {
   Labels& labels = places_[number].labels[direction];
   if (cost > labels.min_pending) return;
-  take_pending(cost * (1 + kAhead), labels, due_);
+  take_pending(std::max(cost, cost * (1 + kAhead)), labels, due_);  // at least the nearest, whatever the costs are
   // Links are scattered in memory, so some are prefetched.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
   const CellFrames& cell = *places_[number].frames;
