@@ -132,6 +132,7 @@ class Daemon {
       facts.not_taken[Reason::CORRUPT] = 1;
       return facts;
     };
+    core_.transport = {&connections_, &everyone_};
     core_.process = [] { return rpc::ProcessFacts{1, 2}; };
     services_.push_back(rpc::make_map_service(core_, gateway_));
     services_.push_back(rpc::make_ingest_service(core_, gateway_));
