@@ -158,13 +158,14 @@ TEST_F(LimitsTest, WhoWaitsUntilAllIsDoneHoldsUpNeitherQuestionsNorEdits) {
   constexpr int kWaits = 16;
   std::atomic<bool> done = false;
   std::atomic<int> inside = 0, most = 0, refused = 0;
+  std::vector<std::unique_ptr<client::Client>> clients;  // who connects asks something that counts among the four calls
+  for (int i = 0; i < kWaits; ++i) clients.push_back(client::Client::connect(folder_ / "map").or_throw());
   std::vector<std::thread> waits;
-  for (int i = 0; i < kWaits; ++i)
-    waits.emplace_back([&] {
-      const auto client = client::Client::connect(folder_ / "map").or_throw();
+  for (const auto& client : clients)
+    waits.emplace_back([&, waiting = client.get()] {
       while (!done) {
         most = std::max<int>(most, ++inside);
-        refused += client->wait_idle().reason() == Reason::BUDGET_EXCEEDED;
+        refused += waiting->wait_idle().reason() == Reason::BUDGET_EXCEEDED;
         --inside;
       }
     });
@@ -179,6 +180,22 @@ TEST_F(LimitsTest, WhoWaitsUntilAllIsDoneHoldsUpNeitherQuestionsNorEdits) {
   for (std::thread& wait : waits) wait.join();
   EXPECT_EQ(refused, 0) << "they have a limit of their own";
   EXPECT_EQ(robot.wait(kPatience), 0);
+  EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
+}
+
+// A shell allows 1,024 files or fewer unless it is asked; the daemon takes as many as it may.
+TEST_F(LimitsTest, TheDaemonTakesAllTheFilesThatItMay) {
+  program_ = folder_ / "soft-limit";
+  std::ofstream(program_) << "#!/bin/sh\nulimit -Sn 256\nexec " << built_program("relmapd") << " \"$@\"\n";
+  ASSERT_EQ(chmod(program_.c_str(), 0700), 0);
+  serve("");
+  rlimit files{}, ours{};
+  ASSERT_EQ(prlimit(daemon_->process().pid(), RLIMIT_NOFILE, nullptr, &files), 0);
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &ours), 0);
+  EXPECT_EQ(files.rlim_cur, ours.rlim_max);
+  auto some = connect(400, 65535);
+  EXPECT_TRUE(client_->status().or_throw().connections.ok());
+  EXPECT_EQ(open(some), 400);
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 
@@ -243,14 +260,20 @@ TEST_F(LongLimits, ThousandsAtOnceKeepNobodyOut) {
   for (RawHttp2& one : halves) one.call(kStatus, std::string(20, 'x'), 10);
   auto stalled = connect(1000, 0);
   for (RawHttp2& one : stalled) one.call(kExport, kGraph);
+  record_simulation(folder_ / "long", {"--seed", "2", "--pairs", "200", "--laps", "1"});
+  Process robot({built_program("relmap-frontend"), folder_ / "long", "--robot", "barrow", "--server", folder_ / "map",
+                 "--spool", "none", "--quiet"},
+                {});
+  std::vector<std::unique_ptr<client::Client>> clients;
+  for (int i = 0; i < 16; ++i) clients.push_back(client::Client::connect(folder_ / "map").or_throw());
   std::atomic<bool> done = false;
   std::vector<std::thread> waits;
-  for (int i = 0; i < 16; ++i)
-    waits.emplace_back([&] {
-      const auto client = client::Client::connect(folder_ / "map").or_throw();
-      while (!done) (void)client->wait_idle();
+  for (const auto& client : clients)
+    waits.emplace_back([&done, waiting = client.get()] {
+      while (!done) (void)waiting->wait_idle();
     });
   expect_answers(500);
+  EXPECT_GT(running(stalled), 0);
   const auto backup = client_->backup(folder_ / "backups/one", [](const auto&) { return true; });
   EXPECT_TRUE(backup.ok()) << backup.status().to_string();
   expect_answers(500);
@@ -259,6 +282,7 @@ TEST_F(LongLimits, ThousandsAtOnceKeepNobodyOut) {
   EXPECT_EQ(open(stalled), 1000);
   done = true;
   for (std::thread& wait : waits) wait.join();
+  EXPECT_EQ(robot.wait(kPatience), 0);
   EXPECT_EQ(daemon_->stop(), 0) << daemon_->log();
 }
 
