@@ -355,12 +355,14 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   storage::Edge by_appearance = closure;
   by_appearance.verification = storage::Verification::kEpipolar;
   EXPECT_FALSE(ingest::closure_news(*view, by_appearance)) << "it has no transform";
-  PoseNews news = ingest::closure_news(*view, closure).value();
+  const auto told = ingest::closure_news(*view, closure).value();
+  EXPECT_EQ(told.robot, header().robot);
+  PoseNews news = told.news;
   EXPECT_EQ(news.kind, PoseNews::Kind::kClosure);
   closure.state = storage::EdgeState::kCandidate;
-  EXPECT_EQ(ingest::closure_news(*view, closure)->kind, PoseNews::Kind::kLocalised);
+  EXPECT_EQ(ingest::closure_news(*view, closure)->news.kind, PoseNews::Kind::kLocalised);
   closure.state = storage::EdgeState::kRemoved;
-  EXPECT_EQ(ingest::closure_news(*view, closure)->kind, PoseNews::Kind::kClosureOut);
+  EXPECT_EQ(ingest::closure_news(*view, closure)->news.kind, PoseNews::Kind::kClosureOut);
   const auto deadline = steady_clock::now() + kPatience;
   const auto count = [&] {
     const std::lock_guard lock(mutex);

@@ -209,16 +209,18 @@ void PublisherCore::want_missing(const Acknowledgement& ack, Time now) {
       lost ? std::max(kMinWindow, window_bytes_ * 3 / 4) : std::min(kMaxWindow, window_bytes_ + kMinWindow / 2);
 }
 
+PublisherCore::Progress PublisherCore::progress_of(const Acknowledgement& ack, Time now) {
+  if (ack.next_sequence >= acknowledged_) return Progress::kAhead;
+  if (!behind_since_) behind_since_ = now;
+  return now - *behind_since_ < kOvertaken ? Progress::kOvertaken : Progress::kForgotten;
+}
+
 void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (ack.session != session_ || past_boots_.count(ack.boot)) return;
   if (!maps_.believes(ack.boot, now)) return;
   const bool fresh_boot = !boot_ || *boot_ != ack.boot;
-  if (fresh_boot || ack.next_sequence >= acknowledged_)
-    behind_since_.reset();
-  else if (!behind_since_)
-    behind_since_ = now;
-  const bool forgotten = behind_since_ && now - *behind_since_ >= kOvertaken;
-  if (behind_since_ && !forgotten) return;  // a newer one overtook it
+  const Progress progress = fresh_boot ? Progress::kAhead : progress_of(ack, now);
+  if (progress == Progress::kOvertaken) return;
   behind_since_.reset();
   last_ack_ = now;
   if (fresh_boot) adopt_boot(ack.boot);
@@ -231,7 +233,7 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
     if (it->second.settled && it->second.refused == Reason::OK) ++counts_.refused[refused.reason];
     it->second.refused = refused.reason;
   }
-  if (fresh_boot || forgotten) {
+  if (fresh_boot || progress == Progress::kForgotten) {
     unsettle_from(ack.next_sequence);
     fill_holes(ack.next_sequence, maps_.restored(ack.boot) ? Reason::MAP_RESTORED : Reason::DROPPED_BY_ROBOT);
   }

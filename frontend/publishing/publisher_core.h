@@ -116,7 +116,14 @@ class PublisherCore {
     Reason refused = Reason::OK;
   };
   using Items = std::map<std::uint32_t, Item>;
+  // What the daemon has settled, against what it had when it was heard last.
+  enum class Progress {
+    kAhead,      // as much or more
+    kOvertaken,  // less: a newer acknowledgement overtook this one
+    kForgotten,  // less, and has been for a while: it has forgotten a session of which it had only refused keyframes
+  };
 
+  Progress progress_of(const Acknowledgement& ack, Time now);
   void adopt_boot(const BootId& boot);
   void settle_below(std::uint64_t next);
   void unsettle_from(std::uint64_t next);

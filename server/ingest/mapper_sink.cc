@@ -10,10 +10,11 @@ std::size_t MapperSink::free_bytes() const {
   return allowed - std::min(allowed, budget.used(storage::Share::kQueues));
 }
 
-std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure) {
+std::optional<ClosureNews> closure_news(const storage::Graph& map, const storage::Edge& closure) {
   const auto session = map.session(closure.b.session);
   if (!session || !storage::is_metric(closure.verification)) return std::nullopt;
-  PoseNews news;
+  ClosureNews told{{}, session->header.robot};
+  PoseNews& news = told.news;
   news.session = session->header.uuid;
   news.kind = closure.state == storage::EdgeState::kAccepted    ? PoseNews::Kind::kClosure
               : closure.state == storage::EdgeState::kCandidate ? PoseNews::Kind::kLocalised
@@ -22,7 +23,7 @@ std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::E
   news.frame = closure.a;
   news.T_frame_keyframe = closure.T_ab;
   news.covariance = closure.covariance;
-  return news;
+  return told;
 }
 
 }  // namespace relmap::ingest

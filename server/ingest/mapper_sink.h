@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "proto/keyframe/ingest_messages.h"
 #include "server/intake/keyframe_sink.h"
@@ -32,8 +33,12 @@ class MapperSink final : public intake::KeyframeSink {
   map::Mapper& mapper_;
 };
 
-// News of a closure for the robot whose keyframe is its newer end. `map` and `closure` are as passed to Mapper's
-// watcher. Nullopt if the closure has no transform in metres.
-std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure);
+struct ClosureNews {
+  PoseNews news;
+  std::string robot;  // whose keyframe is the newer end of the closure
+};
+// What a robot is told of a closure. `map` and `closure` are as passed to Mapper's watcher. Nullopt if the closure has
+// no transform in metres.
+std::optional<ClosureNews> closure_news(const storage::Graph& map, const storage::Edge& closure);
 
 }  // namespace relmap::ingest

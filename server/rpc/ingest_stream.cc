@@ -153,21 +153,26 @@ bool IngestStream::is_for_us(const SessionUuid& session, const std::string& robo
   return own.empty() || own == robot;
 }
 
+// A caller who is no longer known hears the end of the stream instead.
+bool IngestStream::may_hear(const SessionUuid& session, const std::string& robot) {
+  if (ending_ || !is_for_us(session, robot)) return false;
+  const Status known = call_.check_caller();
+  if (known.ok()) return true;
+  ending_ = known;
+  go_on();
+  return false;
+}
+
 void IngestStream::hear(const Acknowledgement& ack, const std::string& robot) {
   const MutexLock lock(mutex_);
-  if (ending_ || !is_for_us(ack.session, robot)) return;
-  if (const Status known = call_.check_caller(); !known.ok()) ending_ = known;
-  if (!ending_) acknowledgements_.insert_or_assign(ack.session, ack);
+  if (!may_hear(ack.session, robot)) return;
+  acknowledgements_.insert_or_assign(ack.session, ack);
   go_on();
 }
 
 void IngestStream::hear(const PoseNews& news, const std::string& robot) {
   const MutexLock lock(mutex_);
-  if (ending_ || !is_for_us(news.session, robot) || replies_.size() >= kMaxReplies) return;
-  if (const Status known = call_.check_caller(); !known.ok()) {
-    ending_ = known;
-    return go_on();
-  }
+  if (!may_hear(news.session, robot) || replies_.size() >= kMaxReplies) return;
   replies_.push_back(news_message(news));
   go_on();
 }

@@ -45,6 +45,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   void read_next();
   void hear(const Acknowledgement& ack, const std::string& robot);
   void hear(const PoseNews& news, const std::string& robot);
+  bool may_hear(const SessionUuid& session, const std::string& robot) RELMAP_REQUIRES(mutex_);
   bool is_for_us(const SessionUuid& session, const std::string& robot) const RELMAP_REQUIRES(mutex_);
   void end(const Status& status);
   void go_on() RELMAP_REQUIRES(mutex_);

@@ -122,8 +122,8 @@ class Daemon {
     options.map = mapper_->identity();
     intake_ = std::make_unique<intake::IngestServer>(sink_, mapper_->budget(), BootId{4, 2}, std::move(options));
     mapper_->watch_closures([this](const storage::Graph& graph, const storage::Edge& closure) {
-      if (auto news = ingest::closure_news(graph, closure))
-        intake_->tell(std::move(*news), graph.session(closure.b.session)->header.robot);
+      if (auto told = ingest::closure_news(graph, closure))
+        intake_->tell(std::move(told->news), std::move(told->robot));
     });
     core_.intake.server = intake_.get();
     core_.intake.facts = [] {
