@@ -227,7 +227,8 @@ class FaultyRun {
             " answers to readers, the first of them: " + reader.refusals().front());
     if (fault_.hang.count() == 0 || !course_.hit_at_work) return;
     if (course_.meanwhile == 0) wrong("no reader was answered meanwhile");
-    if (course_.slowest > fault_.hang / 2)
+    // Within a second where it hangs for a minute; other runs share this machine with whatever else it does.
+    if (course_.slowest > fault_.hang / (fault_.hang >= seconds(60) ? 60 : 5))
       wrong("a reader waited for " + std::to_string(course_.slowest.count()) + " ms");
   }
 
@@ -285,14 +286,12 @@ class FaultyRun {
     const std::string log = daemon.log();
     course_.last_words = "exit code " + std::to_string(code) + ": " +
                          log.substr(std::min(log.size(), log.size() - std::min<std::size_t>(log.size(), 400)));
-    static const std::regex kReason(R"(\[(error|critical)\][^\n]* ?([A-Z_]{5,}): [^\n]+)");
-    bool reason = false, internal = false;
+    static const std::regex kReason(R"(\[(?:error|critical)\] (?:[^\n]*[ :])?([A-Z_]{5,}): [^\n]+)");
+    bool reason = false;
     for (std::sregex_iterator found(log.begin(), log.end(), kReason); found != std::sregex_iterator(); ++found)
-      ((*found)[2] == "INTERNAL" ? internal : reason) = true;
-    // gRPC and protobuf do not survive that memory runs out in what they call: the daemon aborts, and says so.
-    const bool aborted = fault_.kind == FaultKind::kAllocation && code == 128 + SIGABRT && internal;
-    if ((code < 0 || code >= 128) && !aborted) wrong("crashed, or does not stop: " + course_.last_words);
-    if (!reason && !aborted) wrong("ended without a reason: " + course_.last_words);
+      reason = reason || (*found)[1] != "INTERNAL";
+    if (code < 0 || code >= 128) wrong("crashed, or does not stop: " + course_.last_words);
+    if (!reason) wrong("ended without a reason: " + course_.last_words);
   }
 
   void without_it() {
@@ -402,8 +401,10 @@ class NthFailure : public ::testing::Test {
     return chosen;
   }
 
+  enum class When { kAtWork, kAtTheStart };
+
   // So many runs at a time.
-  static void run(const std::vector<Fault>& all, std::size_t at_once = 1) {
+  static void run(const std::vector<Fault>& all, std::size_t at_once = 1, When when = When::kAtWork) {
     std::atomic<std::size_t> next{0};
     std::vector<std::future<std::vector<Course>>> workers;
     for (std::size_t worker = 0; worker < at_once; ++worker)
@@ -436,7 +437,7 @@ class NthFailure : public ::testing::Test {
         static_cast<unsigned long long>(meanwhile), static_cast<long long>(slowest.count()),
         longest_with.to_string().c_str(), static_cast<long long>(longest.count()));
     EXPECT_GT(reads, 0u);
-    EXPECT_GT(at_work, 0u);
+    EXPECT_TRUE(at_work > 0 || when == When::kAtTheStart);
   }
 
   // No two runs do the same number of operations, since the journal's thread syncs together what has come in, and
@@ -462,6 +463,13 @@ TEST_F(LongNthFailure, Write) { run(faults(FaultKind::kWrite, 0, EIO), 2); }
 TEST_F(LongNthFailure, WriteOnAFullDisk) { run(faults(FaultKind::kWrite, 0, ENOSPC), 2); }
 TEST_F(LongNthFailure, Sync) { run(faults(FaultKind::kSync, 0, EIO), 2); }
 TEST_F(LongNthFailure, Allocation) { run(faults(FaultKind::kAllocation, 1000, ENOMEM), 2); }
+// Every one until the daemon serves.
+TEST_F(LongNthFailure, AllocationAtTheStart) {
+  std::vector<Fault> all;
+  for (std::uint64_t n = 1; n <= without().before_work[static_cast<std::size_t>(FaultKind::kAllocation)]; ++n)
+    all.push_back({FaultKind::kAllocation, n, ENOMEM});
+  run(all, 2, When::kAtTheStart);
+}
 TEST_F(LongNthFailure, Hang) { run(hangs(0, seconds(60)), 12); }
 
 }  // namespace

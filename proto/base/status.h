@@ -40,6 +40,10 @@ class StatusError : public std::runtime_error {
   Status status_;
 };
 
+// Within a handler of exceptions: the status of the one that is handled. A StatusError's own, BUDGET_EXCEEDED where
+// memory ran out, INTERNAL for all others.
+Status caught_status();
+
 inline void throw_if(const Status& status) {
   if (!status.ok()) throw StatusError(status);
 }

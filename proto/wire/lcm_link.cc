@@ -74,9 +74,9 @@ Result<std::unique_ptr<LcmLink>> LcmLink::open(const std::string& url, Handlers 
   if (Status s = probe_multicast(*complete); !s.ok()) return s;
   auto impl = std::make_unique<Impl>(*complete, is_replay(*complete), std::move(handlers), queue_bytes);
   if (!impl->subscribe()) return {Reason::IO_ERROR, "LCM cannot open " + *complete};
-  Impl* const running = impl.get();
-  impl->thread = std::thread([running] { running->run(); });
-  return std::unique_ptr<LcmLink>(new LcmLink(std::move(impl)));
+  std::unique_ptr<LcmLink> link(new LcmLink(std::move(impl)));
+  link->impl_->thread = std::thread([running = link->impl_.get()] { running->run(); });
+  return link;
 }
 
 LcmLink::~LcmLink() { stop(); }

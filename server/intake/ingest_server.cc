@@ -304,8 +304,11 @@ class IngestServer::Entry : public IngestServer::Subscription {
   const std::uint64_t id_;
 };
 
+IngestServer::IngestServer(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+// Delegates so that the destructor ends the threads that run already if one cannot be started.
 IngestServer::IngestServer(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IngestServerOptions options)
-    : impl_(std::make_shared<Impl>(sink, budget, boot, std::move(options))) {
+    : IngestServer(std::make_shared<Impl>(sink, budget, boot, std::move(options))) {
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
   impl_->parts_thread = std::thread([impl = impl_.get()] { impl->serve_parts(); });
   impl_->map_thread = std::thread([impl = impl_.get()] { impl->read_map(); });

@@ -70,6 +70,7 @@ class IngestServer {
  private:
   struct Impl;
   class Entry;
+  explicit IngestServer(std::shared_ptr<Impl> impl);
   std::shared_ptr<Impl> impl_;
 };
 

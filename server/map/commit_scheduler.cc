@@ -88,8 +88,8 @@ void CommitScheduler::begin() {
       }
       hooks_.on_change();
     });
-  } catch (const std::exception& error) {
-    begun = {Reason::INTERNAL, error.what()};
+  } catch (const std::exception&) {
+    begun = caught_status();
   }
   budget_->set(storage::Share::kEngine, engine_->memory_bytes());
   if (begun.ok()) return;

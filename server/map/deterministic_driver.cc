@@ -24,10 +24,8 @@ DeterministicDriver::Outcome DeterministicDriver::follow_up(std::uint64_t sequen
       if (!append_and_apply(*removal, outcome)) break;
       relax(kSlices, outcome);
     }
-  } catch (const StatusError& error) {
-    outcome.trouble = error.status();
-  } catch (const std::exception& error) {
-    outcome.trouble = Status(Reason::INTERNAL, error.what());
+  } catch (const std::exception&) {
+    outcome.trouble = caught_status();
   }
   return outcome;
 }

@@ -128,8 +128,8 @@ Result<std::uint64_t> JournalWriter::append(std::span<const Queued> group) try {
   const std::uint64_t acknowledged = durable_through();
   for (const Queued& queued : group) records.push_back(storage::encode_record(queued.record, acknowledged));
   return engine_->append(epoch_, records);
-} catch (const std::exception& error) {
-  return Status(Reason::INTERNAL, error.what());
+} catch (const std::exception&) {
+  return caught_status();
 }
 
 void JournalWriter::refuse(std::vector<Queued> group, const Status& why) {

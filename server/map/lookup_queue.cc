@@ -8,7 +8,6 @@
 #include <exception>
 #include <iterator>
 #include <limits>
-#include <system_error>
 #include <utility>
 
 #include "proto/base/mutex.h"
@@ -43,7 +42,7 @@ void LookupQueue::start(std::size_t threads, LookUp look_up, Journal journal, st
       threads_.emplace_back([this] { run(); });
       const MutexLock lock(mutex_);
       ++running_;
-    } catch (const std::system_error& error) {
+    } catch (const std::exception& error) {  // no more threads, or no memory
       if (threads_.empty()) throw;
       spdlog::warn("{} of {} threads recognise places: {}", i, threads, error.what());
       return;

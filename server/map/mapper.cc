@@ -361,11 +361,8 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::Jour
   Applied result;
   try {
     result = builder->apply(sequence, record, std::move(prepared));
-  } catch (const StatusError& error) {
-    return fail("journal record " + std::to_string(sequence) + " could not be applied", error.status());
-  } catch (const std::exception& error) {
-    return fail("journal record " + std::to_string(sequence) + " could not be applied",
-                {Reason::INTERNAL, error.what()});
+  } catch (const std::exception&) {
+    return fail("journal record " + std::to_string(sequence) + " could not be applied", caught_status());
   }
   if (const std::string line = log_line(*map, record, result); !line.empty()) spdlog::info("{}", line);
   note_applied(sequence, record, result);
@@ -443,6 +440,8 @@ void Mapper::Impl::fail(const std::string& what, const Status& why) {
   std::string advice = "start the daemon again when the disk is well";
   if (why.reason() == Reason::DATA_LOSS || why.reason() == Reason::IO_ERROR)
     advice = "stop the daemon and run relmap-admin repair " + options.folder;
+  else if (why.reason() == Reason::BUDGET_EXCEEDED)
+    advice = "start the daemon again with more memory (memory_budget_mb, or of the machine)";
   const Status status(Reason::READ_ONLY, what + ": " + why.to_string() + "; " + advice);
   spdlog::critical("the map is read-only: {}", status.message());
   commits.close();
@@ -534,7 +533,7 @@ Status Mapper::Impl::stop() {
     stopping = true;
     changed.notify_all();
   }
-  worker.join();
+  if (worker.joinable()) worker.join();  // start() may have failed before it began
   if (recognition)
     if (const Status saved = recognition->save(); !saved.ok())
       spdlog::warn("the next start reads more of the map for its place index: {}", saved.to_string());
@@ -551,13 +550,12 @@ Result<std::unique_ptr<Mapper>> Mapper::open(std::shared_ptr<storage::Engine> en
   auto impl = std::make_unique<Impl>(std::move(engine), std::move(budget), std::move(vocabulary), options);
   try {
     if (Status loaded = impl->load(); !loaded.ok()) return loaded;
-  } catch (const StatusError& error) {
-    return error.status();
-  } catch (const std::exception& error) {
-    return Status(Reason::INTERNAL, error.what());
+  } catch (const std::exception&) {
+    return caught_status();
   }
-  impl->start();
-  return std::unique_ptr<Mapper>(new Mapper(std::move(impl)));
+  std::unique_ptr<Mapper> mapper(new Mapper(std::move(impl)));
+  mapper->impl_->start();  // if it throws, the destructor ends the threads that run already
+  return mapper;
 }
 
 Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) { return impl_->sessions.begin(header); }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <exception>
 #include <iterator>
-#include <system_error>
 #include <utility>
 #include <variant>
 
@@ -15,7 +14,7 @@ RecordQueue::RecordQueue(storage::WordFunction words, std::shared_ptr<storage::B
     : words_(std::move(words)), budget_(std::move(budget)), max_ahead_(4 * threads) {
   for (std::size_t i = 0; i < threads; ++i) try {
       threads_.emplace_back([this] { run(); });
-    } catch (const std::system_error& error) {  // the worker prepares what no thread does
+    } catch (const std::exception& error) {  // no more threads, or no memory: the worker prepares what no thread does
       spdlog::warn("{} of {} threads prepare keyframes: {}", i, threads, error.what());
       return;
     }

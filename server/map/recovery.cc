@@ -25,10 +25,8 @@ Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& b
       return true;
     });
     if (replayed.trouble.ok()) replayed.trouble = read;
-  } catch (const StatusError& error) {
-    replayed.trouble = error.status();
-  } catch (const std::exception& error) {
-    replayed.trouble = Status(Reason::INTERNAL, error.what());
+  } catch (const std::exception&) {
+    replayed.trouble = caught_status();
   }
   return replayed;
 }

@@ -337,16 +337,4 @@ grpc::Status Call::end(const Status& status) {
   return to_grpc(status, request_id_);
 }
 
-Status Call::from_current_exception() {
-  try {
-    throw;
-  } catch (const StatusError& error) {
-    return error.status();
-  } catch (const std::bad_alloc&) {
-    return {Reason::BUDGET_EXCEEDED, "out of memory"};
-  } catch (const std::exception& error) {
-    return {Reason::INTERNAL, error.what()};
-  }
-}
-
 }  // namespace relmap::rpc

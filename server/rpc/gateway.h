@@ -149,7 +149,6 @@ class Call {
  private:
   friend class Gateway;
 
-  static Status from_current_exception();
   Status admit_caller(std::size_t bytes);
   Status check_role(const Identity& caller) const;
   void leave();
@@ -178,7 +177,7 @@ Status Call::guarded(Body body) {
   try {
     return body();
   } catch (...) {
-    return from_current_exception();
+    return caught_status();
   }
 }
 

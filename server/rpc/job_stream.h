@@ -77,12 +77,8 @@ class JobStream {
     Status end;
     try {
       end = job(*this);
-    } catch (const StatusError& error) {
-      end = error.status();
-    } catch (const std::bad_alloc&) {
-      end = {Reason::BUDGET_EXCEEDED, "out of memory"};
-    } catch (const std::exception& error) {
-      end = {Reason::INTERNAL, error.what()};
+    } catch (const std::exception&) {
+      end = caught_status();
     }
     const MutexLock lock(mutex_);
     end_ = std::move(end);

@@ -4,7 +4,8 @@
 
 namespace relmap::rpc {
 
-TaskPool::TaskPool(int threads) {
+// Delegates so that the destructor ends the threads that run already if one cannot be started.
+TaskPool::TaskPool(int threads) : TaskPool() {
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { run(); });
 }
 

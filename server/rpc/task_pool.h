@@ -23,6 +23,7 @@ class TaskPool {
   void post(std::function<void()> task);
 
  private:
+  TaskPool() = default;
   void run();
 
   Mutex mutex_;

@@ -163,7 +163,13 @@ Result<std::uint64_t> JournalLog::append(std::span<const Bytes> records) {
     if (Status begun = begin_segment(); !begun.ok()) return begun;
   }
   if (records.empty()) return last_;
-  if (Status written = write(records); !written.ok()) {
+  Status written;
+  try {
+    written = write(records);
+  } catch (const std::exception&) {
+    written = caught_status();
+  }
+  if (!written.ok()) {
     leave_segment();
     return written;
   }

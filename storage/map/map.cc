@@ -28,7 +28,7 @@ Map::Map(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Map::~Map() {
   if (impl_->committing) {
-    impl_->committing->written.wait();
+    if (impl_->committing->written.valid()) impl_->committing->written.wait();
     impl_->budget->release(Share::kCache, impl_->committing->cache_bytes);
   }
   impl_->budget->release(Share::kDirty, impl_->dirty_bytes + impl_->spare_bytes);

@@ -253,16 +253,18 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   write_all(*batch);  // while the commit before, which it builds upon, is still being written
   if (const auto before = finish_commit(); before && !before->ok()) return *before;
 
-  committing = std::make_unique<Commit>();
+  auto commit = std::make_unique<Commit>();
+  for (const SessionNumber number : dirty_sessions) commit->sessions.push_back(*place_of(sessions, number));
+  commit->labels = labels;
+  commit->skipped = skipped;
+  commit->batch = batch;
+  // From here on what is dirty is the commit's, and finish_commit() gives it back whatever fails.
+  committing = std::move(commit);
   committing->chunks = std::exchange(dirty, {});
   committing->bytes = dirty_bytes;
-  for (const SessionNumber number : std::exchange(dirty_sessions, {}))
-    committing->sessions.push_back(*place_of(sessions, number));
-  committing->labels = labels;
-  committing->skipped = skipped;
+  dirty_sessions.clear();
   committing->pending = state.pending.take_changes();
   committing->edits = std::exchange(changed_edits, {});
-  committing->batch = batch;
   // The encoded bytes and the engine's copy of them take memory from the cache, but no more than the cache holds:
   // charging more would refuse others memory that is needed for a moment only.
   std::size_t encoded = 0;
@@ -274,8 +276,8 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
     const auto caught = [](const auto& step) -> Status {
       try {
         return step();
-      } catch (const std::exception& error) {
-        return {Reason::INTERNAL, error.what()};
+      } catch (const std::exception&) {
+        return caught_status();
       }
     };
     const Status status = caught([&] { return engine->commit(epoch, applied, batch->puts, batch->deletes); });
@@ -293,7 +295,8 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
 std::optional<Status> Map::Impl::finish_commit() {
   if (!committing) return std::nullopt;
   publish();
-  const Status status = committing->written.get();
+  const Status status =
+      committing->written.valid() ? committing->written.get() : Status(Reason::BUDGET_EXCEEDED, "out of memory");
   const std::unique_ptr<Commit> commit = std::move(committing);
   budget->release(Share::kCache, commit->cache_bytes);
   if (!status.ok()) {

@@ -88,7 +88,7 @@ struct Map::Impl {
     std::set<std::uint64_t> edits;
     std::shared_ptr<Batch> batch;
     std::size_t cache_bytes = 0;  // charged to the cache's share for the batch
-    std::future<Status> written;
+    std::future<Status> written;  // not valid if there was no memory to begin
   };
   std::unique_ptr<Commit> committing;
 

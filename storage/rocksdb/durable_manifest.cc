@@ -11,7 +11,7 @@ class DurableManifest final : public rocksdb::FileSystemWrapper {
   const char* Name() const override { return "DurableManifest"; }
 
   rocksdb::IOStatus RenameFile(const std::string& from, const std::string& to, const rocksdb::IOOptions& options,
-                               rocksdb::IODebugContext* dbg) override {
+                               rocksdb::IODebugContext* dbg) noexcept override {
     if (to.ends_with("/CURRENT")) {
       std::unique_ptr<rocksdb::FSDirectory> folder;
       auto synced = target()->NewDirectory(folder_of(to), options, &folder, dbg);

@@ -52,12 +52,13 @@ class LossyInfoLog final : public rocksdb::FileSystemWrapper {
 
   // The wrapper's would write to a file that the wrapped file system opens by itself.
   rocksdb::IOStatus NewLogger(const std::string& path, const rocksdb::IOOptions& options,
-                              std::shared_ptr<rocksdb::Logger>* result, rocksdb::IODebugContext* dbg) override {
+                              std::shared_ptr<rocksdb::Logger>* result,
+                              rocksdb::IODebugContext* dbg) noexcept override {
     return FileSystem::NewLogger(path, options, result, dbg);
   }
   rocksdb::IOStatus NewWritableFile(const std::string& path, const rocksdb::FileOptions& options,
                                     std::unique_ptr<rocksdb::FSWritableFile>* result,
-                                    rocksdb::IODebugContext* dbg) override {
+                                    rocksdb::IODebugContext* dbg) noexcept override {
     const auto status = target()->NewWritableFile(path, options, result, dbg);
     if (status.ok() && path.ends_with("/LOG")) *result = std::make_unique<LossyFile>(std::move(*result));
     return status;

@@ -10,7 +10,7 @@ using rocksdb::IOStatus;
 using rocksdb::Slice;
 
 // Leaves out the subcode for a full disk, which would make RocksDB wait for room in a thread of its own.
-IOStatus marked(const IOStatus& status) {
+IOStatus marked(const IOStatus& status) noexcept {
   if (!status.IsIOError()) return status;
   IOStatus again = IOStatus::IOError(status.getState() ? status.getState() : "");
   again.SetRetryable(true);
@@ -93,28 +93,29 @@ class RetryableFiles final : public rocksdb::FileSystemWrapper {
   const char* Name() const override { return "RetryableFiles"; }
 
   IOStatus NewWritableFile(const std::string& name, const FileOptions& options,
-                           std::unique_ptr<rocksdb::FSWritableFile>* result, IODebugContext* dbg) override {
+                           std::unique_ptr<rocksdb::FSWritableFile>* result, IODebugContext* dbg) noexcept override {
     const IOStatus status = target()->NewWritableFile(name, options, result, dbg);
     if (!status.ok()) return marked(status);
     *result = std::make_unique<RetryableFile>(std::move(*result));
     return status;
   }
   IOStatus ReopenWritableFile(const std::string& name, const FileOptions& options,
-                              std::unique_ptr<rocksdb::FSWritableFile>* result, IODebugContext* dbg) override {
+                              std::unique_ptr<rocksdb::FSWritableFile>* result, IODebugContext* dbg) noexcept override {
     const IOStatus status = target()->ReopenWritableFile(name, options, result, dbg);
     if (!status.ok()) return marked(status);
     *result = std::make_unique<RetryableFile>(std::move(*result));
     return status;
   }
   IOStatus NewRandomAccessFile(const std::string& name, const FileOptions& options,
-                               std::unique_ptr<rocksdb::FSRandomAccessFile>* result, IODebugContext* dbg) override {
+                               std::unique_ptr<rocksdb::FSRandomAccessFile>* result,
+                               IODebugContext* dbg) noexcept override {
     const IOStatus status = target()->NewRandomAccessFile(name, options, result, dbg);
     if (!status.ok()) return marked(status);
     *result = std::make_unique<RetryableReads>(std::move(*result));
     return status;
   }
   IOStatus NewDirectory(const std::string& name, const IOOptions& options,
-                        std::unique_ptr<rocksdb::FSDirectory>* result, IODebugContext* dbg) override {
+                        std::unique_ptr<rocksdb::FSDirectory>* result, IODebugContext* dbg) noexcept override {
     const IOStatus status = target()->NewDirectory(name, options, result, dbg);
     if (!status.ok()) return marked(status);
     *result = std::make_unique<RetryableDirectory>(std::move(*result));

@@ -4,6 +4,7 @@
 #include <rocksdb/db.h>
 #include <rocksdb/write_batch.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "proto/base/mutex.h"
@@ -60,10 +61,13 @@ class RocksDbSnapshot final : public EngineSnapshot {
     read.readahead_size = 256 * 1024;
     read.fill_cache = false;
     std::vector<std::unique_ptr<rocksdb::Iterator>> families;
+    const auto read_family = [&](rocksdb::ColumnFamilyHandle* family) {
+      families.push_back(std::unique_ptr<rocksdb::Iterator>(database_->db().NewIterator(read, family)));
+    };
     if (prefix.empty())
-      for (auto* family : database_->map->families()) families.emplace_back(database_->db().NewIterator(read, family));
+      std::for_each(database_->map->families().begin(), database_->map->families().end(), read_family);
     else
-      families.emplace_back(database_->db().NewIterator(read, database_->map->family(prefix)));
+      read_family(database_->map->family(prefix));
     for (const auto& it : families) it->Seek(std::max(from, std::string_view(&kFirstMapByte, 1)));
     for (;;) {
       rocksdb::Iterator* next = nullptr;

@@ -39,7 +39,7 @@ class TornManifest final : public rocksdb::FileSystemWrapper {
 
   rocksdb::IOStatus NewSequentialFile(const std::string& path, const rocksdb::FileOptions& options,
                                       std::unique_ptr<rocksdb::FSSequentialFile>* file,
-                                      rocksdb::IODebugContext* dbg) override {
+                                      rocksdb::IODebugContext* dbg) noexcept override {
     if (!*forgive_ || path.substr(path.rfind('/') + 1).rfind("MANIFEST-", 0) != 0)
       return target()->NewSequentialFile(path, options, file, dbg);
     std::string all;

@@ -723,24 +723,29 @@ long syscall(long number, ...) {
 
 }  // extern "C"
 
-// Memory that the program itself asks for.
+// Memory that the program itself asks for. Where it fails, the program's own handler is called, as by the library; what
+// a handler may have made free is not tried.
+[[noreturn]] static void fail_to_allocate() {
+  if (const std::new_handler handler = std::get_new_handler()) handler();
+  throw std::bad_alloc();
+}
 #define ALLOCATE(TYPE, SYMBOL, ...)                                               \
   static TYPE* const found = reinterpret_cast<TYPE*>(::dlsym(RTLD_NEXT, SYMBOL)); \
   return found(__VA_ARGS__)
 
 void* operator new(std::size_t size) {
-  if (allocated(__builtin_return_address(0)) == nullptr) throw std::bad_alloc();
+  if (allocated(__builtin_return_address(0)) == nullptr) fail_to_allocate();
   ALLOCATE(New, "_Znwm", size);
 }
 void* operator new[](std::size_t size) {
-  if (allocated(__builtin_return_address(0)) == nullptr) throw std::bad_alloc();
+  if (allocated(__builtin_return_address(0)) == nullptr) fail_to_allocate();
   ALLOCATE(New, "_Znam", size);
 }
 void* operator new(std::size_t size, std::align_val_t alignment) {
-  if (allocated(__builtin_return_address(0)) == nullptr) throw std::bad_alloc();
+  if (allocated(__builtin_return_address(0)) == nullptr) fail_to_allocate();
   ALLOCATE(AlignedNew, "_ZnwmSt11align_val_t", size, alignment);
 }
 void* operator new[](std::size_t size, std::align_val_t alignment) {
-  if (allocated(__builtin_return_address(0)) == nullptr) throw std::bad_alloc();
+  if (allocated(__builtin_return_address(0)) == nullptr) fail_to_allocate();
   ALLOCATE(AlignedNew, "_ZnamSt11align_val_t", size, alignment);
 }

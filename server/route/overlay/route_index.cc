@@ -89,10 +89,8 @@ void RouteIndex::Impl::run() {
     Status trouble;
     try {
       more = work();
-    } catch (const StatusError& error) {
-      trouble = error.status();
-    } catch (const std::exception& error) {
-      trouble = {Reason::INTERNAL, error.what()};
+    } catch (const std::exception&) {
+      trouble = caught_status();
     }
     Clock::duration pause;
     if (trouble.ok()) {
