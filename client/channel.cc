@@ -5,7 +5,10 @@
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/channel_arguments.h>
 
+#include "proto/access/access_list.h"
+#include "proto/access/certificate.h"
 #include "proto/access/credentials.h"
+#include "proto/base/clock.h"
 
 namespace relmap::client {
 
@@ -19,6 +22,20 @@ Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, 
       grpc::SslCredentials({shown->authorities, shown->key, shown->certificate});
   if (!shown->token.empty()) by = grpc::CompositeChannelCredentials(by, grpc::AccessTokenCredentials(shown->token));
   return grpc::CreateCustomChannel(where.address, by, arguments);
+}
+
+std::string other_causes(const ServerAddress& where, const std::string& credentials, const std::string& why) {
+  if (where.is_socket()) return "";
+  if (credentials.empty()) return ", or it serves TLS, and needs --credentials";
+  std::string causes = ", or it and " + credentials + " do not trust each other";
+  const auto shown = access::read_credentials(credentials);
+  const auto facts = shown.ok() && !shown->certificate.empty() ? access::read_certificate(shown->certificate)
+                                                               : Result<access::CertificateFacts>(Status());
+  if (facts.ok() && facts->expires_s <= now_us() / 1'000'000)
+    causes += " (its certificate expired at " + access::time_text(facts->expires_s) + ")";
+  if (why.find("is not in peer certificate") != std::string::npos)
+    causes += " (relmap-admin credentials ca FOLDER --host HOST adds a name or an address to the daemon's certificate)";
+  return causes;
 }
 
 }  // namespace relmap::client

@@ -18,4 +18,8 @@ namespace relmap::client {
 Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, const std::string& credentials,
                                                     const grpc::ChannelArguments& arguments);
 
+// What else may be the cause where nothing answers at this address, and what to do about it: ", or it serves TLS, and
+// needs --credentials". `why` is what gRPC says. Empty at a Unix socket.
+std::string other_causes(const ServerAddress& where, const std::string& credentials, const std::string& why);
+
 }  // namespace relmap::client

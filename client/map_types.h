@@ -394,9 +394,9 @@ struct DaemonStatus {
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;
   bool deterministic = false;
-  // Not ok: why the daemon accepts nothing, nothing over LCM, fewer connections than was configured, or an access list
-  // that is out of date.
-  Status storage, lcm, connections, access;
+  // Not ok: why the daemon accepts nothing, nothing over LCM, fewer connections than was configured, an access list
+  // that is out of date, or soon nobody over TLS.
+  Status storage, lcm, connections, access, certificate;
   std::uint64_t connections_open = 0, connections_refused = 0,
                 connections_displaced = 0;  // the last two: since the start
 

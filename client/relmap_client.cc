@@ -65,13 +65,11 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   if (!channel.ok()) return channel.status();
   auto impl = std::make_unique<Impl>(server, std::move(*channel), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";
-  if (!impl->channel->WaitForConnected(until))
+  if (!impl->channel->WaitForConnected(until)) {
+    const std::string why = why_not(*impl->map);
     return {Reason::UNREACHABLE, "nothing answers at " + where->address + named +
-                                     (where->is_socket() ? ""
-                                      : impl->options.credentials.empty()
-                                          ? ", or it serves TLS, and needs --credentials"
-                                          : ", or it and " + impl->options.credentials + " do not trust each other") +
-                                     why_not(*impl->map)};
+                                     other_causes(*where, impl->options.credentials, why) + why};
+  }
   if (where->boot_id.empty()) return std::unique_ptr<Client>(new Client(std::move(impl)));
 
   // After a crash the file `endpoint` remains, and another daemon may use its port by now.

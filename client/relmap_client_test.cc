@@ -9,6 +9,7 @@
 #include <fstream>
 #include <set>
 
+#include "client/channel.h"
 #include "client/server_address.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.grpc.pb.h"
@@ -155,6 +156,33 @@ class ClientTest : public ::testing::Test {
   std::unique_ptr<grpc::Server> server_;
   const std::filesystem::path folder_;
 };
+
+TEST(Channel, NamesOtherCausesWhereNothingAnswers) {
+  const ServerAddress tcp{"map.lab:1", 0, ""}, socket{"unix:/map/socket", 0, ""};
+  EXPECT_EQ(other_causes(socket, "", "gone"), "");
+  EXPECT_EQ(other_causes(tcp, "", "Socket closed"), ", or it serves TLS, and needs --credentials");
+  EXPECT_EQ(other_causes(tcp, "a.pem", "Socket closed"), ", or it and a.pem do not trust each other");
+  EXPECT_EQ(
+      other_causes(tcp, "a.pem", "Peer name map.lab is not in peer certificate"),
+      ", or it and a.pem do not trust each other (relmap-admin credentials ca FOLDER --host HOST adds a name or an "
+      "address to the daemon's certificate)");
+}
+
+// As another user than the one that runs the daemon.
+TEST(ServerAddress, SaysThatAFolderMayNotBeRead) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  std::string folder = (std::filesystem::temp_directory_path() / "relmap-client-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const auto as_another = [&] {
+    std::filesystem::permissions(folder, std::filesystem::perms::none);
+    if (geteuid() == 0 && seteuid(65534) != 0) std::abort();
+    std::fprintf(stderr, "%s\n", resolve_server(folder + "/map").status().to_string().c_str());
+    std::_Exit(0);
+  };
+  EXPECT_EXIT(as_another(), testing::ExitedWithCode(0), "NOT_ALLOWED: you may not read .*socket_group");
+  std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
+  std::filesystem::remove(folder);
+}
 
 TEST_F(ClientTest, FindsTheDaemonOfADataFolder) {
   write_endpoint(address(), "boot-1");

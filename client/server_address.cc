@@ -1,8 +1,10 @@
 #include "client/server_address.h"
 
+#include <cerrno>
 #include <charconv>
 #include <filesystem>
 #include <fstream>
+#include <system_error>
 
 #include "proto/base/hex.h"
 
@@ -42,13 +44,21 @@ std::string reachable(const std::string& address) {
 }  // namespace
 
 Result<ServerAddress> resolve_server(const std::string& server) {
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(server, ignored)) {
+  std::error_code error;
+  const bool folder = std::filesystem::is_directory(server, error);
+  const auto refused = [&](const std::string& what) -> Status {
+    return {Reason::NOT_ALLOWED,
+            "you may not read " + what +
+                ": run this as the user of the daemon, or let a group use its socket (socket_group)"};
+  };
+  if (error == std::errc::permission_denied) return refused(server);
+  if (!folder) {
     if (is_host_port(server) || server.starts_with("unix:/")) return ServerAddress{server, 0, ""};
     return {Reason::INVALID_ARGUMENT, "'" + server + "' is neither a data folder nor HOST:PORT"};
   }
   const std::string path = server + "/endpoint";
   std::ifstream file(path);
+  if (!file && errno == EACCES) return refused(path);
   if (!file) return {Reason::UNREACHABLE, "no daemon serves " + server + " (there is no " + path + ")"};
   ServerAddress address;
   std::string socket;

@@ -32,6 +32,7 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.lcm = read_state(m.lcm_reason(), m.lcm_message());
   s.connections = read_state(m.connections().reason(), m.connections().message());
   s.access = read_state(m.access_reason(), m.access_message());
+  s.certificate = read_state(m.certificate_reason(), m.certificate_message());
   s.connections_open = m.connections().open();
   s.connections_refused = m.connections().refused();
   s.connections_displaced = m.connections().displaced();

@@ -291,8 +291,12 @@ std::string summary_text(const RunSummary& s) {
   out << "\n  keyframes     " << s.keyframes;
   if (s.steps > 0) out << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps) << " %";
   if (!s.mono) out << "\n  path          " << path_text(s);
-  out << "\n  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
-      << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps;
+  out << "\n  settled       ";
+  if (s.gone_on && !s.publishing.heard && s.publishing.settled == 0)
+    out << "not known until relmapd says what it has of the " << s.publishing.unsettled << " in the spool, resent ";
+  else
+    out << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent ";
+  out << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps;
   if (s.publishing.lost_in_restores > 0)
     out << " (" << s.publishing.lost_in_restores << " of them a restored map lacks, and the spool has no more)";
   out << '\n';

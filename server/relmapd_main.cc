@@ -44,7 +44,7 @@ Some settings have no option and are set in the configuration file: ingest.* (wh
 tls.*, access, lcm.*, socket_group, rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms.
 server/README.md describes them.
 
-SIGHUP reads certificates, the access list and the log level again. SIGTERM or SIGINT stops the daemon after everything
+SIGHUP reads the access list and the log level again; certificates are read within ten seconds after they change. SIGTERM or SIGINT stops the daemon after everything
 acknowledged is applied and committed. A second signal ends it at once, without loss: the next start applies the rest.
 
 exit codes:
@@ -116,7 +116,8 @@ struct CommandLine {
     app.add_option("--backup-root", backup_roots,
                    "Folder below which operators may have backups made by this daemon; none by default")
         ->type_name("FOLDER")
-        ->expected(1);
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     app.add_option("--memory-budget-mb", memory_budget_mb,
                    "Memory budget for everything that grows with map and load, in MB (default 1024, at least 32)");
     app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
@@ -240,9 +241,7 @@ int main(int argc, char** argv) {
   }
   try {
     return run(line, config);
-  } catch (const std::bad_alloc&) {
-    return fail({Reason::BUDGET_EXCEEDED, "out of memory"});
-  } catch (const std::exception& error) {
-    return fail({Reason::INTERNAL, error.what()});
+  } catch (const std::exception&) {
+    return fail(relmap::caught_status());
   }
 }

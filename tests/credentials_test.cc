@@ -111,6 +111,8 @@ TEST_F(CredentialsTest, LetEachDoWhatItsRoleMayUntilTheyAreRevoked) {
          std::chrono::steady_clock::now() < patience)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_THAT(daemon.log(), HasSubstr("the certificate stays as it was"));
+  const Finished status = program("relmap", {"--server", folder_ / "map", "status"});
+  EXPECT_THAT(status.standard_output, HasSubstr("certificate")) << "it needs attention";
   std::ofstream(folder_ / "fleet/server.pem") << server;
   expect_done(relmap(anna, {"status"}));
 
@@ -234,10 +236,14 @@ TEST_F(CredentialsTest, AreMadeOnceAndRenewedWithTheirNames) {
   EXPECT_EQ(twice.exit_code, 1);
   EXPECT_THAT(twice.standard_error, HasSubstr("exists already"));
   EXPECT_EQ(admin({"credentials", "revoke", folder_ / "fleet", "nobody"}).exit_code, 1);
+  expect_done(admin({"credentials", "revoke", folder_ / "fleet", "cart"}));
+  EXPECT_THAT(admin({"credentials", "revoke", folder_ / "fleet", "cart"}).standard_error,
+              HasSubstr("all that was issued to cart was revoked before"));
+  issue("robot", "van");
   EXPECT_EQ(admin({"credentials", "new", folder_ / "fleet", "x", "--role", "king"}).exit_code, 2);
   const Finished listed = admin({"--json", "credentials", "list", folder_ / "fleet"});
   EXPECT_THAT(listed.standard_output,
-              HasSubstr(R"({"role":"robot","name":"cart","kind":"certificate","state":"valid","expires":")"));
+              HasSubstr(R"({"role":"robot","name":"van","kind":"certificate","state":"valid","expires":")"));
 
   // On a copy without the authority's key a new one would shut everybody out.
   std::filesystem::copy(folder_ / "fleet", folder_ / "copy");
@@ -246,6 +252,62 @@ TEST_F(CredentialsTest, AreMadeOnceAndRenewedWithTheirNames) {
   EXPECT_EQ(blind.exit_code, 1);
   EXPECT_THAT(blind.standard_error, HasSubstr("needs a new folder"));
   EXPECT_EQ(read_text(folder_ / "copy/access"), read_text(folder_ / "fleet/access"));
+  EXPECT_THAT(admin({"credentials", "new", folder_ / "copy", "x", "--role", "robot"}).standard_error,
+              HasSubstr("issued where the authority's key is kept"));
+}
+
+TEST_F(CredentialsTest, MistakesAreNamed) {
+  for (const char* command : {"new", "list", "revoke"}) {
+    std::vector<std::string> arguments{"credentials", command, folder_ / "nowhere"};
+    if (command != std::string("list")) arguments.emplace_back("cart");
+    if (command == std::string("new")) arguments.insert(arguments.end(), {"--role", "robot"});
+    const Finished early = admin(arguments);
+    EXPECT_EQ(early.exit_code, 1);
+    EXPECT_THAT(early.standard_error, HasSubstr("relmap-admin credentials ca " + (folder_ / "nowhere") + " makes it"));
+  }
+  const Finished outside = admin({"credentials", "new", folder_ / "fleet", "../cart", "--role", "robot"});
+  EXPECT_THAT(outside.standard_error, HasSubstr("'../cart' is no name for a file; --out FILE gives one"));
+  // Whoever the daemon runs as gets to its folder, and nobody else into it.
+  expect_done(admin({"credentials", "ca", folder_ / "a/b/fleet"}));
+  for (const auto& [folder, mode] : {std::pair("a", 0755), {"a/b", 0755}, {"a/b/fleet", 0700}})
+    EXPECT_EQ(static_cast<int>(std::filesystem::status(folder_ / folder).permissions()), mode) << folder;
+}
+
+TEST_F(CredentialsTest, BothSidesSayWhyTheyDoNotTrustEachOther) {
+  expect_done(admin({"credentials", "ca", folder_ / "other"}));
+  expect_done(admin(
+      {"credentials", "new", folder_ / "other", "anna", "--role", "operator", "--out", folder_ / "stranger.pem"}));
+  RunningDaemon daemon(served());
+  const Finished refused =
+      program("relmap", {"--server", daemon.address(), "--credentials", folder_ / "stranger.pem", "status"});
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.standard_error, HasSubstr("stranger.pem do not trust each other"));
+  EXPECT_THAT(daemon.log(), HasSubstr("TLS: a handshake failed"));
+}
+
+TEST_F(CredentialsTest, TheLogLevelIsReadAgain) {
+  const auto configure = [&](const char* level) { std::ofstream(folder_ / "relmapd.yaml") << "log_level: " << level; };
+  configure("info");
+  DaemonOptions options = served();
+  options.more = {"--config",      folder_ / "relmapd.yaml", "--backup-root",
+                  folder_ / "one", "--backup-root",          folder_ / "two"};
+  RunningDaemon daemon(options);
+  configure("error");
+  daemon.process().signal(SIGHUP);
+  const auto patience = std::chrono::steady_clock::now() + kPatience;
+  std::string log;
+  do {
+    log = daemon.log();
+    daemon.process().signal(SIGHUP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  } while (daemon.log() != log && std::chrono::steady_clock::now() < patience);
+  EXPECT_EQ(daemon.log(), log) << "SIGHUP is answered at the level info";
+  configure("info");
+  while (daemon.log() == log && std::chrono::steady_clock::now() < patience) {
+    daemon.process().signal(SIGHUP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  EXPECT_NE(daemon.log(), log);
 }
 
 }  // namespace

@@ -4,6 +4,10 @@
 
 namespace relmap::workflow {
 
+bool is_refusal(const Status& trouble) {
+  return trouble.reason() == Reason::UNAUTHENTICATED || trouble.reason() == Reason::NOT_ALLOWED;
+}
+
 std::string silence_of(const std::string& daemon, const std::string& what, const Status& trouble) {
   return what + " on " + daemon + (trouble.ok() ? "" : " (" + trouble.to_string() + ")");
 }
@@ -12,6 +16,7 @@ DaemonSilence::DaemonSilence(Options options, Time begin) : options_(std::move(o
 
 std::optional<std::string> DaemonSilence::look(Time now, bool heard, const Status& trouble) {
   const bool wrong_map = options_.live && trouble.reason() == Reason::WRONG_MAP;
+  const bool refused = is_refusal(trouble);
   if (heard && trouble.ok()) {
     silent_since_.reset();
     if (std::exchange(told_, false)) return "relmapd answers on " + options_.daemon;
@@ -20,6 +25,7 @@ std::optional<std::string> DaemonSilence::look(Time now, bool heard, const Statu
   } else if (!told_ && (wrong_map || now > *silent_since_ + options_.patience)) {
     told_ = true;
     const char* const what = wrong_map ? "nothing is sent"
+                             : refused ? "relmapd takes nothing"
                              : heard   ? "relmapd does not answer any more"
                                        : "no relmapd has answered";
     return silence_of(options_.daemon, what, trouble) + "; keyframes wait in " +

@@ -9,6 +9,9 @@
 
 namespace relmap::workflow {
 
+// Whether the daemon answers, and takes nothing with these credentials: waiting alone does not help.
+bool is_refusal(const Status& trouble);
+
 // Returns "WHAT on DAEMON (TROUBLE)", without the brackets if `trouble` is ok.
 std::string silence_of(const std::string& daemon, const std::string& what, const Status& trouble);
 

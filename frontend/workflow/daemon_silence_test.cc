@@ -30,6 +30,14 @@ TEST(DaemonSilence, BeginsWithTheTroubleOfADaemonThatHasAnswered) {
             "relmapd does not answer any more on map.lab (UNREACHABLE: nobody listens); keyframes wait in memory");
 }
 
+TEST(DaemonSilence, IsNoneWhereTheDaemonRefuses) {
+  DaemonSilence silence({.daemon = "map.lab", .kept_in = "/spool"}, kStart);
+  const Status revoked{Reason::UNAUTHENTICATED, "the certificate of cart-1 was revoked"};
+  EXPECT_EQ(silence.look(kStart + seconds(6), false, revoked),
+            "relmapd takes nothing on map.lab (UNAUTHENTICATED: the certificate of cart-1 was revoked); keyframes wait "
+            "in /spool");
+}
+
 TEST(DaemonSilence, ReportsTheWrongMapOfALiveSessionAtOnce) {
   DaemonSilence live({.daemon = "map.lab", .kept_in = "/spool", .live = true}, kStart);
   EXPECT_EQ(live.look(kStart, true, kOtherMap),

@@ -182,7 +182,9 @@ void Delivery::tell_what_is_missing() const {
     std::fprintf(stderr, "%llu keyframes were given up: they are gaps in the map\n", printed(given_up));
   const Status trouble = sink_->trouble();
   if (!summary.publishing.all_settled() && !run_.stop && (!summary.publishing.heard || !trouble.ok()))
-    std::fprintf(stderr, "%s\n", silence_of(daemon(), "no relmapd answers", trouble).c_str());
+    std::fprintf(
+        stderr, "%s\n",
+        silence_of(daemon(), is_refusal(trouble) ? "relmapd takes nothing" : "no relmapd answers", trouble).c_str());
   if (summary.gone_on && summary.keyframes == 0 && !run_.stop && !run_.options.quiet)
     std::fprintf(stderr, "there is nothing after keyframe %u, with which the session goes on\n", *summary.gone_on);
 }

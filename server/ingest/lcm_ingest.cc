@@ -65,11 +65,17 @@ struct LcmIngest::Impl {
     }
     const MutexLock lock(mutex);
     const auto opened = sealed.open(channel, datagram, now(), utc_s());
+    log_complaint();
     if (!opened.ok()) return opened.status();
     Result<Message> message = decode(opened->message);
     if (message.ok()) sealed.sends(*opened, message->session);
     sender = {opened->robot, false};
     return message;
+  }
+
+  void log_complaint() RELMAP_REQUIRES(mutex) {
+    if (const std::string complaint = sealed.take_complaint(); !complaint.empty())
+      spdlog::warn("LCM: a robot sends that may not: {}", complaint);
   }
 
   void take_hello(ByteSpan datagram) {
@@ -80,6 +86,7 @@ struct LcmIngest::Impl {
     {
       const MutexLock lock(mutex);
       const auto opened = sealed.open_hello(datagram, utc_s());
+      log_complaint();
       const auto hello = opened.ok() ? decode_lcm_hello(opened->message) : opened.status();
       if (hello.ok()) welcome = sealed.welcome(*opened, encode_lcm(server.identity()), now());
       if (!hello.ok()) return server.count_foreign(hello.reason());
@@ -155,8 +162,8 @@ LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const LcmOptions& options, intake::IngestServer& server,
                                                     StatusSource status) {
-  auto impl = std::make_unique<Impl>(options, server, std::move(status));
-  Impl* const running = impl.get();
+  std::unique_ptr<LcmIngest> ingest(new LcmIngest(std::make_unique<Impl>(options, server, std::move(status))));
+  Impl* const running = ingest->impl_.get();
   using intake::Sender;
   Result<std::unique_ptr<LcmLink>> link = LcmLink::open(
       options.url,
@@ -169,18 +176,18 @@ Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const LcmOptions& options, i
        {kHelloChannel, [running](ByteSpan datagram) { running->take_hello(datagram); }}},
       options.queue_bytes);
   if (!link.ok()) return link.status();
-  impl->link = std::move(*link);
-  impl->opened_link = impl->link.get();
-  impl->said = server.subscribe({[running](const auto& ack, const auto& robot) { running->acknowledge(ack, robot); },
-                                 [running](const auto& news, const auto& robot) {
-                                   running->tell(news.session, robot, kPoseChannel, encode_lcm(news));
-                                 },
-                                 {}});
-  if (impl->status) impl->status_thread = std::thread([running] { running->run(); });
+  running->link = std::move(*link);
+  running->opened_link = running->link.get();
+  running->said = server.subscribe({[running](const auto& ack, const auto& robot) { running->acknowledge(ack, robot); },
+                                    [running](const auto& news, const auto& robot) {
+                                      running->tell(news.session, robot, kPoseChannel, encode_lcm(news));
+                                    },
+                                    {}});
+  if (running->status) running->status_thread = std::thread([running] { running->run(); });
   spdlog::info("LCM: listening on {}", options.url);
   if (const auto complete = complete_lcm_url(options.url); complete.ok())
     if (const std::string advice = receive_buffer_advice(*complete); !advice.empty()) spdlog::warn("LCM: {}", advice);
-  return std::unique_ptr<LcmIngest>(new LcmIngest(std::move(impl)));
+  return ingest;
 }
 
 LcmIngest::~LcmIngest() { stop(); }
@@ -193,7 +200,7 @@ void LcmIngest::use(const access::AccessList& list) {
 bool LcmIngest::at_end() const { return impl_->link->at_end(); }
 
 void LcmIngest::stop() {
-  impl_->link->stop();
+  if (impl_->link) impl_->link->stop();
   impl_->said.reset();
   {
     const MutexLock lock(impl_->mutex);

@@ -10,6 +10,7 @@ namespace relmap::ingest {
 namespace {
 
 constexpr std::chrono::milliseconds kWelcomeSpacing{5};
+constexpr std::int64_t kComplainAgain_s = 600;
 
 Status refused(const std::string& why) { return {Reason::UNAUTHENTICATED, why}; }
 
@@ -17,10 +18,15 @@ Status refused(const std::string& why) { return {Reason::UNAUTHENTICATED, why}; 
 
 void SealedRobots::use(const access::AccessList& list) {
   std::map<access::SealKeyId, Robot> robots;
+  former_.clear();
+  complained_.clear();
   for (const access::Grant& grant : list.grants()) {
-    if (grant.kind != access::Grant::Kind::kKey || grant.principal.role != access::Role::kRobot || grant.revoked)
-      continue;
+    if (grant.kind != access::Grant::Kind::kKey || grant.principal.role != access::Role::kRobot) continue;
     const access::RobotKey key = access::robot_key(secret_, access::key_of_hex(grant.hash).value());
+    if (grant.revoked) {
+      former_.emplace(key.id, Former{access::Sealer(key.key), grant.principal.name});
+      continue;
+    }
     Robot robot(access::Sealer(key.key), grant.principal.name);
     robot.expires_s = grant.expires_s;
     if (const auto known = robots_.find(key.id); known != robots_.end()) {
@@ -34,15 +40,30 @@ void SealedRobots::use(const access::AccessList& list) {
   std::erase_if(recipients_, [&](const auto& entry) { return !robots_.contains(entry.first.second); });
 }
 
+Status SealedRobots::complain(const access::SealKeyId& key, const std::string& why, std::int64_t utc_s) {
+  const auto [before, first] = complained_.try_emplace(key, utc_s);
+  if (first || utc_s - before->second >= kComplainAgain_s) {
+    before->second = utc_s;
+    complaint_ = why;
+  }
+  return refused(why);
+}
+
 Result<SealedRobots::Robot*> SealedRobots::verified(std::string_view channel, const access::SealBoot& boot,
                                                     const access::SealedMessage& sealed, std::int64_t utc_s) {
   const auto found = robots_.find(sealed.seal.key);
-  if (found == robots_.end()) return refused("no seal, or one of an unknown key");
+  if (found == robots_.end()) {
+    const auto former = former_.find(sealed.seal.key);
+    if (former == former_.end() || !former->second.sealer.verify(access::SealedBy::kRobot, channel, boot, sealed))
+      return refused("no seal, or one of an unknown key");
+    return complain(former->first, "the key of " + former->second.name + " was revoked", utc_s);
+  }
   Robot& robot = found->second;
   if (!robot.sealer.verify(access::SealedBy::kRobot, channel, boot, sealed))
     return refused("not sealed by " + robot.name + ", or for another daemon");
   if (robot.expires_s <= utc_s)
-    return refused("the key of " + robot.name + " expired at " + access::time_text(robot.expires_s));
+    return complain(found->first, "the key of " + robot.name + " expired at " + access::time_text(robot.expires_s),
+                    utc_s);
   return &robot;
 }
 

@@ -48,6 +48,9 @@ class SealedRobots {
   Result<Opened> open(std::string_view channel, ByteSpan datagram, Time now, std::int64_t utc_s);
   // The same for a hello, which is for any daemon and may come again.
   Result<Opened> open_hello(ByteSpan datagram, std::int64_t utc_s);
+  // Whose messages were refused since the last call although they are sealed with a key that was issued, and why: "the
+  // key of cart-1 was revoked". Of each key at most once every ten minutes; empty if there is nobody to name.
+  std::string take_complaint() { return std::exchange(complaint_, {}); }
 
   // Notes that the robot's process sends the session.
   void sends(const Opened& from, const SessionUuid& session);
@@ -73,10 +76,16 @@ class SealedRobots {
     std::vector<SessionUuid> sessions;       // those of which recipients_ has an entry, the oldest first
     std::map<std::uint64_t, Time> welcomed;  // by process
   };
+  // One that was revoked.
+  struct Former {
+    access::Sealer sealer;
+    std::string name;
+  };
   using Recipient = std::pair<SessionUuid, access::SealKeyId>;
 
   Result<Robot*> verified(std::string_view channel, const access::SealBoot& boot, const access::SealedMessage& sealed,
                           std::int64_t utc_s);
+  Status complain(const access::SealKeyId& key, const std::string& why, std::int64_t utc_s);
   std::uint64_t time_us(Time now) const;
   void seal(Robot& robot, const access::SealKeyId& key, std::uint64_t run, std::string_view channel, Time now,
             Bytes& message);
@@ -86,6 +95,9 @@ class SealedRobots {
   const Time start_;
   std::uint64_t sent_ = 0;
   std::map<access::SealKeyId, Robot> robots_;
+  std::map<access::SealKeyId, Former> former_;
+  std::map<access::SealKeyId, std::int64_t> complained_;  // when, UTC seconds
+  std::string complaint_;
   std::map<Recipient, std::uint64_t> recipients_;  // the run for which to seal
 };
 

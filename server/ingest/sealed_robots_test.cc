@@ -124,6 +124,26 @@ TEST_F(SealedRobotsTest, AKeyEndsWithItsTimeOrWhenItIsRevoked) {
   EXPECT_EQ(open(other.seal(boot_, time_us())), Reason::OK);
 }
 
+TEST_F(SealedRobotsTest, WhoIsKnownAndMayNoLongerSendIsNamedNowAndThen) {
+  HandRun cart{issue("cart")}, other{issue("other")};
+  use();
+  const auto complaint_after = [&](const Bytes& message, std::int64_t utc_s) {
+    EXPECT_EQ(open(message, kGapChannel, utc_s), Reason::UNAUTHENTICATED);
+    return robots_.take_complaint();
+  };
+  EXPECT_THAT(complaint_after(cart.seal(boot_, time_us()), kExpires),
+              testing::HasSubstr("the key of cart expired at "));
+  EXPECT_EQ(complaint_after(cart.seal(boot_, time_us()), kExpires + 1), "");
+  EXPECT_NE(complaint_after(other.seal(boot_, time_us()), kExpires + 1), "");
+  EXPECT_NE(complaint_after(cart.seal(boot_, time_us()), kExpires + 600), "");
+  list_.revoke("cart");
+  use();
+  Bytes forged = cart.seal(boot_, time_us());
+  forged[0] ^= 1;
+  EXPECT_EQ(complaint_after(forged, kNow), "") << "whoever knows the id of a key does not fill the log";
+  EXPECT_EQ(complaint_after(cart.seal(boot_, time_us()), kNow), "the key of cart was revoked");
+}
+
 // What was sent by processes that are forgotten does not pass again.
 TEST_F(SealedRobotsTest, OneRobotsProcessesAreLimited) {
   const access::RobotKey key = issue("cart");

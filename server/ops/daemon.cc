@@ -18,6 +18,7 @@
 #include "server/ops/process.h"
 #include "server/ops/socket_path.h"
 #include "server/route/overlay/route_index.h"
+#include "server/rpc/handshake_log.h"
 #include "server/rpc/server.h"
 #include "storage/io/file.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -28,6 +29,7 @@ namespace {
 
 constexpr std::chrono::seconds kPatience{5};  // that running calls get to end at a stop
 constexpr std::chrono::minutes kReportInterval{1};
+constexpr std::chrono::seconds kCertificateInterval{10};
 
 rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
   rpc::IngestFacts facts;
@@ -98,6 +100,7 @@ struct Daemon::Impl {
   DaemonStatus lcm_status() const;
   void report() const;
   void reload_access();
+  void look_at_certificate();
   Status stop();
 
   const Config config;
@@ -120,7 +123,9 @@ struct Daemon::Impl {
   std::string socket, address;
   access::SealKey lcm_secret{};
   std::uint64_t lcm_access_version = 0;  // of the access list that LCM uses
-  std::string access_problem;            // with the access list, which is logged once
+  // With the access list and the certificate, which is logged once.
+  std::string access_problem, certificate_problem;
+  std::chrono::steady_clock::time_point certificate_looked;
 
   std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
   bool stopped = false;
@@ -166,8 +171,7 @@ Status Daemon::Impl::open_map() {
   ingest = std::make_unique<intake::IngestServer>(*sink, *budget, boot, std::move(ingest_options));
   robot_log = ingest->subscribe({.acknowledged = {}, .news = {}, .stopping = {}, .robot = log});
   mapper->watch_closures([this](const storage::Graph& map, const storage::Edge& closure) {
-    if (auto news = ingest::closure_news(map, closure))
-      ingest->tell(std::move(*news), map.session(closure.b.session)->header.robot);
+    if (auto told = ingest::closure_news(map, closure)) ingest->tell(std::move(told->news), std::move(told->robot));
   });
   return {};
 }
@@ -222,6 +226,7 @@ Status Daemon::Impl::serve() {
   lcm_secret = *secret;
   if (config.insecure && !config.listen.empty())
     spdlog::warn("--insecure: everyone who can reach {} may edit the map", config.listen);
+  if (!options.host.empty() && !config.tls.certificate.empty()) rpc::log_failed_handshakes();
   auto started = rpc::RpcServer::start(*core, *gatekeeper, options);
   if (!started.ok()) return started.status();
   server = std::move(started).value();
@@ -283,6 +288,14 @@ void Daemon::Impl::report() const {
                budget->used() >> 20, budget->limit() >> 20, resident_bytes() >> 20);
 }
 
+void Daemon::Impl::look_at_certificate() {
+  certificate_looked = std::chrono::steady_clock::now();
+  if (config.listen.empty()) return;
+  const Status state = rpc::tls_state(config.tls, now_us() / 1'000'000);
+  if (!state.ok() && state.message() != certificate_problem) spdlog::warn("TLS: {}", state.to_string());
+  certificate_problem = state.message();
+}
+
 void Daemon::Impl::reload_access() {
   const Status read = gatekeeper->reload_if_changed();
   if (!read.ok() && read.message() != access_problem)
@@ -326,6 +339,8 @@ Status Daemon::check(const Config& config) {
   if (Status sound = check_config(config); !sound.ok()) return sound;
   if (const auto vocabulary = load_vocabulary(config); !vocabulary.ok()) return vocabulary.status();
   if (Status sound = rpc::check_files(config.tls); !sound.ok()) return sound;
+  if (const Status state = rpc::tls_state(config.tls, now_us() / 1'000'000); !state.ok())
+    spdlog::warn("TLS: {}", state.to_string());
   if (Status known = rpc::Gatekeeper(config.access).reload(); !known.ok()) return {Reason::BAD_CONFIG, known.message()};
   if (const auto secret = read_lcm_secret(config); !secret.ok()) return secret.status();
   return storage::check_data_folder(config.data);
@@ -350,6 +365,7 @@ void Daemon::tick() {
   impl_->core->views.expire();
   impl_->core->routes.found.expire();
   impl_->reload_access();
+  if (now - impl_->certificate_looked >= kCertificateInterval) impl_->look_at_certificate();
   give_back_free_memory();
   storage::Budget& budget = impl_->mapper->budget();
   budget.set(storage::Share::kAllocator,
@@ -364,6 +380,7 @@ bool Daemon::reload() {
   const Status read = impl_->gatekeeper->reload(), sound = rpc::check_files(impl_->config.tls);
   if (!read.ok()) spdlog::error("the access list stays as it was: {}", read.to_string());
   if (!sound.ok()) spdlog::error("the certificate stays as it was: {}", sound.to_string());
+  impl_->look_at_certificate();
   impl_->access_problem = read.message();
   return read.ok() && sound.ok();
 }

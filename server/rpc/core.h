@@ -24,6 +24,7 @@
 #include "server/rpc/limits.h"
 #include "server/rpc/maintenance_turn.h"
 #include "server/rpc/metrics.h"
+#include "server/rpc/tls_files.h"
 #include "server/rpc/token_keeper.h"
 
 namespace relmap::rpc {
@@ -60,6 +61,7 @@ using ProcessProbe = std::function<ProcessFacts()>;
 struct Transport {
   const Connections* connections = nullptr;
   const Gatekeeper* gatekeeper = nullptr;
+  const TlsFiles* tls = nullptr;
 };
 
 // The intake of keyframes.

@@ -77,37 +77,21 @@ Listener::Take hand_over_to(Acceptor acceptor) {
 
 }  // namespace
 
-Status check_files(const TlsFiles& files) {
-  if (files.certificate.empty()) return {};
-  const auto certificate = access::read_file(files.certificate), key = access::read_file(files.key);
-  for (const auto* text : {&certificate, &key})
-    if (!text->ok()) return {Reason::BAD_CONFIG, text->status().message()};
-  struct stat file {};
-  if (stat(files.key.c_str(), &file) == 0 && (file.st_mode & S_IRWXO) != 0)
-    return {Reason::BAD_CONFIG, "others can read " + files.key + ": chmod o= " + files.key};
-  if (const Status fits = access::check_key_pair({*certificate, *key}); !fits.ok())
-    return {Reason::BAD_CONFIG, files.certificate + " with " + files.key + ": " + fits.message()};
-  if (files.client_authority.empty()) return {};
-  const auto authority = access::read_file(files.client_authority);
-  if (!authority.ok()) return {Reason::BAD_CONFIG, authority.status().message()};
-  if (const auto facts = access::read_certificate(*authority); !facts.ok())
-    return {Reason::BAD_CONFIG, files.client_authority + ": " + facts.status().message()};
-  return {};
-}
-
 struct RpcServer::Impl {
   // The mapper's budget outlives the server: the core holds both.
   Impl(Core& core, const Gatekeeper& gatekeeper, const ServerOptions& options)
       : transport(core.transport),
         connections(options.connections),
-        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {
-    transport = {&connections, &gatekeeper};
+        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit),
+        tls(options.host.empty() ? TlsFiles() : options.tls) {
+    transport = {&connections, &gatekeeper, &tls};
   }
   ~Impl() { transport = {}; }
 
   Transport& transport;
   Connections connections;
   Gateway gateway;
+  const TlsFiles tls;
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;  // destroyed before the services
   std::unique_ptr<Listener> listener;    // destroyed before the server

@@ -10,14 +10,9 @@
 #include "server/rpc/core.h"
 #include "server/rpc/gatekeeper.h"
 #include "server/rpc/listener.h"
+#include "server/rpc/tls_files.h"
 
 namespace relmap::rpc {
-
-// Files in PEM, which are read again within ten seconds after they change.
-struct TlsFiles {
-  std::string certificate, key;  // may be one file, so that both change at a time; empty: no TLS
-  std::string client_authority;  // by whom callers' certificates must be signed; empty: none is asked for
-};
 
 struct ServerOptions {
   std::string socket = {};        // path; empty: no socket
@@ -28,9 +23,6 @@ struct ServerOptions {
   ConnectionLimits connections = {};
   AuditLog* audit = nullptr;  // outlives the server; null: none
 };
-
-// BAD_CONFIG unless the files can be read and belong together; nothing is checked without TLS.
-Status check_files(const TlsFiles& files);
 
 class RpcServer {
  public:

@@ -177,6 +177,11 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadlin
     reply.set_access_reason(to_wire(problem.reason()));
     reply.set_access_message(problem.message());
   }
+  if (transport.tls) {
+    const Status state = tls_state(*transport.tls, now_us() / 1'000'000);
+    reply.set_certificate_reason(to_wire(state.reason()));
+    reply.set_certificate_message(state.message());
+  }
   put_methods(metrics, reply);
   return reply;
 }

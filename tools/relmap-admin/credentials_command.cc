@@ -57,10 +57,27 @@ Result<access::KeyPair> read_authority(const Files& files) {
 Status make_private_folder(const std::string& folder) {
   std::error_code error;
   if (fs::is_directory(folder, error)) return {};
+  // Whoever the daemon runs as has to get through the folders above, whatever the umask.
+  std::vector<fs::path> above;
+  for (fs::path one = fs::absolute(folder).lexically_normal(); (one = one.parent_path(), !fs::exists(one, error));)
+    above.push_back(one);
   fs::create_directories(folder, error);
   if (!error) fs::permissions(folder, fs::perms::owner_all, error);
+  using fs::perms;
+  for (const fs::path& one : above)
+    if (!error)
+      fs::permissions(
+          one, perms::owner_all | perms::group_read | perms::group_exec | perms::others_read | perms::others_exec,
+          error);
   if (error) return {Reason::IO_ERROR, "cannot make " + folder + ": " + error.message()};
   return {};
+}
+
+// NO_SUCH_FILE unless credentials ca has made the folder.
+Status check_made(const Files& files, const std::string& folder) {
+  if (fs::exists(files.access)) return {};
+  return {Reason::NO_SUCH_FILE,
+          "there is no " + files.access + "; relmap-admin credentials ca " + folder + " makes it"};
 }
 
 struct CaOptions {
@@ -148,7 +165,12 @@ struct NewOptions {
 
 Answer make_credentials(const NewOptions& options, Context& context) {
   if (Status name = check_name("name", options.name); !name.ok()) return {name, false, {}};
+  if (options.out.empty() && (options.name.find('/') != std::string::npos || options.name.front() == '.'))
+    return {Status(Reason::INVALID_ARGUMENT, "'" + options.name + "' is no name for a file; --out FILE gives one"),
+            false,
+            {}};
   const Files files(options.folder);
+  if (Status made = check_made(files, options.folder); !made.ok()) return {made, false, {}};
   const auto turn = access::FolderTurn::take(options.folder);
   if (!turn.ok()) return {turn.status(), false, {}};
   auto list = access::read_access_list(files.access);
@@ -166,6 +188,12 @@ Answer make_credentials(const NewOptions& options, Context& context) {
     grant.kind = access::Grant::Kind::kToken;
     grant.hash = access::sha256(credentials.token);
   } else {
+    if (!fs::exists(files.authority_key))
+      return {Status(Reason::NO_SUCH_FILE, "there is no " + files.authority_key +
+                                               ": certificates are issued where the authority's key is kept (tokens "
+                                               "need none)"),
+              false,
+              {}};
     const auto authority = read_authority(files);
     if (!authority.ok()) return {authority.status(), false, {}};
     const auto issued = access::issue(*authority, {options.name, {}, grant.principal, options.days});
@@ -216,7 +244,9 @@ std::string state_of(const access::Grant& grant) {
 }
 
 Answer list_credentials(const std::string& folder, Context& context) {
-  const auto list = access::read_access_list(Files(folder).access);
+  const Files files(folder);
+  if (Status made = check_made(files, folder); !made.ok()) return {made, false, {}};
+  const auto list = access::read_access_list(files.access);
   if (!list.ok()) return {list.status(), false, {}};
   std::vector<Json> all;
   for (const access::Grant& grant : list->grants()) {
@@ -238,12 +268,20 @@ Answer list_credentials(const std::string& folder, Context& context) {
 
 Answer revoke_credentials(const std::string& folder, const std::string& name, Context& context) {
   const Files files(folder);
+  if (Status made = check_made(files, folder); !made.ok()) return {made, false, {}};
   const auto turn = access::FolderTurn::take(folder);
   if (!turn.ok()) return {turn.status(), false, {}};
   auto list = access::read_access_list(files.access);
   if (!list.ok()) return {list.status(), false, {}};
   const std::size_t count = list->revoke(name);
-  if (count == 0) return {Status(Reason::INVALID_ARGUMENT, "nothing that is valid was issued to " + name), false, {}};
+  if (count == 0) {
+    const bool known = std::any_of(list->grants().begin(), list->grants().end(),
+                                   [&](const access::Grant& grant) { return grant.principal.name == name; });
+    return {Status(Reason::INVALID_ARGUMENT,
+                   known ? "all that was issued to " + name + " was revoked before" : "nothing was issued to " + name),
+            false,
+            {}};
+  }
   if (Status written = access::write_private_file(files.access, list->text()); !written.ok())
     return {written, false, {}};
   context.say(name + " may not call any more; a daemon that uses " + files.access + " knows within a second");

@@ -20,8 +20,13 @@ std::string owner_of(const std::string& directory) {
 }
 
 Status check_map(const std::string& directory) {
-  if (!std::filesystem::is_directory(directory)) return Status(Reason::NO_SUCH_FILE, "there is no folder " + directory);
-  if (!std::filesystem::exists(directory + "/FORMAT")) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
+  std::error_code error;
+  const bool folder = std::filesystem::is_directory(directory, error);
+  const bool map = !error && folder && std::filesystem::exists(directory + "/FORMAT", error);
+  if (error == std::errc::permission_denied)
+    return Status(Reason::NOT_ALLOWED, "you may not read " + directory + ": run this as the user of the daemon");
+  if (!folder) return Status(Reason::NO_SUCH_FILE, "there is no folder " + directory);
+  if (!map) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
   return {};
 }
 

@@ -99,6 +99,7 @@ Facts needs_attention(const StatusMoment& now) {
   if (!s.lcm.ok()) facts.emplace_back("lcm", s.lcm.to_string());
   if (!s.connections.ok()) facts.emplace_back("connections", s.connections.to_string());
   if (!s.access.ok()) facts.emplace_back("access list", "it stays as it was: " + s.access.to_string());
+  if (!s.certificate.ok()) facts.emplace_back("certificate", s.certificate.to_string());
   add_robots(now, true, facts);
   for (const client::DoubtfulCamera& camera : s.doubtful_cameras)
     facts.emplace_back("session " + std::to_string(camera.session), doubt_text(camera));

@@ -74,6 +74,7 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   now.status.lcm = {Reason::NO_MULTICAST_ROUTE, "no route"};
   now.status.connections = {Reason::TOO_MANY_FILES, "160 files may be open"};
   now.status.access = {Reason::BAD_CONFIG, "line 13"};
+  now.status.certificate = {Reason::BAD_CONFIG, "server.pem expires"};
   now.status.doubtful_cameras = {{7, "car", "monday", {2, 5}, 41, "it fits a focal length 10 % longer"}};
   now.status.places_left_out = 12;
   now.status.memory_shares[5].used = 64 << 20;  // queues
@@ -85,8 +86,8 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   const std::string text = shown(now);
   EXPECT_THAT(text, StartsWith("needs attention\n"));
   std::size_t last = 0;
-  for (const char* line : {"  storage ", "  lcm ", "  connections ", "  access list ", "  robot c-twice ",
-                           "  session 7 ", "  places ", "  memory ", "  robot b-silent "}) {
+  for (const char* line : {"  storage ", "  lcm ", "  connections ", "  access list ", "  certificate ",
+                           "  robot c-twice ", "  session 7 ", "  places ", "  memory ", "  robot b-silent "}) {
     const std::size_t at = text.find(line);
     ASSERT_NE(at, std::string::npos) << line << text;
     EXPECT_GT(at, last) << line;

@@ -168,7 +168,10 @@ struct GrpcTransport::Impl {
     acknowledged = stream.acknowledged;
     Status why = stream.fault.ok() ? client::status_of(*stream.outcome) : stream.fault;
     if (why.ok()) why = {Reason::UNREACHABLE, "the daemon has ended the stream"};
-    return {why.reason(), where->address + ": " + why.message()};
+    const bool never_connected = why.reason() == Reason::UNREACHABLE && !stream.boot;
+    return {why.reason(),
+            where->address + ": " + why.message() +
+                (never_connected ? client::other_causes(*where, options.credentials, why.message()) : "")};
   }
 
   void write_next(Stream& stream) RELMAP_REQUIRES(mutex) {

@@ -100,8 +100,10 @@ void LcmTransport::hear(std::string_view channel, ByteSpan datagram) {
 Status LcmTransport::trouble() const {
   const MutexLock lock(mutex_);
   if (daemon_ && !daemon_->ready(Clock::now()) && unsealed_heard_)
-    return {Reason::UNAUTHENTICATED,
-            "there is a relmapd, which does not know the key of these credentials, or takes none"};
+    return {
+        Reason::UNAUTHENTICATED,
+        "there is a relmapd, which does not believe these credentials: they are revoked, expired or of another fleet, "
+        "or it takes what nobody has sealed (lcm.authentication)"};
   if (!daemon_ && unsealed_heard_ && !acknowledged_ && sent_since_ && Clock::now() - *sent_since_ >= kUnanswered)
     return {Reason::UNAUTHENTICATED, "there is a relmapd, which may take only what is sealed: --credentials FILE"};
   return {};
