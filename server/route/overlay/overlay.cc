@@ -17,6 +17,8 @@ Overlay::Overlay(std::vector<RouteWeights> metrics, std::shared_ptr<CellStore> s
 
 namespace {
 
+constexpr std::size_t kNodeBytes = 48;  // of a set, about
+
 // The chunk after `chunk`, whose frames are given; a gap that a motion edge bridges is skipped in one step. nullopt if
 // it is the last.
 std::optional<storage::ChunkId> next_chunk(const storage::Graph& graph, const storage::Session& session,
@@ -117,6 +119,10 @@ std::size_t Overlay::refresh(const storage::Graph& graph, std::span<const storag
     if (number == CellTree::kNone && frames.nodes.empty()) continue;
     const Cell cell = make_cell(frames, chunk, metrics_);
     if (number != CellTree::kNone) {
+      if (frames.nodes.empty())
+        gone_.insert(number);
+      else
+        gone_.erase(number);
       made.emplace_back(number, store_->write(cell, cells_[number]));
     } else {
       NewChunk& fresh = came[chunk];
@@ -131,6 +137,15 @@ std::size_t Overlay::refresh(const storage::Graph& graph, std::span<const storag
   }
   add(came);
   return made.size() + came.size();
+}
+
+void Overlay::note_gone(const storage::Graph& graph) {
+  for (const SessionNumber number : tree_->sessions()) {
+    const auto session = graph.session(number);
+    if (session && session->frames > 0) continue;
+    const auto chunks = tree_->chunks_of(number);
+    gone_.insert(chunks.begin(), chunks.end());
+  }
 }
 
 // Adds each chunk beside the one to which most of its edges lead, of the chunks that the tree holds by then.
@@ -227,7 +242,8 @@ std::size_t Overlay::memory_bytes() const {
   // Counts a StoredCell and its shared count for each cell, and the vectors twice: here and in the copy that searches
   // use.
   return cells_.size() * (sizeof(StoredCell) + 32) +
-         2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + tree_->memory_bytes());
+         2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + gone_.size() * kNodeBytes +
+              tree_->memory_bytes());
 }
 
 void Overlay::put(ByteWriter& w) const {

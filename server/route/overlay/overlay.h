@@ -40,6 +40,11 @@ class Overlay {
   bool make_next();
   std::size_t outdated() const { return waiting_.size(); }
 
+  // Chunks whose frames have gone stay in the tree, and take memory, until the cells of the whole map are made anew.
+  bool is_mostly_gone() const { return gone_.size() > kFewGone && 2 * gone_.size() > tree_->chunks(); }
+  // Notes which chunks of the tree have gone from the map; refresh() does so by itself for those that it is told of.
+  void note_gone(const storage::Graph& graph);
+
   std::span<const RouteWeights> metrics() const { return metrics_; }
   const CellTree& tree() const { return *tree_; }
   // Whether a search may pass the cell: it is not the root, and neither the cell nor any of its parts is outdated.
@@ -55,6 +60,8 @@ class Overlay {
   static std::optional<Overlay> get(ByteReader& r, std::shared_ptr<CellStore> store);
 
  private:
+  static constexpr std::size_t kFewGone = 64;
+
   std::shared_ptr<const StoredCell> make(std::uint32_t number, std::shared_ptr<const StoredCell> known) const;
   void outdate(std::uint32_t number);
   struct NewChunk {
@@ -74,6 +81,7 @@ class Overlay {
   std::vector<bool> waits_;                                    // whether the cell or one within it is outdated
   std::set<std::pair<std::uint32_t, std::uint32_t>> waiting_;  // level and number of the cells that wait
   std::set<std::uint32_t> outdated_;                           // cells of which a direct part has changed
+  std::set<std::uint32_t> gone_;                               // chunks without a frame
 };
 
 }  // namespace relmap::route

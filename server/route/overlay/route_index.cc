@@ -132,6 +132,7 @@ void RouteIndex::Impl::load() {
                             options.room_for_others);
     if (!table) return;
     working = std::move(table->overlay);
+    working.note_gone(*current_view());
     {
       const MutexLock lock(mutex);
       store = working.store();
@@ -165,7 +166,7 @@ bool RouteIndex::Impl::work() {
     view = current_view();
     for (const auto& [chunk, version] : stale) chunks.push_back(chunk);
   }
-  if (!shows || is_mostly_new(chunks)) {
+  if (!shows || is_mostly_new(chunks) || working.is_mostly_gone()) {
     build(*view);
   } else {
     if (chunks.size() > options.chunks_at_once) chunks.resize(options.chunks_at_once);
@@ -179,7 +180,7 @@ bool RouteIndex::Impl::work() {
     show(0, {});
   }
   const MutexLock lock(mutex);
-  return working.outdated() > 0 || !stale.empty();
+  return working.outdated() > 0 || !stale.empty() || working.is_mostly_gone();
 }
 
 // There is room for one set of cells only.
@@ -351,7 +352,7 @@ bool RouteIndex::wait_current(Clock::time_point deadline) const {
   MutexLock lock(impl_->mutex);
   return impl_->wake.wait_until(impl_->mutex, deadline, [this]() RELMAP_REQUIRES(impl_->mutex) {
     return impl_->given_up || !impl_->late_because.empty() ||
-           (impl_->shown && impl_->stale.empty() && impl_->shown->outdated() == 0);
+           (impl_->shown && impl_->stale.empty() && impl_->shown->outdated() == 0 && !impl_->shown->is_mostly_gone());
   });
 }
 

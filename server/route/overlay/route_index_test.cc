@@ -94,6 +94,34 @@ TEST(RouteIndexUpdates, KeepsUpWithASessionThatIsDeleted) {
   EXPECT_EQ(index->snapshot().overlay->outdated(), 0u);
 }
 
+TEST(RouteIndexUpdates, WhatDeletedSessionsTookIsGivenBack) {
+  LiveTown town;
+  town.drive(3000);
+  constexpr std::uint32_t kChunks = 3000 / storage::kFramesPerChunk + 1;
+  const auto remove = [&](SessionNumber session) {
+    while (town.map().session(session)->frames > 0) town.remove_chunk(session);
+  };
+  const auto chunks = [](const RouteIndex& index) { return index.snapshot().overlay->tree().chunks(); };
+  auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
+  EXPECT_EQ(chunks(*index), 4 * kChunks);
+  const std::size_t used = town.budget().used(storage::Share::kRoutes);
+  Overlay saved(kTownMetrics, CellStore::open_temporary().or_throw());  // as an earlier run would have left it
+  saved.build(*town.map().view());
+  remove(2);
+  remove(3);
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
+  EXPECT_EQ(chunks(*index), 4 * kChunks) << "half is not worth it";
+  remove(4);
+  ASSERT_TRUE(index->wait_current(Clock::now() + 60s));
+  EXPECT_LT(chunks(*index), 2 * kChunks) << "they are made anew as soon as more than half have gone";
+  EXPECT_LT(town.budget().used(storage::Share::kRoutes), used);
+  EXPECT_FALSE(saved.is_mostly_gone());
+  saved.note_gone(*town.map().view());
+  EXPECT_TRUE(saved.is_mostly_gone());
+}
+
 // One thread edits the map, one makes cells, and two search.
 TEST(RouteIndex, IsRightWhileTheMapChanges) {
   LiveTown town;
