@@ -28,11 +28,10 @@ std::string other_causes(const ServerAddress& where, const std::string& credenti
   if (where.is_socket()) return "";
   if (credentials.empty()) return ", or it serves TLS, and needs --credentials";
   std::string causes = ", or it and " + credentials + " do not trust each other";
-  const auto shown = access::read_credentials(credentials);
-  const auto facts = shown.ok() && !shown->certificate.empty() ? access::read_certificate(shown->certificate)
-                                                               : Result<access::CertificateFacts>(Status());
-  if (facts.ok() && facts->expires_s <= now_us() / 1'000'000)
-    causes += " (its certificate expired at " + access::time_text(facts->expires_s) + ")";
+  if (const auto shown = access::read_credentials(credentials); shown.ok())
+    if (const auto facts = access::read_certificate(shown->certificate);
+        facts.ok() && facts->expires_s <= now_us() / 1'000'000)
+      causes += " (its certificate expired at " + access::time_text(facts->expires_s) + ")";
   if (why.find("is not in peer certificate") != std::string::npos)
     causes += " (relmap-admin credentials ca FOLDER --host HOST adds a name or an address to the daemon's certificate)";
   return causes;

@@ -170,7 +170,6 @@ TEST(Channel, NamesOtherCausesWhereNothingAnswers) {
 
 // As another user than the one that runs the daemon.
 TEST(ServerAddress, SaysThatAFolderMayNotBeRead) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
   std::string folder = (std::filesystem::temp_directory_path() / "relmap-client-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   const auto as_another = [&] {

@@ -51,9 +51,9 @@ Result<ServerAddress> resolve_server(const std::string& server) {
             "you may not read " + what +
                 ": run this as the user of the daemon, or let a group use its socket (socket_group)"};
   };
-  if (error == std::errc::permission_denied) return refused(server);
   if (!folder) {
     if (is_host_port(server) || server.starts_with("unix:/")) return ServerAddress{server, 0, ""};
+    if (error == std::errc::permission_denied) return refused(server);
     return {Reason::INVALID_ARGUMENT, "'" + server + "' is neither a data folder nor HOST:PORT"};
   }
   const std::string path = server + "/endpoint";

@@ -63,36 +63,45 @@ struct LcmIngest::Impl {
       }
       if (message.reason() != Reason::CORRUPT) return message;
     }
-    const MutexLock lock(mutex);
+    MutexLock lock(mutex);
     const auto opened = sealed.open(channel, datagram, now(), utc_s());
-    log_complaint();
-    if (!opened.ok()) return opened.status();
+    if (!opened.ok()) {
+      const std::string complaint = sealed.take_complaint();
+      lock.unlock();
+      log_complaint(complaint);
+      return opened.status();
+    }
     Result<Message> message = decode(opened->message);
     if (message.ok()) sealed.sends(*opened, message->session);
     sender = {opened->robot, false};
     return message;
   }
 
-  void log_complaint() RELMAP_REQUIRES(mutex) {
-    if (const std::string complaint = sealed.take_complaint(); !complaint.empty())
-      spdlog::warn("LCM: a robot sends that may not: {}", complaint);
+  static void log_complaint(const std::string& complaint) {
+    if (!complaint.empty()) spdlog::warn("LCM: {}, and what it seals is not taken", complaint);
   }
 
   void take_hello(ByteSpan datagram) {
     if (who == Who::kNobody) return;
     Bytes welcome;
+    Status refused;
+    std::string complaint;
     SessionUuid session;
     intake::Sender sender;
     {
       const MutexLock lock(mutex);
       const auto opened = sealed.open_hello(datagram, utc_s());
-      log_complaint();
+      complaint = sealed.take_complaint();
       const auto hello = opened.ok() ? decode_lcm_hello(opened->message) : opened.status();
       if (hello.ok()) welcome = sealed.welcome(*opened, encode_lcm(server.identity()), now());
-      if (!hello.ok()) return server.count_foreign(hello.reason());
-      session = hello->session;
-      sender.robot = opened->robot;
+      refused = hello.status();
+      if (hello.ok()) {
+        session = hello->session;
+        sender.robot = opened->robot;
+      }
     }
+    log_complaint(complaint);
+    if (!refused.ok()) return server.count_foreign(refused.reason());
     if (welcome.empty()) return;
     // From now on its uuid is known to everyone on the network.
     server.claim(session, sender);

@@ -42,7 +42,7 @@ void SealedRobots::use(const access::AccessList& list) {
 
 Status SealedRobots::complain(const access::SealKeyId& key, const std::string& why, std::int64_t utc_s) {
   const auto [before, first] = complained_.try_emplace(key, utc_s);
-  if (first || utc_s - before->second >= kComplainAgain_s) {
+  if (first || utc_s < before->second || utc_s - before->second >= kComplainAgain_s) {
     before->second = utc_s;
     complaint_ = why;
   }

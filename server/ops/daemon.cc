@@ -119,6 +119,7 @@ struct Daemon::Impl {
   std::unique_ptr<rpc::Core> core;
   std::unique_ptr<rpc::Gatekeeper> gatekeeper;
   std::unique_ptr<rpc::AuditLog> audit;
+  std::unique_ptr<rpc::TlsWatch> tls_watch;  // null without TLS
   std::unique_ptr<rpc::RpcServer> server;
   std::string socket, address;
   access::SealKey lcm_secret{};
@@ -226,7 +227,12 @@ Status Daemon::Impl::serve() {
   lcm_secret = *secret;
   if (config.insecure && !config.listen.empty())
     spdlog::warn("--insecure: everyone who can reach {} may edit the map", config.listen);
-  if (!options.host.empty() && !config.tls.certificate.empty()) rpc::log_failed_handshakes();
+  if (!options.host.empty() && !config.tls.certificate.empty()) {
+    rpc::log_failed_handshakes();
+    tls_watch = std::make_unique<rpc::TlsWatch>(config.tls);
+    options.tls_watch = tls_watch.get();
+    look_at_certificate();
+  }
   auto started = rpc::RpcServer::start(*core, *gatekeeper, options);
   if (!started.ok()) return started.status();
   server = std::move(started).value();
@@ -290,8 +296,8 @@ void Daemon::Impl::report() const {
 
 void Daemon::Impl::look_at_certificate() {
   certificate_looked = std::chrono::steady_clock::now();
-  if (config.listen.empty()) return;
-  const Status state = rpc::tls_state(config.tls, now_us() / 1'000'000);
+  if (!tls_watch) return;
+  const Status state = tls_watch->look(now_us() / 1'000'000);
   if (!state.ok() && state.message() != certificate_problem) spdlog::warn("TLS: {}", state.to_string());
   certificate_problem = state.message();
 }
@@ -379,7 +385,10 @@ void Daemon::tick() {
 bool Daemon::reload() {
   const Status read = impl_->gatekeeper->reload(), sound = rpc::check_files(impl_->config.tls);
   if (!read.ok()) spdlog::error("the access list stays as it was: {}", read.to_string());
-  if (!sound.ok()) spdlog::error("the certificate stays as it was: {}", sound.to_string());
+  if (!sound.ok()) {
+    spdlog::error("the certificate stays as it was: {}", sound.to_string());
+    impl_->certificate_problem = sound.message();  // it has been said
+  }
   impl_->look_at_certificate();
   impl_->access_problem = read.message();
   return read.ok() && sound.ok();

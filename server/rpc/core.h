@@ -61,7 +61,7 @@ using ProcessProbe = std::function<ProcessFacts()>;
 struct Transport {
   const Connections* connections = nullptr;
   const Gatekeeper* gatekeeper = nullptr;
-  const TlsFiles* tls = nullptr;
+  const TlsWatch* tls = nullptr;
 };
 
 // The intake of keyframes.

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,6 +20,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::minutes kSpacing{1};
 constexpr std::string_view kFailed = "Security handshake failed: UNKNOWN:";
+
+constexpr std::string_view kAssertion = "assertion failed";
 
 // What stands between `begin` and the next `end`; empty if there is no `begin`.
 std::string_view between(std::string_view text, std::string_view begin, char end) {
@@ -48,7 +51,7 @@ class HandshakeLog {
     spdlog::warn(
         "TLS: a handshake failed ({}): the caller's certificate has expired or is another authority's, or the caller "
         "does not believe this daemon's, or speaks no TLS{}",
-        what, untold_ == 0 ? "" : "; so did " + std::to_string(untold_) + " others since the last such line");
+        what, untold_ == 0 ? "" : "; and " + std::to_string(untold_) + " more since the last such line");
     told_ = now;
     untold_ = 0;
   }
@@ -61,12 +64,16 @@ class HandshakeLog {
 
 void hear(gpr_log_func_args* said) {
   static HandshakeLog log;
-  if (const std::string_view text = said->message; text.starts_with(kFailed)) log.note(in_short(text));
+  const std::string_view text = said->message;
+  if (text.starts_with(kFailed)) log.note(in_short(text));
+  if (text.starts_with(kAssertion)) spdlog::critical("INTERNAL: gRPC: {}", text);  // and ends the process
 }
 
 }  // namespace
 
 void log_failed_handshakes() {
+  const char* const asked = std::getenv("GRPC_VERBOSITY");
+  if (asked && asked != std::string_view("NONE")) return;
   gpr_set_log_function(hear);
   gpr_set_log_verbosity(GPR_LOG_SEVERITY_DEBUG);
 }

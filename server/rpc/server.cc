@@ -82,16 +82,14 @@ struct RpcServer::Impl {
   Impl(Core& core, const Gatekeeper& gatekeeper, const ServerOptions& options)
       : transport(core.transport),
         connections(options.connections),
-        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit),
-        tls(options.host.empty() ? TlsFiles() : options.tls) {
-    transport = {&connections, &gatekeeper, &tls};
+        gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {
+    transport = {&connections, &gatekeeper, options.tls_watch};
   }
   ~Impl() { transport = {}; }
 
   Transport& transport;
   Connections connections;
   Gateway gateway;
-  const TlsFiles tls;
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;  // destroyed before the services
   std::unique_ptr<Listener> listener;    // destroyed before the server

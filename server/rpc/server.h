@@ -21,7 +21,8 @@ struct ServerOptions {
   std::uint16_t port = 0;         // 0 means any free port
   TlsFiles tls = {};
   ConnectionLimits connections = {};
-  AuditLog* audit = nullptr;  // outlives the server; null: none
+  AuditLog* audit = nullptr;            // outlives the server; null: none
+  const TlsWatch* tls_watch = nullptr;  // whose state GetStatus tells; outlives the server; null: none
 };
 
 class RpcServer {

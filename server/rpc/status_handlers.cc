@@ -178,7 +178,7 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadlin
     reply.set_access_message(problem.message());
   }
   if (transport.tls) {
-    const Status state = tls_state(*transport.tls, now_us() / 1'000'000);
+    const Status state = transport.tls->state();
     reply.set_certificate_reason(to_wire(state.reason()));
     reply.set_certificate_message(state.message());
   }

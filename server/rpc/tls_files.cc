@@ -34,15 +34,30 @@ Status check_files(const TlsFiles& files) {
 
 Status tls_state(const TlsFiles& files, std::int64_t utc_s) {
   if (Status sound = check_files(files); !sound.ok() || files.certificate.empty()) return sound;
-  const auto certificate = access::read_file(files.certificate);
-  const auto facts = certificate.ok() ? access::read_certificate(*certificate) : certificate.status();
-  if (!facts.ok()) return {Reason::BAD_CONFIG, files.certificate + ": " + facts.status().message()};
-  if (facts->expires_s > utc_s + kSoon_s) return {};
-  const bool expired = facts->expires_s <= utc_s;
-  return {Reason::BAD_CONFIG, files.certificate + (expired ? " expired at " : " expires at ") +
-                                  access::time_text(facts->expires_s) +
-                                  (expired ? ", and nobody can call over TLS" : "") +
-                                  ": relmap-admin credentials ca FOLDER makes a new one"};
+  for (const std::string& path : {files.certificate, files.client_authority}) {
+    if (path.empty()) continue;
+    const auto text = access::read_file(path);
+    const auto facts = text.ok() ? access::read_certificate(*text) : text.status();
+    if (!facts.ok()) return {Reason::BAD_CONFIG, path + ": " + facts.status().message()};
+    if (facts->expires_s > utc_s + kSoon_s) continue;
+    const bool expired = facts->expires_s <= utc_s;
+    return {Reason::BAD_CONFIG, path + (expired ? " expired at " : " expires at ") +
+                                    access::time_text(facts->expires_s) +
+                                    (expired ? ", and nobody can call over TLS" : "") +
+                                    "; what relmap-admin credentials ca made, it also renews"};
+  }
+  return {};
+}
+
+Status TlsWatch::look(std::int64_t utc_s) {
+  const Status state = tls_state(files_, utc_s);
+  const MutexLock lock(mutex_);
+  return state_ = state;
+}
+
+Status TlsWatch::state() const {
+  const MutexLock lock(mutex_);
+  return state_;
 }
 
 }  // namespace relmap::rpc

@@ -136,6 +136,7 @@ Status JournalLog::begin_segment() {
     if (Status status = (*file)->append(header); !status.ok()) return status;
     if (Status status = (*file)->sync(); !status.ok()) return status;
     if (Status status = files_->sync_directory(directory_); !status.ok()) return status;
+    segments_.push_back(begun);  // before the file, so that records have its salt
     file_ = std::move(*file);
     return {};
   };
@@ -147,7 +148,6 @@ Status JournalLog::begin_segment() {
     return status;
   }
   file_bytes_ = header.size();
-  segments_.push_back(begun);
   next_salt_ = options_.salts();
   return {};
 }

@@ -317,8 +317,8 @@ Status Map::begin_commit(std::function<void()> written) { return impl_->begin_co
 std::optional<Status> Map::finish_commit() { return impl_->finish_commit(); }
 bool Map::commit_is_due() const {
   const std::size_t allowance = impl_->budget->allowance(Share::kDirty);
-  const bool writing =
-      impl_->committing && impl_->committing->written.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+  const bool writing = impl_->committing && impl_->committing->written.valid() &&
+                       impl_->committing->written.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
   if (writing) return impl_->dirty_bytes > allowance / 4 * 3;
   return dirty_bytes() > allowance / 4 || impl_->dirty_sessions.size() > kEditedSessions;
 }

@@ -308,7 +308,7 @@ std::optional<Status> Map::Impl::finish_commit() {
 }
 
 // Makes what the commit held dirty again, except where something newer is dirty. All of it has been published.
-void Map::Impl::restore(Commit& commit) {
+void Map::Impl::restore(Commit& commit) noexcept {
   const auto take_back = [&](auto& old, auto& now, bool removed) {
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
       if (!old.frames[slot]) continue;
@@ -363,7 +363,7 @@ std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
 
 }  // namespace
 
-void Map::Impl::complete(Commit& commit) {
+void Map::Impl::complete(Commit& commit) noexcept {
   snapshot = engine->snapshot();
   recent_hot.clear();
   recent_warm.clear();

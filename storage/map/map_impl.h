@@ -134,7 +134,9 @@ struct Map::Impl {
   Session& edit_session(SessionNumber number);
   void set_skipped(const SkippedTable::key_type& key, std::optional<Skipped> value);
   void publish_sessions();
-  std::shared_ptr<const MapView> publish();
+  // Where memory runs out, this, complete() and restore() end the process, which loses nothing: half of what they do
+  // would be a map that differs from its journal.
+  std::shared_ptr<const MapView> publish() noexcept;
   std::shared_ptr<const MapView> show();  // a new version of what is published
   void charge_rest();
 
@@ -147,8 +149,8 @@ struct Map::Impl {
   void write_rest(Batch& batch);
   Status begin_commit(std::function<void()> written);
   std::optional<Status> finish_commit();
-  void complete(Commit& commit);  // the engine has it
-  void restore(Commit& commit);   // it failed: what it held is dirty again
+  void complete(Commit& commit) noexcept;  // the engine has it
+  void restore(Commit& commit) noexcept;   // it failed: what it held is dirty again
 };
 
 }  // namespace relmap::storage

@@ -52,7 +52,7 @@ WorkingChunk& Map::Impl::touch(ChunkId id) {
   return chunk;
 }
 
-std::shared_ptr<const MapView> Map::Impl::publish() {
+std::shared_ptr<const MapView> Map::Impl::publish() noexcept {
   if (budget->used(Share::kCache) > budget->allowance(Share::kCache)) {  // these may keep evicted parts alive
     recent_hot.clear();
     recent_warm.clear();

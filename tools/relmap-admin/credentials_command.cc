@@ -59,16 +59,16 @@ Status make_private_folder(const std::string& folder) {
   if (fs::is_directory(folder, error)) return {};
   // Whoever the daemon runs as has to get through the folders above, whatever the umask.
   std::vector<fs::path> above;
-  for (fs::path one = fs::absolute(folder).lexically_normal(); (one = one.parent_path(), !fs::exists(one, error));)
-    above.push_back(one);
+  fs::path one = fs::absolute(folder).lexically_normal();
+  if (!one.has_filename()) one = one.parent_path();  // without the slash at its end
+  while ((one = one.parent_path(), !fs::exists(one, error))) above.push_back(one);
   fs::create_directories(folder, error);
   if (!error) fs::permissions(folder, fs::perms::owner_all, error);
   using fs::perms;
-  for (const fs::path& one : above)
-    if (!error)
-      fs::permissions(
-          one, perms::owner_all | perms::group_read | perms::group_exec | perms::others_read | perms::others_exec,
-          error);
+  constexpr perms kOpen =
+      perms::owner_all | perms::group_read | perms::group_exec | perms::others_read | perms::others_exec;
+  for (const fs::path& path : above)
+    if (!error) fs::permissions(path, kOpen, error);
   if (error) return {Reason::IO_ERROR, "cannot make " + folder + ": " + error.message()};
   return {};
 }

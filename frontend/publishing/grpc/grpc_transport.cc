@@ -168,7 +168,8 @@ struct GrpcTransport::Impl {
     acknowledged = stream.acknowledged;
     Status why = stream.fault.ok() ? client::status_of(*stream.outcome) : stream.fault;
     if (why.ok()) why = {Reason::UNREACHABLE, "the daemon has ended the stream"};
-    const bool never_connected = why.reason() == Reason::UNREACHABLE && !stream.boot;
+    welcomed = welcomed || stream.boot;
+    const bool never_connected = why.reason() == Reason::UNREACHABLE && !welcomed;
     return {why.reason(),
             where->address + ": " + why.message() +
                 (never_connected ? client::other_causes(*where, options.credentials, why.message()) : "")};
@@ -258,6 +259,7 @@ struct GrpcTransport::Impl {
   std::deque<v1::IngestRequest> waiting RELMAP_GUARDED_BY(mutex);
   std::size_t waiting_bytes RELMAP_GUARDED_BY(mutex) = 0;
   Status trouble RELMAP_GUARDED_BY(mutex);
+  bool welcomed RELMAP_GUARDED_BY(mutex) = false;  // by some daemon, at some time
   bool stopping RELMAP_GUARDED_BY(mutex) = false;
   std::thread thread;
 };

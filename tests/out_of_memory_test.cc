@@ -1,6 +1,8 @@
-// Each allocation of a commit fails in turn. The map is as it was, and the next commit writes all of it.
+// Each allocation of a commit, or of an append to the journal, fails in turn. The map is as it was, and the next commit
+// writes all of it; the journal has what was acknowledged, and takes the record when it comes again.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -8,14 +10,21 @@
 #include <new>
 
 #include "storage/engine/memory_engine.h"
+#include "storage/io/file.h"
+#include "storage/journal/journal_log.h"
 #include "storage/map/map.h"
 #include "storage/testing/random_frames.h"
+#include "storage/testing/temporary_folder.h"
 
 namespace {
 
 thread_local std::uint64_t before_failure = 0;  // so many allocations of this thread succeed, less one; 0: all do
+thread_local std::uint64_t allocations = 0;
 
-bool fails() { return before_failure > 0 && --before_failure == 0; }
+bool fails() {
+  ++allocations;
+  return before_failure > 0 && --before_failure == 0;
+}
 
 }  // namespace
 
@@ -89,10 +98,14 @@ TEST_F(MapOutOfMemoryTest, ACommitLosesNothingWhicheverAllocationFails) {
   std::uint64_t n = 1;
   for (; failed; ++n) {
     for (int i = 0; i < 3; ++i) edit(*map);
-    if (n % 2 == 0) map->publish();
+    // What the commit publishes first, and ends the process where it cannot: nothing, and as often.
+    map->publish();
+    const std::uint64_t used = allocations;
+    map->publish();
+    const std::uint64_t published = allocations - used;
     const auto before = hash_map(*map);
     failed = false;
-    before_failure = n;
+    before_failure = published + n;
     try {
       const Status begun = map->begin_commit({});
       failed = !begun.ok();
@@ -100,11 +113,11 @@ TEST_F(MapOutOfMemoryTest, ACommitLosesNothingWhicheverAllocationFails) {
       failed = true;
     }
     before_failure = 0;
+    ASSERT_EQ(hash_map(*map), before) << n;
     edit(*map);  // meanwhile
     if (const auto outcome = map->finish_commit()) {
       EXPECT_EQ(outcome->ok(), !failed);
     }
-    EXPECT_NE(hash_map(*map), before);
     ASSERT_TRUE(map->commit().ok()) << n;
     ASSERT_EQ(map->dirty_bytes(), 0u) << n;
     ASSERT_EQ(budget_->used(Share::kDirty), 0u) << n;
@@ -114,6 +127,57 @@ TEST_F(MapOutOfMemoryTest, ACommitLosesNothingWhicheverAllocationFails) {
   expect_as_stored(*map);
   EXPECT_GT(n, 100u);
   std::printf("%llu allocations failed\n", static_cast<unsigned long long>(n - 2));
+}
+
+TEST(JournalOutOfMemoryTest, AnAppendIsDoneOrNotWhicheverAllocationFails) {
+  const TemporaryFolder folder;
+  const auto files = posix_file_system();
+  const auto open = [&](bool read_only) {
+    return JournalLog::open(files, folder / "journal", 0, {.segment_bytes = 300, .read_only = read_only}).or_throw();
+  };
+  const auto log = open(false);
+  const auto record_of = [](std::uint64_t sequence) { return Bytes(100, static_cast<std::uint8_t>(sequence)); };
+  const auto expect_all = [&] {
+    const auto again = open(true);
+    EXPECT_TRUE(again->loss().ok()) << again->loss().to_string();
+    EXPECT_EQ(again->last(), log->last());
+    std::uint64_t next = 1;
+    EXPECT_TRUE(again
+                    ->read(1,
+                           [&](std::uint64_t sequence, ByteSpan record) {
+                             EXPECT_EQ(sequence, next++);
+                             const Bytes expected = record_of(sequence);
+                             EXPECT_TRUE(std::equal(record.begin(), record.end(), expected.begin(), expected.end()))
+                                 << sequence;
+                             return true;
+                           })
+                    .ok());
+    EXPECT_EQ(next, log->last() + 1);
+  };
+  std::uint64_t failures = 0, n = 1;
+  for (bool failed = true; failed; ++n) {
+    failed = false;
+    // Every third record begins a segment, and so does the one after a failure, at which another allocation fails.
+    for (std::uint64_t again = 1; again <= 24; ++again) {
+      const std::uint64_t last = log->last();
+      const Bytes record = record_of(last + 1);
+      for (const std::uint64_t fails_at : {n, again, std::uint64_t{0}}) {
+        if (log->last() > last) break;
+        before_failure = fails_at;
+        try {
+          if (!log->append({&record, 1}).ok()) ++failures, failed = true;
+        } catch (const std::bad_alloc&) {
+          ++failures, failed = true;
+        }
+        before_failure = 0;
+      }
+      ASSERT_EQ(log->last(), last + 1) << n << " " << again;
+    }
+    expect_all();
+    if (::testing::Test::HasFailure()) FAIL() << "allocation " << n;
+  }
+  EXPECT_GT(failures, 20u);
+  std::printf("%llu allocations failed\n", static_cast<unsigned long long>(failures));
 }
 
 }  // namespace
