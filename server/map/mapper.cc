@@ -15,6 +15,7 @@
 #include "proto/base/mutex.h"
 #include "server/map/background_work.h"
 #include "server/map/commit_scheduler.h"
+#include "server/map/deletion.h"
 #include "server/map/deterministic_driver.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup_queue.h"
