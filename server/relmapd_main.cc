@@ -44,8 +44,9 @@ Some settings have no option and are set in the configuration file: ingest.* (wh
 tls.*, access, lcm.*, socket_group, rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms.
 server/README.md describes them.
 
-SIGHUP reads the access list and the log level again; certificates are read within ten seconds after they change. SIGTERM or SIGINT stops the daemon after everything
-acknowledged is applied and committed. A second signal ends it at once, without loss: the next start applies the rest.
+SIGHUP reads the access list and the log level again; certificates are read within ten seconds after they change.
+SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
+once, without loss: the next start applies the rest.
 
 exit codes:
   0  stopped by a signal; with --check-config: the configuration is sound
