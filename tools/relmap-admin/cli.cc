@@ -47,7 +47,7 @@ void declare(CLI::App& app, Context& context, Action& action) {
       ->capture_default_str();
   terminal::add_version(app);
   for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
-                         add_stats, add_credentials})
+                         add_stats, add_log_level, add_credentials})
     add(app, action);
 }
 
