@@ -71,7 +71,7 @@ int main_function(int argc, char** argv) {
   bool json = false;
   CLI::App app("Turns stereo pictures into keyframes of a relative map and publishes them.", "relmap-frontend");
   app.footer(kFooter);
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   app.add_option("--source", a.source, "where pairs come from")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "raw", "log", "iidc", "auto"}))
       ->capture_default_str();

@@ -132,7 +132,7 @@ struct CommandLine {
                  "Serve --listen without TLS: everyone who can reach the port may edit the map");
     app.add_flag("--check-config", check_config,
                  "Check whether the daemon could start with these settings, write nothing, and exit");
-    relmap::terminal::add_version(app);
+    relmap::terminal::add_standard_options(app);
   }
 
   Status apply(Config& config) const {

@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   app.add_option("--errors", options.errors, "File for the program's standard error");
   app.add_option("--report", options.report, "File for a JSON object: exit_code, frames, lost, cpu_s")->required();
   app.add_option("command", options.command, "The program and its arguments, behind --")->required();
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.footer(
       "Example:\n"
       "  relmap-simulated-camera --report r.json -- $PWD/build/release/bin/relmap-camera record a.raw --frames 100\n"

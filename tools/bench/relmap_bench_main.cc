@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
     own->footer(std::string("Example:\n  relmap-bench ") + subcommand.name + " --json");
     runs.emplace_back(own, subcommand.declare(*own));  // subcommands with required options set their own footer
   }
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.footer(
       "Examples:\n"
       "  relmap-bench rba --json\n"

@@ -38,7 +38,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   app.add_option("--bus", options.bus, "bus on which cameras are looked for")
       ->check(CLI::IsMember({"auto", "usb", "1394"}))
       ->capture_default_str();

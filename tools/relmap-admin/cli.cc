@@ -45,7 +45,7 @@ void declare(CLI::App& app, Context& context, Action& action) {
   app.add_option("--deadline", context.deadline_s, "time limit of work that a daemon does, in seconds")
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
                          add_stats, add_credentials})
     add(app, action);

@@ -52,7 +52,7 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   app.add_option("--server", options.server, "the daemon: its data folder, or HOST:PORT")
       ->envname("RELMAP_SERVER")
       ->required();

@@ -439,7 +439,7 @@ int main(int argc, char** argv) {
       "  relmap-sim pictures --out training --seed 11 --pairs 120 --laps 1 --step 0.8\n"
       "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3\n"
       "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   PicturesCommand pictures;
   PointsCommand points;
   pictures.add_to(app);

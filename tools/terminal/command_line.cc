@@ -5,6 +5,8 @@
 #include <ostream>
 #include <string_view>
 
+#include "proto/base/version.h"
+
 namespace relmap::terminal {
 
 namespace {
@@ -108,7 +110,9 @@ std::vector<std::string> likely_meant(const std::string& typed, const std::vecto
   return names;
 }
 
-void add_version(CLI::App& app) { app.set_version_flag("--version", RELMAP_VERSION, "Print the version and exit"); }
+void add_standard_options(CLI::App& app) {
+  app.set_version_flag("--version", version_line(), "Print the version and exit");
+}
 
 int end_with(const CLI::App& app, const CLI::ParseError& error, std::ostream& out, std::ostream& err, int usage) {
   if (error.get_exit_code() == 0) return app.exit(error, out, err);

@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <sstream>
 
+#include "proto/base/version.h"
+
 namespace relmap::terminal {
 namespace {
 
@@ -32,7 +34,7 @@ struct Ended {
 
 Ended end(std::vector<const char*> arguments) {
   CLI::App app("for a test", "prog");
-  add_version(app);
+  add_standard_options(app);
   app.fallthrough();
   app.require_subcommand(1);
   std::string server, id;
@@ -87,7 +89,7 @@ TEST(CommandLine, HelpIsOfTheGivenCommandAndTheVersionIsPrinted) {
   EXPECT_EQ(help.err, "");
   const Ended version = end({"--version"});
   EXPECT_EQ(version.code, 0);
-  EXPECT_EQ(version.out, RELMAP_VERSION "\n");
+  EXPECT_EQ(version.out, version_line() + "\n");
 }
 
 }  // namespace

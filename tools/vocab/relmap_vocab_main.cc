@@ -202,7 +202,7 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
 
 int main(int argc, char** argv) {
   CLI::App app("Visual vocabularies of relmap: words, their Chow-Liu tree, and sample places.", "relmap-vocab");
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
