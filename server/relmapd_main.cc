@@ -29,7 +29,7 @@ using relmap::Status;
 using relmap::ops::Config;
 using Who = relmap::ingest::LcmAuthentication::Who;
 
-constexpr const char* kFooter = R"(examples:
+constexpr const char* kFooter = R"(Examples:
   relmapd --data /srv/map
   relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0' --credentials /etc/relmap/credentials
   relmapd --config /etc/relmapd.yaml --check-config
@@ -48,7 +48,7 @@ SIGHUP reads the access list and the log level again; certificates are read with
 SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
 once, without loss: the next start applies the rest.
 
-exit codes:
+Exit codes:
   0  stopped by a signal; with --check-config: the configuration is sound
   1  the last commit failed, memory ran out (BUDGET_EXCEEDED), or an internal error; nothing acknowledged is lost
   2  BAD_CONFIG, or wrong usage
@@ -122,7 +122,8 @@ struct CommandLine {
     app.add_option("--memory-budget-mb", memory_budget_mb,
                    "Memory budget for everything that grows with map and load, in MB (default 1024, at least 32)");
     app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
-    app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)");
+    app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)")
+        ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
     app.add_flag(
         "--deterministic", deterministic,
         "Look up places and relax at fixed points of the input, so that the same input gives the same map; slower");
@@ -223,7 +224,7 @@ int main(int argc, char** argv) {
   // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   spdlog::set_default_logger(spdlog::stderr_color_mt("relmapd"));
-  CLI::App app("relmapd: a map server for fleets of stereo robots", "relmapd");
+  CLI::App app("A map server for fleets of stereo robots.", "relmapd");
   app.footer(kFooter);
   CommandLine line;
   line.declare(app);

@@ -16,6 +16,9 @@ std::string_view version();
 // it. Empty if that is not known, since the sources were built outside a git repository.
 std::string_view build_commit();
 
+// The day of that commit, "2026-11-30", or of SOURCE_DATE_EPOCH; empty if neither is known.
+std::string_view build_date();
+
 // "relmap 0.2.0 (ed5a5e5e5e0e)", or "relmap 0.2.0" if the commit is not known.
 std::string version_line();
 

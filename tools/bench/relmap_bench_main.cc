@@ -63,7 +63,11 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  relmap-bench rba --json\n"
       "  relmap-bench routes --help\n"
-      "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
+      "\n"
+      "Exit codes:\n"
+      "  0  done\n"
+      "  1  failed; the reason is printed\n"
+      "  2  wrong usage");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -16,8 +16,15 @@ be on another machine; paths are then paths on that machine.
 
 Data goes to stdout, everything else to stderr. With --json each finding is a document, and the last document gives the
 outcome in the keys reason and message, also after a failure.
-Exit codes: 0 fine; 1 failed; 2 wrong usage; 3 damage was found, or data were lost to it; 4 another process owns the
-folder and must be stopped first; 5 no daemon answers; 130 interrupted.
+
+Exit codes:
+  0    fine
+  1    failed; the first word on stderr is the reason
+  2    wrong usage
+  3    damage was found, or data were lost to it
+  4    another process owns the folder and must be stopped first
+  5    no daemon answers
+  130  interrupted
 
 Examples:
   relmap-admin stats /var/lib/relmap

@@ -296,6 +296,7 @@ void add_credentials(CLI::App& app, Action& action) {
   auto* all = app.add_subcommand("credentials", "make, list and revoke what lets robots and operators in");
   all->require_subcommand(1);
   all->footer(R"(
+Examples:
   relmap-admin credentials ca /etc/relmap/credentials --host map.example
   relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot
   relmap-admin credentials new /etc/relmap/credentials dashboard --role reader --token
@@ -308,11 +309,12 @@ void add_credentials(CLI::App& app, Action& action) {
   auto ca_options = std::make_shared<CaOptions>();
   auto* ca = all->add_subcommand(
       "ca", "make the authority of a fleet, unless it is there, and a new certificate for the daemon");
-  ca->add_option("FOLDER", ca_options->folder, "where everything is kept")->required();
+  ca->add_option("FOLDER", ca_options->folder, "where everything is kept")->type_name("FOLDER")->required();
   ca->add_option(
-      "--host", ca_options->hosts,
-      "names and addresses by which callers reach the daemon, besides localhost, this machine's name, and those "
-      "of the certificate that is renewed");
+        "--host", ca_options->hosts,
+        "names and addresses by which callers reach the daemon, besides localhost, this machine's name, and those "
+        "of the certificate that is renewed")
+      ->type_name("HOST");
   days(ca, ca_options->days);
   ca->callback([&action, ca_options] {
     action = [ca_options](Context& context) { return make_authority(*ca_options, context); };
@@ -320,7 +322,7 @@ void add_credentials(CLI::App& app, Action& action) {
 
   auto new_options = std::make_shared<NewOptions>();
   auto* fresh = all->add_subcommand("new", "issue a certificate, or a token, to a robot, an operator or a reader");
-  fresh->add_option("FOLDER", new_options->folder, "made by credentials ca")->required();
+  fresh->add_option("FOLDER", new_options->folder, "made by credentials ca")->type_name("FOLDER")->required();
   fresh->add_option("NAME", new_options->name, "of a robot: as its keyframes have it, and it may send no others")
       ->required();
   fresh->add_option("--role", new_options->role, "reader (asks), robot (also sends keyframes), operator (also edits)")
@@ -335,13 +337,13 @@ void add_credentials(CLI::App& app, Action& action) {
 
   auto folder = std::make_shared<std::string>();
   auto* list = all->add_subcommand("list", "show what was issued: role, kind, state, expiry, name");
-  list->add_option("FOLDER", *folder, "made by credentials ca")->required();
+  list->add_option("FOLDER", *folder, "made by credentials ca")->type_name("FOLDER")->required();
   list->callback(
       [&action, folder] { action = [folder](Context& context) { return list_credentials(*folder, context); }; });
 
   auto name = std::make_shared<std::string>();
   auto* revoke = all->add_subcommand("revoke", "let a name in no more, at once");
-  revoke->add_option("FOLDER", *folder, "made by credentials ca")->required();
+  revoke->add_option("FOLDER", *folder, "made by credentials ca")->type_name("FOLDER")->required();
   revoke->add_option("NAME", *name, "as it was issued")->required();
   revoke->callback([&action, folder, name] {
     action = [folder, name](Context& context) { return revoke_credentials(*folder, *name, context); };

@@ -17,8 +17,13 @@ constexpr char kFooter[] = R"(
 --credentials names the file that proves who asks; its default is $RELMAP_CREDENTIALS, and a folder needs none.
 A frame is written session:index, as 3:120; an edge session:index/ordinal, as 3:120/1.
 Data goes to stdout, everything else to stderr.
-Exit codes: 0 done; 1 refused or failed (the first word on stderr is the reason); 2 wrong usage; 3 no daemon answers,
-or ingest: keyframes were refused; 5 ingest: everything is in the map, but some of it cannot be trusted.
+
+Exit codes:
+  0  done
+  1  refused or failed; the first word on stderr is the reason
+  2  wrong usage
+  3  no daemon answers; ingest: keyframes were refused
+  5  ingest: everything is in the map, but some of it cannot be trusted
 
 Examples:
   relmap --server /var/lib/relmap status
@@ -54,6 +59,7 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.fallthrough();
   terminal::add_standard_options(app);
   app.add_option("--server", options.server, "the daemon: its data folder, or HOST:PORT")
+      ->type_name("FOLDER|HOST:PORT")
       ->envname("RELMAP_SERVER")
       ->required();
   app.add_option("--credentials", options.credentials,

@@ -32,7 +32,8 @@ std::string upper(std::string text) {
 // A phrase as a sentence. A first word that is a name stays as it is.
 std::string sentence(std::string text, const std::vector<std::string>& names = {}) {
   if (text.empty()) return text;
-  const std::string first = text.substr(0, text.find(' '));
+  std::string first = text.substr(0, text.find(' '));
+  if (first.ends_with(',')) first.pop_back();
   const bool ordinary = std::all_of(first.begin(), first.end(), [](unsigned char c) { return std::islower(c) != 0; }) &&
                         std::find(names.begin(), names.end(), first) == names.end() && !first.starts_with("relmap");
   if (ordinary) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
@@ -193,7 +194,7 @@ std::string manual_page(const CLI::App& app) {
   std::string description = roff_prose(sentence(program.description)) + "\n", lists, exit_codes, examples;
   for (const FooterPart& part : parts_of(program.footer)) {
     if (!part.paragraph.empty())
-      description += paragraph_of(part.paragraph);
+      (exit_codes.empty() ? description : exit_codes) += paragraph_of(part.paragraph);
     else if (part.heading == "Examples")
       examples += list_of(part);
     else if (part.heading == "Exit codes")
@@ -201,9 +202,9 @@ std::string manual_page(const CLI::App& app) {
     else
       lists += section_of(upper(part.heading), list_of(part));
   }
-  const std::string release = "relmap " + std::string(version());
-  const std::string text = ".TH " + roff_escaped(upper(name)) + " " + std::to_string(manual_section(name)) +
-                           " \"\" \"" + release + "\" \"relmap\"\n.nh\n.ad l\n" +
+  const std::string title = ".TH " + roff_escaped(upper(name)) + " " + std::to_string(manual_section(name)) + " \"" +
+                            std::string(build_date()) + "\" \"relmap " + std::string(version()) + "\" \"relmap\"\n";
+  const std::string text = title + ".nh\n.ad l\n" +
                            section_of("NAME", roff_escaped(name) + " \\- " + roff_escaped(summary_of(program)) + "\n") +
                            section_of("SYNOPSIS", usage_of(program)) + section_of("DESCRIPTION", description) +
                            section_of("OPTIONS", entries_of(program, true)) +

@@ -37,16 +37,18 @@ Spaces spaces_of(const std::string& command) {
   return spaces;
 }
 
-// Where to divide a command that is too wide: before an option, so that its value stays with it, else at the last space
-// that fits. 0: nowhere.
+// Where to divide a command that is too wide: behind a pipe, else before an option, so that its value stays with it,
+// else at the last space that fits. 0: nowhere.
 std::size_t division_of(const std::string& command) {
   const std::size_t begin = command.find_first_not_of(' ');
-  std::size_t space = 0, before_option = 0;
+  std::size_t space = 0, before_option = 0, behind_pipe = 0;
   for (const std::size_t i : spaces_of(command).at) {
     if (i <= begin || i + 2 > kPageWidth) continue;
     space = i;
+    if (command[i - 1] == '|') behind_pipe = i;
     if (i + 1 < command.size() && command[i + 1] == '-') before_option = i;
   }
+  if (behind_pipe > 0) return behind_pipe;
   return before_option > 0 ? before_option : space;
 }
 
@@ -59,7 +61,7 @@ void add_command(std::string command, std::vector<std::string>& lines) {
   while (command.size() > kPageWidth) {
     const std::size_t end = division_of(command);
     if (end == 0) break;
-    lines.push_back(command.substr(0, end) + " \\");
+    lines.push_back(command.substr(0, end) + (command[end - 1] == '|' ? "" : " \\"));
     command = std::string(kContinuation, ' ') + command.substr(end + 1);
   }
   lines.push_back(command);
