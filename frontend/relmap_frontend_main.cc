@@ -130,8 +130,7 @@ int main_function(int argc, char** argv) {
           ->type_name("FOLDER|HOST:PORT")
           ->excludes(lcm);
   app.add_option("--credentials", a.credentials,
-                 "file that proves which robot this is, over TLS and over LCM (relmap-admin credentials makes it);\n"
-                 "$RELMAP_CREDENTIALS")
+                 "file that proves which robot this is, over TLS and over LCM (relmap-admin credentials makes it)")
       ->type_name("FILE")
       ->envname("RELMAP_CREDENTIALS");
   app.add_option("--map", map,

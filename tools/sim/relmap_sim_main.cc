@@ -132,7 +132,8 @@ struct PicturesCommand {
     c->add_option("--exposure-jumps", world.exposure_jumps, "Sudden changes of the gain per 100 pairs")
         ->capture_default_str();
     c->add_option("--exposure", world.exposure_s, "Exposure time in seconds, for motion blur")->capture_default_str();
-    c->add_option("--faults", faults, "none, all (which also drops 5 % of the pairs), or kind:frame,kind:frame...")
+    c->add_option("--faults", faults,
+                  "What goes wrong: none, all (which also drops 5 % of the pairs), or kind:frame,kind:frame...")
         ->capture_default_str();
     c->add_option("--drop-share", world.drop_share, "Share of the pairs that are dropped")->capture_default_str();
     c->add_flag("--imu", imu, "Write also the measurements of an inertial unit");

@@ -92,5 +92,20 @@ TEST(CommandLine, HelpIsOfTheGivenCommandAndTheVersionIsPrinted) {
   EXPECT_EQ(version.out, version_line() + "\n");
 }
 
+TEST(CommandLine, ManualAndCompletionAreWrittenWhateverElseIsRequired) {
+  const Ended manual = end({"--manual"});
+  EXPECT_EQ(manual.code, 0);
+  EXPECT_THAT(manual.out, StartsWith(".TH PROG 1 "));
+  EXPECT_THAT(manual.out, HasSubstr("\n.SS edge remove\n"));
+  const Ended below = end({"edge", "remove", "--completion", "fish"});
+  EXPECT_EQ(below.code, 0);
+  EXPECT_THAT(below.out, StartsWith("# fish completion of prog"));
+  const Ended unknown = end({"--completion", "csh"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("csh not in {bash,zsh,fish}"));
+  const Ended help = end({"--help"});
+  EXPECT_EQ(help.out.find("--manual"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace relmap::terminal

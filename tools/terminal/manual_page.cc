@@ -33,7 +33,7 @@ std::string upper(std::string text) {
 std::string sentence(std::string text, const std::vector<std::string>& names = {}) {
   if (text.empty()) return text;
   std::string first = text.substr(0, text.find(' '));
-  if (first.ends_with(',')) first.pop_back();
+  if (first.ends_with(',') || first.ends_with(';')) first.pop_back();
   const bool ordinary = std::all_of(first.begin(), first.end(), [](unsigned char c) { return std::islower(c) != 0; }) &&
                         std::find(names.begin(), names.end(), first) == names.end() && !first.starts_with("relmap");
   if (ordinary) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
@@ -115,12 +115,12 @@ std::string usage_of(const CommandModel& command) {
 
 std::string list_of(const FooterPart& list) {
   if (!list.commands.empty()) return roff_commands(list.commands);
-  std::string text;
+  std::string text = ".PD 0\n";  // no lines between items, of which most are short
   for (const FooterItem& item : list.items) {
     text += ".TP\n" + roff_bold(item.term) + "\n";
     text += item.text.empty() ? "\\&\n" : roff_prose(item.text) + "\n";
   }
-  return text;
+  return text + ".PD\n";
 }
 
 std::string paragraph_of(const std::string& text) { return ".PP\n" + roff_prose(text) + "\n"; }
@@ -164,7 +164,7 @@ std::string environment_of(const CommandModel& program) {
 std::string summary_of(const CommandModel& program) {
   std::string text = program.description;
   if (text.ends_with('.')) text.pop_back();
-  if (text.size() > 1 && std::islower(static_cast<unsigned char>(text[1])) != 0)
+  if (text.size() > 1 && std::isupper(static_cast<unsigned char>(text[1])) == 0)
     text[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(text[0])));
   return text;
 }

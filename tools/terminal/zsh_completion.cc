@@ -70,7 +70,8 @@ std::string below_of(const CommandModel& command) {
       "commands=(\n";
   for (const CommandModel& below : command.commands)
     text += "        " + shell_quoted(below.name() + ":" + below.description) + "\n";
-  text += "      )\n      _describe -t commands " + shell_quoted(command.full_name() + " command") +
+  text += "      )\n      (( ${words[(I)--]} )) || _describe -t commands " +
+          shell_quoted(command.full_name() + " command") +
           " commands\n      ;;\n    argument)\n      curcontext=${curcontext%:*}-$words[1]:\n      case $words[1] in\n";
   for (const CommandModel& below : command.commands)
     text += "        " + below.name() + ") " + function_of(below) + " ;;\n";
