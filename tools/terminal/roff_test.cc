@@ -18,7 +18,7 @@ TEST(Roff, OptionsAndQuotedCommandsAreBold) {
 }
 
 TEST(Roff, CommandsThatAreTooWideAreContinued) {
-  const std::string wide(50, 'x');
+  const std::string wide(56, 'x');
   EXPECT_EQ(roff_commands({"prog " + wide + " --out file"}),
             ".RS 4\n.nf\nprog " + wide + " \\e\n    \\-\\-out file\n.fi\n.RE\n");
   EXPECT_EQ(roff_commands({"prog " + wide + " | jq --raw .x"}),

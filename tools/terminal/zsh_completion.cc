@@ -27,7 +27,7 @@ std::string message_and_action(const OptionModel& option, const std::string& mes
   } else if (option.takes_file()) {
     action = "_files";
   } else if (option.takes_folder()) {
-    action = "_files -/";
+    action = "_path_files -/";  // _files -/ falls back on files
   }
   return escaped_for_arguments(message, ":") + ":" + action;
 }
