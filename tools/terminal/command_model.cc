@@ -2,10 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <initializer_list>
 #include <regex>
 #include <set>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 namespace relmap::terminal {
 

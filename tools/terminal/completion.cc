@@ -1,7 +1,9 @@
 #include "tools/terminal/completion.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <iterator>
+#include <utility>
 
 #include "tools/terminal/command_model.h"
 
