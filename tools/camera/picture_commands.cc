@@ -248,9 +248,10 @@ void add_show(CLI::App& app, Action& action) {
   command->footer("Example:\n  relmap-camera show 7140058 --out pictures/ --count 5");
   auto wish = std::make_shared<ShowOptions>();
   command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording")->type_name("CAMERA|FILE");
-  command->add_option("--out", wish->out, "folder for the pictures; created if it does not exist")
-      ->type_name("FOLDER")
-      ->capture_default_str();
+  command
+      ->add_option("--out", wish->out,
+                   "folder for the pictures; created if it does not exist (default: the current one)")
+      ->type_name("FOLDER");
   command->add_option("--count", wish->count, "number of pairs")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();

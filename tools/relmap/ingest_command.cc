@@ -279,7 +279,9 @@ void add_ingest(CLI::App& app, Action& action) {
   batch::BatchOptions& how = options->batch;
   how.jobs = usual_jobs();
   how.summaries = default_summaries();
-  command->add_option("PATH", options->paths, "recordings: folders of pictures, files of keyframes, logs of lcm-logger")
+  command
+      ->add_option("PATH", options->paths,
+                   "the recordings: folders of pictures, files of keyframes, logs of lcm-logger")
       ->type_name("FILE|FOLDER")
       ->required();
   command->add_option("--source", how.recordings.source, "kind of the recordings; auto recognises it")

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <string_view>
 
 namespace relmap::terminal {
 
@@ -46,7 +47,8 @@ std::size_t division_of(const std::string& command) {
     if (i <= begin || i + 2 > kPageWidth) continue;
     space = i;
     if (command[i - 1] == '|') behind_pipe = i;
-    if (i + 1 < command.size() && command[i + 1] == '-') before_option = i;
+    const std::string_view next = std::string_view(command).substr(i + 1);
+    if (next.size() > 1 && next[0] == '-' && std::isdigit(static_cast<unsigned char>(next[1])) == 0) before_option = i;
   }
   if (behind_pipe > 0) return behind_pipe;
   return before_option > 0 ? before_option : space;

@@ -25,6 +25,8 @@ TEST(Roff, CommandsThatAreTooWideAreContinued) {
             ".RS 4\n.nf\nprog " + wide + " |\n    jq \\-\\-raw .x\n.fi\n.RE\n");
   EXPECT_EQ(roff_commands({"prog " + wide + "   # a comment"}),
             ".RS 4\n.nf\n# a comment\nprog " + wide + "\n.fi\n.RE\n");
+  EXPECT_EQ(roff_commands({"prog --north " + std::string(45, 'x') + " --east -1.25"}),
+            ".RS 4\n.nf\nprog \\-\\-north " + std::string(45, 'x') + " \\e\n    \\-\\-east \\-1.25\n.fi\n.RE\n");
   // Not within quotes, even if it stays too wide.
   EXPECT_EQ(roff_commands({"'" + wide + " " + wide + "'"}),
             ".RS 4\n.nf\n\\(aq" + wide + " " + wide + "\\(aq\n.fi\n.RE\n");
