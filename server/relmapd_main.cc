@@ -32,7 +32,7 @@ using relmap::Status;
 using relmap::ops::Config;
 using Who = relmap::ingest::LcmAuthentication::Who;
 
-constexpr const char* kFooter = R"(examples:
+constexpr const char* kFooter = R"(Examples:
   relmapd --data /srv/map
   relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0' --credentials /etc/relmap/credentials
   relmapd --config /etc/relmapd.yaml --check-config
@@ -55,7 +55,7 @@ journal and its worker make progress.
 SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
 once, without loss: the next start applies the rest.
 
-exit codes:
+Exit codes:
   0  stopped by a signal; with --check-config: the configuration is sound
   1  the last commit failed, memory ran out (BUDGET_EXCEEDED), or an internal error; nothing acknowledged is lost
   2  BAD_CONFIG, or wrong usage
@@ -154,7 +154,7 @@ struct CommandLine {
                  "Check whether the daemon could start with these settings, write nothing, and exit");
     app.add_flag("--print-config", print_config, "Print all settings as they would be in force, and exit");
     app.add_flag("--sample-config", sample_config, "Print a configuration file with all settings explained, and exit");
-    relmap::terminal::add_version(app);
+    relmap::terminal::add_standard_options(app);
   }
 
   Status apply(Config& config) const {
@@ -259,7 +259,7 @@ int main(int argc, char** argv) {
   // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   relmap::monitor::set_up_log("auto");
-  CLI::App app("relmapd: a map server for fleets of stereo robots", "relmapd");
+  CLI::App app("A map server for fleets of stereo robots.", "relmapd");
   app.footer(kFooter);
   CommandLine line;
   line.declare(app);

@@ -12,6 +12,7 @@
 #include "proto/base/clock.h"
 #include "proto/base/hex.h"
 #include "proto/base/mutex.h"
+#include "proto/base/version.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
 #include "server/monitor/clock_watch.h"
@@ -202,7 +203,8 @@ Status Daemon::Impl::open_map() {
 
 Status Daemon::Impl::serve() {
   rpc::DaemonFacts facts;
-  facts.version = RELMAP_VERSION;
+  facts.version = version();
+  facts.commit = build_commit();
   facts.boot_id = hex(boot);
   facts.data_folder = std::filesystem::absolute(config.data).string();
   facts.lcm_url = config.lcm;
@@ -376,7 +378,7 @@ DaemonStatus Daemon::Impl::lcm_status() const {
   const auto view = mapper->view();
   const map::MapperStats stats = mapper->stats();
   DaemonStatus status;
-  status.version = RELMAP_VERSION;
+  status.version = version();
   status.sessions = view->session_counts().all;
   status.keyframes = view->state().keyframes;
   status.refused = std::accumulate(view->state().refused.begin(), view->state().refused.end(), std::uint64_t{0});
@@ -465,7 +467,7 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
   std::unique_ptr<Daemon> daemon(new Daemon(std::make_unique<Impl>(config)));
   if (Status status = daemon->impl_->open_map(); !status.ok()) return with_advice(status, config);
   if (Status status = daemon->impl_->serve(); !status.ok()) return status;
-  spdlog::info("relmapd {} serves {} at {}{}{}{}", RELMAP_VERSION, config.data, daemon->socket(),
+  spdlog::info("relmapd {} serves {} at {}{}{}{}", version(), config.data, daemon->socket(),
                daemon->address().empty() ? std::string() : ", gRPC on " + daemon->address(),
                daemon->http().empty() ? std::string() : ", HTTP on " + daemon->http(),
                daemon->impl_->lcm ? ", LCM on " + config.lcm : std::string());

@@ -61,12 +61,16 @@ int main(int argc, char** argv) {
     own->footer(std::string("Example:\n  relmap-bench ") + subcommand.name + " --json");
     runs.emplace_back(own, subcommand.declare(*own));  // subcommands with required options set their own footer
   }
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.footer(
       "Examples:\n"
       "  relmap-bench rba --json\n"
       "  relmap-bench routes --help\n"
-      "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
+      "\n"
+      "Exit codes:\n"
+      "  0  done\n"
+      "  1  failed; the reason is printed\n"
+      "  2  wrong usage");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

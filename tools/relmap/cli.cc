@@ -19,8 +19,13 @@ constexpr char kFooter[] = R"(
 --credentials names the file that proves who asks; its default is $RELMAP_CREDENTIALS, and a folder needs none.
 A frame is written session:index, as 3:120; an edge session:index/ordinal, as 3:120/1.
 Data goes to stdout, everything else to stderr.
-Exit codes: 0 done; 1 refused or failed (the first word on stderr is the reason); 2 wrong usage; 3 no daemon answers,
-or ingest: keyframes were refused; 5 ingest: everything is in the map, but some of it cannot be trusted.
+
+Exit codes:
+  0  done
+  1  refused or failed; the first word on stderr is the reason
+  2  wrong usage
+  3  no daemon answers; ingest: keyframes were refused
+  5  ingest: everything is in the map, but some of it cannot be trusted
 
 Examples:
   relmap --server /var/lib/relmap status
@@ -56,10 +61,11 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   auto* server = app.add_option("--server", options.server,
                                 "the daemon: its data folder, that of its socket, or HOST:PORT (default where relmapd "
                                 "runs as a service: /run/relmap)")
+                     ->type_name("FOLDER|HOST:PORT")
                      ->envname("RELMAP_SERVER");
   if (std::error_code error; std::filesystem::is_directory(kServiceFolder, error))
     options.server = kServiceFolder;
