@@ -253,14 +253,14 @@ TEST(IncludeRules, PartsIncludeOnlyWhatTheyMay) {
   }
 }
 
-// What tests and benchmarks share stands in tests/support.
+// What tests and benchmarks share stands in tests/support and tests/file_faults.
 TEST(IncludeRules, NothingLinksBenchmarksAndTheyLinkNoTest) {
   for (const Include& include : includes_of_sources()) {
     if (part_of(include.file) != "tools/bench") {
       EXPECT_FALSE(include.name.starts_with("tools/bench/")) << include.file << " includes " << include.name;
     } else {
       EXPECT_TRUE(!include.name.starts_with("tests/") || include.name.starts_with("tests/support/") ||
-                  include.name == "tests/paths.h")
+                  include.name.starts_with("tests/file_faults/") || include.name == "tests/paths.h")
           << include.file << " includes " << include.name;
     }
   }

@@ -181,18 +181,6 @@ TEST(Readme, BuildsAsTheDemoDoes) {
   EXPECT_EQ(seen, 3);
 }
 
-TEST(Readme, OfTheServerDescribesEverySetting) {
-  std::string source = content_of("server/ops/config.cc");
-  source.erase(0, source.find("settings() {"));
-  source.erase(source.find("return table;"));
-  const std::string described = content_of("server/README.md");
-  const std::regex key(R"re(\{"([a-z_.]+)",)re");
-  std::size_t keys = 0;
-  for (std::sregex_iterator found(source.begin(), source.end(), key), end; found != end; ++found, ++keys)
-    EXPECT_NE(described.find("| `" + found->str(1) + "` |"), std::string::npos) << found->str(1);
-  EXPECT_GE(keys, 24u) << "settings() has another form";
-}
-
 TEST(Readme, TellsOfTheDriveThatTheDemoMakes) {
   const std::string demo = read_text(RELMAP_SOURCE_DIR "/tools/demo");
   const int pairs = static_cast<int>(published_figure("README.md", "`tools/demo` renders ([0-9]+) stereo pairs"));

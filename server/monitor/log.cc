@@ -76,16 +76,17 @@ std::string on_one_line(std::string_view message) {
   return line;
 }
 
-std::string with_request(std::string_view message) {
-  const rpc::RequestContext* request = rpc::current_request();
-  return (request ? "[" + request->request_id + "] " : std::string()) + on_one_line(message);
+// What people read in passing is not cluttered by the request's id; what they look into has it.
+std::string with_request(const spdlog::details::log_msg& message) {
+  const rpc::RequestContext* request = message.level == Level::info ? nullptr : rpc::current_request();
+  return (request ? "[" + request->request_id + "] " : std::string()) + on_one_line(view(message.payload));
 }
 
 // The message in the text format.
 class MessageFlag final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
-    const std::string line = with_request(view(message.payload));
+    const std::string line = with_request(message);
     out.append(line.data(), line.data() + line.size());
   }
   std::unique_ptr<spdlog::custom_flag_formatter> clone() const override { return std::make_unique<MessageFlag>(); }
@@ -119,7 +120,7 @@ std::string json_line(const spdlog::details::log_msg& message) {
 }
 
 std::string journal_line(const spdlog::details::log_msg& message) {
-  return "<" + std::to_string(priority_of(message.level)) + ">" + with_request(view(message.payload));
+  return "<" + std::to_string(priority_of(message.level)) + ">" + with_request(message);
 }
 
 // systemd names the device and inode of what it connected to standard error (systemd.exec(5)).
