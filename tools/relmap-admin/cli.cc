@@ -46,8 +46,8 @@ void declare(CLI::App& app, Context& context, Action& action) {
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
   terminal::add_version(app);
-  for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
-                         add_stats, add_credentials})
+  for (const auto add : {add_verify, add_repair, add_backup, add_drill, add_restore, add_compact, add_migrate,
+                         add_reindex, add_stats, add_credentials})
     add(app, action);
 }
 

@@ -19,6 +19,15 @@ std::string owner_of(const std::string& directory) {
   return "relmapd (process " + std::to_string(where->pid) + ") at " + where->address;
 }
 
+Result<std::unique_ptr<client::Client>> connect(const Context& context, const std::string& server) {
+  client::ClientOptions options;
+  options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(context.deadline_s * 1e3));
+  options.credentials = context.credentials;
+  return client::Client::connect(server, options);
+}
+
+}  // namespace
+
 Status check_map(const std::string& directory) {
   std::error_code error;
   const bool folder = std::filesystem::is_directory(directory, error);
@@ -29,15 +38,6 @@ Status check_map(const std::string& directory) {
   if (!map) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
   return {};
 }
-
-Result<std::unique_ptr<client::Client>> connect(const Context& context, const std::string& server) {
-  client::ClientOptions options;
-  options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(context.deadline_s * 1e3));
-  options.credentials = context.credentials;
-  return client::Client::connect(server, options);
-}
-
-}  // namespace
 
 Result<Target> open_target(const Context& context, const std::string& directory, Access access) {
   if (directory.empty() && context.server.empty())

@@ -24,6 +24,9 @@ enum class Access { kRead, kWrite };
 // FOLDER_LOCKED if a process owns it that does not answer; UNREACHABLE.
 Result<Target> open_target(const Context& context, const std::string& directory, Access access);
 
+// Checks that the folder holds a map. NO_SUCH_FILE, NOT_ALLOWED.
+Status check_map(const std::string& directory);
+
 // Checks that the folder holds a map that no process owns. FOLDER_LOCKED with the daemon to stop; NO_SUCH_FILE.
 Status check_free(const std::string& directory);
 
