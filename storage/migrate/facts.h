@@ -12,9 +12,9 @@ namespace relmap::storage {
 
 struct MapFactSums {
   std::uint64_t sessions = 0, frames = 0, edges = 0, landmarks = 0, observations = 0, features = 0;
-  std::uint64_t labels = 0;          // of frames
-  std::uint64_t journal_records = 0; // that the map does not contain yet
-  std::uint64_t hash = 0;            // of all facts, down to each number; estimates to the precision of today's format
+  std::uint64_t labels = 0;           // of frames
+  std::uint64_t journal_records = 0;  // that the map does not contain yet
+  std::uint64_t hash = 0;             // of all facts, down to each number; estimates to the precision of today's format
 
   bool operator==(const MapFactSums&) const = default;
 };

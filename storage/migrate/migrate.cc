@@ -204,8 +204,8 @@ std::uint64_t copy_format2(const Engine& source, const std::string& from, const 
     for (const auto& entry : fs::directory_iterator(from + part)) {
       const std::string name = entry.path().filename().string(), target = to + part + "/" + name;
       if (!entry.is_regular_file() || name == "LOCK") continue;
-      throw_if(copy_map_file(*files, entry.path().string(), target, /*share=*/true,
-                             [](std::uint64_t) { return Status(); }));
+      throw_if(
+          copy_map_file(*files, entry.path().string(), target, /*share=*/true, [](std::uint64_t) { return Status(); }));
       if (progress) progress(0, frames);
     }
   }

@@ -23,7 +23,8 @@ bool can_share(const std::string& directory, const std::string& scratch) {
 }
 
 // Bytes that a copy and its migration write at most. What is copied from format 1 is written anew, in fewer bytes.
-std::uint64_t needed_bytes(const std::string& directory, const std::vector<std::string>& files, int format, bool share) {
+std::uint64_t needed_bytes(const std::string& directory, const std::vector<std::string>& files, int format,
+                           bool share) {
   std::uint64_t copied = 0, all = 0;
   for (const std::string& file : files) {
     const std::uint64_t size = fs::file_size(directory + "/" + file);
@@ -41,9 +42,8 @@ void copy_map(const std::string& directory, const std::string& to, const std::ve
     if (!share || !is_sharable(file)) total += fs::file_size(directory + "/" + file);
   for (const char* part : {"", "/journal", "/map"}) throw_if(disk->create_directory(to + part));
   for (const std::string& file : files)
-    throw_if(copy_map_file(*disk, directory + "/" + file, to + "/" + file, share, [&](std::uint64_t bytes) {
-      return progress("copying", done += bytes, total);
-    }));
+    throw_if(copy_map_file(*disk, directory + "/" + file, to + "/" + file, share,
+                           [&](std::uint64_t bytes) { return progress("copying", done += bytes, total); }));
 }
 
 MapFactSums facts_of(const std::string& directory, int format, std::uint64_t frames,

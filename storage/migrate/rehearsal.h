@@ -21,8 +21,8 @@ struct MigrationRehearsal {
   std::vector<std::string> differences;  // what the migrated map has otherwise, in words; empty: nothing
 };
 
-// `step` is "copying", "reading" or "migrating", with units done and their number (0: not known), in bytes or frames. If
-// it returns a status other than OK, the rehearsal ends with that status.
+// `step` is "copying", "reading" or "migrating", with units done and their number (0: not known), in bytes or frames.
+// If it returns a status other than OK, the rehearsal ends with that status.
 using RehearsalProgress = std::function<Status(const char* step, std::uint64_t done, std::uint64_t total)>;
 
 // Copies the map in `directory` into `scratch`, an empty folder, and migrates the copy. Nothing in `directory` is

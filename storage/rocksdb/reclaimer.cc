@@ -10,7 +10,6 @@
 namespace relmap::storage {
 namespace {
 
-
 constexpr std::uint64_t kCommitsPerLook = 32;
 constexpr std::uint64_t kMinBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kShare = 2;  // collected at half of what is kept: freeing a byte moves two

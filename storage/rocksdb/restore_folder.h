@@ -23,8 +23,8 @@ using CheckCopy = std::function<Status(const std::string& copy)>;
 // nothing with it. `to` must be
 // missing or empty, and must not lie in `backup` or contain it. It appears when it is complete and durable, with its
 // epoch raised to `now_us`, microseconds UTC. Numbers of new sessions begin 2^20 above those of the backup. The bytes
-// are copied unchecked: verify them before, or by `check`, where it matters. NO_SUCH_FILE: there is no map. FOLDER_LOCKED,
-// INVALID_ARGUMENT, IO_ERROR, DISK_FULL.
+// are copied unchecked: verify them before, or by `check`, where it matters. NO_SUCH_FILE: there is no map.
+// FOLDER_LOCKED, INVALID_ARGUMENT, IO_ERROR, DISK_FULL.
 Result<Restored> restore_folder(const std::string& backup, const std::string& to, std::uint64_t now_us,
                                 const EngineProgress& progress, const CheckCopy& check = {});
 

@@ -1,17 +1,22 @@
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <thread>
 
 #include "proto/base/clock.h"
+#include "storage/io/disk_space.h"
 #include "storage/io/file.h"
 #include "storage/maintenance/stored_hash.h"
 #include "storage/migrate/migrate.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/map_files.h"
+#include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/restore_folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "tools/relmap-admin/drill_daemon.h"
@@ -42,10 +47,10 @@ class Drill {
 
   Status run() {
     using Step = Status (Drill::*)();
-    const std::pair<const char*, Step> steps[] = {
-        {"restore", &Drill::restore}, {"hash", &Drill::compare_hash}, {"read", &Drill::read_known},
-        {"start", &Drill::start},     {"settle", &Drill::settle},     {"questions", &Drill::ask},
-        {"stop", &Drill::stop}};
+    const std::pair<const char*, Step> steps[] = {{"restore", &Drill::restore}, {"hash", &Drill::compare_hash},
+                                                  {"read", &Drill::read_known}, {"start", &Drill::start},
+                                                  {"settle", &Drill::settle},   {"questions", &Drill::ask},
+                                                  {"stop", &Drill::stop}};
     for (const auto& [name, step] : steps) {
       step_ = name;
       const Status done = (this->*step)();
@@ -60,11 +65,12 @@ class Drill {
   const QuestionCounts& counts() const { return counts_; }
   std::uint64_t frames() const { return known_.frames; }
   int format() const { return format_; }
+  bool hash_recorded() const { return hash_recorded_; }
 
  private:
   Status restore() {
     const auto format = storage::read_format(asked_.backup);
-    if (!format.ok()) return format.status();
+    if (!format.ok()) return damaged(format.status());
     format_ = *format;
     if (format_ == 0)  // a map whose FORMAT is gone, or no map at all
       return storage::check_folder(asked_.backup).ok() ? Status(Reason::NO_SUCH_FILE, asked_.backup + " holds no map")
@@ -98,11 +104,13 @@ class Drill {
     step_ = "verify";
     const auto engine = open(copy);
     if (!engine.ok()) return damaged(engine.status());
+    const auto recorded = storage::read_recorded_hash(copy);
+    hash_recorded_ = recorded.ok() && recorded->has_value();
     const auto summary = verify_engine(context_, copy, **engine, {});
     if (!summary.ok()) return damaged(summary.status());
     if (summary->findings > 0)
-      return damaged(Status(Reason::DATA_LOSS, asked_.backup + " is damaged: " +
-                                                   counted_text(summary->findings, "finding") +
+      return damaged(Status(Reason::DATA_LOSS, asked_.backup +
+                                                   " is damaged: " + counted_text(summary->findings, "finding") +
                                                    "; `relmap-admin verify` lists them"));
     return hash_of(**engine, hash_);
   }
@@ -113,7 +121,8 @@ class Drill {
     storage::MapHash restored;
     if (Status hashed = hash_of(**engine, restored); !hashed.ok()) return hashed;
     if (restored == hash_) return {};
-    return damaged(Status(Reason::DATA_LOSS, "the restored map is another than that of the backup: their hashes differ"));
+    return damaged(
+        Status(Reason::DATA_LOSS, "the restored map is another than that of the backup: their hashes differ"));
   }
 
   Status read_known() {
@@ -130,8 +139,10 @@ class Drill {
     context_.show("starting relmapd", 0, 0, "");
     auto daemon = DrillDaemon::start(map_, log_, asked_.vocabulary, check_interrupt);
     if (daemon.reason() == Reason::WRONG_VOCABULARY)
-      return {Reason::WRONG_VOCABULARY,
-              "the words of the backup are of another vocabulary: give its file with --vocabulary, as its daemon has it"};
+      return {
+          Reason::WRONG_VOCABULARY,
+          "the words of the backup are of another vocabulary than the one that is shipped, or that --vocabulary names: "
+          "give the one that its daemon has, or run `relmap-admin reindex` once it is restored"};
     if (!daemon.ok()) return damaged(daemon.status());
     daemon_ = std::move(*daemon);
     return {};
@@ -140,23 +151,26 @@ class Drill {
   // Waits until the daemon has done what the map still had to do. If that has changed the map, what is known is read
   // again, and the daemon started again.
   Status settle() {
-    for (bool idle = false; !idle;) {
+    for (Status idle(Reason::DEADLINE, ""); !idle.ok();) {
       const auto status = daemon_->client().status();
       if (!status.ok()) return status.status();
       if (!status->storage.ok()) return damaged(status->storage);
       const std::uint64_t left = status->queued + status->lookup_lag + status->pending_frames;
-      context_.show("relmapd applies what is in the journal", 0, left, "records and frames");
+      context_.show("applying what the journal has", 0, left, "records and frames");
       if (Status going = check_interrupt(); !going.ok()) return going;
-      idle = left == 0;
-      if (!idle) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      if (left > 0)
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      else if (idle = daemon_->client().wait_idle(); !idle.ok() && idle.reason() != Reason::DEADLINE)
+        return idle;
     }
-    if (Status idle = daemon_->client().wait_idle(); !idle.ok()) return idle;
     const auto status = daemon_->client().status();
     if (!status.ok()) return status.status();
     if (status->durable_sequence == known_.applied_sequence) return {};
     if (status->frames < known_.frames)
-      return {Reason::INTERNAL, "the daemon has " + counted_text(status->frames, "frame") + " after it applied the "
-                                "journal, the backup had " + std::to_string(known_.frames)};
+      return {Reason::INTERNAL, "the daemon has " + counted_text(status->frames, "frame") +
+                                    " after it applied the "
+                                    "journal, the backup had " +
+                                    std::to_string(known_.frames)};
     for (const auto next : {&Drill::stop, &Drill::read_known, &Drill::start})
       if (Status done = (this->*next)(); !done.ok()) return done;
     return {};
@@ -178,12 +192,20 @@ class Drill {
     return ended;
   }
 
-  // The status of a step that read the map: notes whether it means damage.
+  // The status of a step that read the copy, about the backup: notes whether it means damage. What the copy lacks, the
+  // backup lacks.
   Status damaged(const Status& status) {
     static constexpr Reason kDamage[] = {Reason::DATA_LOSS, Reason::CORRUPT, Reason::TRUNCATED,
                                          Reason::UNKNOWN_FORMAT_VERSION};
     for (const Reason reason : kDamage) damage_ = damage_ || status.reason() == reason;
-    return status;
+    const bool lacks =
+        status.reason() == Reason::IO_ERROR && status.message().find(std::strerror(ENOENT)) != std::string::npos;
+    damage_ = damage_ || lacks;
+    std::string message = status.message();
+    for (const std::string& copy : {map_ + ".partial", map_})
+      for (std::size_t at; (at = message.find(copy)) != std::string::npos;)
+        message.replace(at, copy.size(), asked_.backup);
+    return {lacks ? Reason::DATA_LOSS : status.reason(), message};
   }
 
   static Result<std::shared_ptr<storage::Engine>> open(const std::string& map) {
@@ -210,6 +232,7 @@ class Drill {
   const std::string map_, log_;
   std::string step_;
   bool damage_ = false;
+  bool hash_recorded_ = false;
   int format_ = 0;
   storage::MapHash hash_;
   KnownMap known_;
@@ -225,16 +248,17 @@ std::string scratch_parent(const DrillAsked& asked) {
 
 // Room for the copy, and for what a daemon makes beside it.
 Status check_room(const DrillAsked& asked, const std::string& scratch) {
-  constexpr std::uint64_t kBesides = std::uint64_t{128} << 20;
   std::uint64_t bytes = 0;
   for (const std::string& file : storage::files_of_map(asked.backup))
     if (std::error_code missing; fs::exists(asked.backup + "/" + file, missing))
       bytes += fs::file_size(asked.backup + "/" + file);
   const auto format = storage::read_format(asked.backup);
   const bool twice = format.ok() && *format < storage::kFolderFormat;  // the migration needs both
-  const std::uint64_t needed = bytes * (twice ? 2 : 1) + bytes / 8 + kBesides;
   const auto room = storage::posix_file_system()->room(scratch);
   if (!room.ok()) return room.status();
+  // With less free than this a daemon takes the disk for full, and applies nothing (DiskSpaceOptions).
+  const std::uint64_t low_water = std::min(storage::DiskSpaceOptions().low_water, room->size / 16);
+  const std::uint64_t needed = bytes * (twice ? 2 : 1) + bytes / 8 + low_water * 3 / 2;
   if (room->free >= needed) return {};
   return {Reason::DISK_FULL, "the drill may need " + terminal::bytes_text(needed) + " in " +
                                  fs::path(scratch).parent_path().string() + ", " + terminal::bytes_text(room->free) +
@@ -259,6 +283,7 @@ Answer drill(DrillAsked asked, Context& context) {
   QuestionCounts counts;
   std::uint64_t frames = 0;
   int format = 0;
+  bool hash_recorded = false;
   answer.status = check_room(asked, (*scratch)->path());
   if (answer.status.ok()) {
     Drill drill(asked, context, (*scratch)->path());
@@ -268,6 +293,7 @@ Answer drill(DrillAsked asked, Context& context) {
     counts = drill.counts();
     frames = drill.frames();
     format = drill.format();
+    hash_recorded = drill.hash_recorded();
   }
   const std::string kept = asked.keep_scratch ? (*scratch)->path() : "";
   if (asked.keep_scratch) {
@@ -275,16 +301,18 @@ Answer drill(DrillAsked asked, Context& context) {
     context.say("kept: " + kept);
   }
   if (answer.status.ok())
-    context.say(asked.backup + ": passed; restored, verified and served: " + counted_text(frames, "frame") + ", asked " +
-                counted_text(counts.sessions, "session") + ", " + counted_text(counts.frames, "frame") + ", " +
-                counted_text(counts.transforms, "transform") + ", " + counted_text(counts.routes, "route") + ", " +
-                counted_text(counts.places, "place"));
+    context.say(asked.backup + ": passed; restored, verified and served: " + counted_text(frames, "frame") +
+                ", asked " + counted_text(counts.sessions, "session") + ", " + counted_text(counts.frames, "frame") +
+                ", " + counted_text(counts.transforms, "transform") + ", " + counted_text(counts.routes, "route") +
+                ", " + counted_text(counts.places, "place") +
+                (hash_recorded ? "" : "; no hash is recorded in it to compare with"));
   else
     answer.status = Status(answer.status.reason(), "the drill failed at '" + step + "': " + answer.status.message());
   answer.json.add("backup", asked.backup)
       .add("passed", answer.status.ok())
       .add("failed_step", step)
       .add("format", format)
+      .add("hash_recorded", hash_recorded)
       .add("frames", frames)
       .add("asked", Json()
                         .add("sessions", counts.sessions)

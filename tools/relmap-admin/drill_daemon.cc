@@ -78,7 +78,8 @@ Result<std::unique_ptr<DrillDaemon>> DrillDaemon::start(const std::string& map, 
   std::error_code error;
   const std::string program = (fs::read_symlink("/proc/self/exe", error).parent_path() / "relmapd").string();
   if (::access(program.c_str(), X_OK) != 0)
-    return Status(Reason::NO_SUCH_FILE, "there is no " + program + ": the drill starts the relmapd beside this program");
+    return Status(Reason::NO_SUCH_FILE,
+                  "there is no " + program + ": the drill starts the relmapd beside this program");
   std::vector<std::string> arguments{program, "--data", map, "--listen", "none", "--lcm", "none"};
   if (!vocabulary.empty()) arguments.insert(arguments.end(), {"--vocabulary", vocabulary});
   const pid_t pid = run(arguments, log);
@@ -88,8 +89,8 @@ Result<std::unique_ptr<DrillDaemon>> DrillDaemon::start(const std::string& map, 
   const auto status = daemon->client().status();
   if (!status.ok()) return status.status();
   if (status->version != RELMAP_VERSION)
-    return Status(Reason::UNSUPPORTED, program + " is of release " + status->version + ", this program of " +
-                                           RELMAP_VERSION);
+    return Status(Reason::UNSUPPORTED,
+                  program + " is of release " + status->version + ", this program of " + RELMAP_VERSION);
   return daemon;
 }
 
@@ -102,8 +103,7 @@ DrillDaemon::~DrillDaemon() {
 
 Status DrillDaemon::wait_until_it_serves(const std::string& map, const std::function<Status()>& going) {
   for (;; std::this_thread::sleep_for(kLook)) {
-    if (const auto end = ended())
-      return end->ok() ? Status(Reason::INTERNAL, "relmapd ended before it served") : *end;
+    if (const auto end = ended()) return end->ok() ? Status(Reason::INTERNAL, "relmapd ended before it served") : *end;
     if (Status go = going(); !go.ok()) return go;
     const auto where = client::resolve_server(map);
     if (!where.ok() || where->pid != pid_) continue;

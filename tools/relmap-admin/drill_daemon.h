@@ -18,7 +18,8 @@ class DrillDaemon {
   // times a second; if it returns a status other than OK, that is the result. A daemon that ends instead: its own
   // reason, from the last line of its log. NO_SUCH_FILE: there is no relmapd; UNSUPPORTED: it is of another release.
   static Result<std::unique_ptr<DrillDaemon>> start(const std::string& map, const std::string& log,
-                                                    const std::string& vocabulary, const std::function<Status()>& going);
+                                                    const std::string& vocabulary,
+                                                    const std::function<Status()>& going);
   ~DrillDaemon();  // kills it, unless it was stopped
   DrillDaemon(const DrillDaemon&) = delete;
   DrillDaemon& operator=(const DrillDaemon&) = delete;

@@ -14,10 +14,11 @@ namespace relmap::admin {
 namespace {
 
 constexpr std::size_t kMemory = std::size_t{128} << 20;
-constexpr std::uint32_t kRouteFrames = 200;     // of the robot's motion, to the frame that a route leads to
-constexpr std::size_t kEnoughFeatures = 40;     // for a frame to be recognised by them
+constexpr std::uint32_t kRouteFrames = 200;  // of the robot's motion, to the frame that a route leads to
+constexpr std::size_t kEnoughFeatures = 40;  // for a frame to be recognised by them
 constexpr std::size_t kComparedSessions = 1000;
-constexpr double kSamePose = 1e-6;  // metres and radians: answers are rounded to doubles of another form
+constexpr std::int64_t kBeside = 5;  // frames from one to another of the same place
+constexpr double kSamePose = 1e-6;   // metres and radians: answers are rounded to doubles of another form
 
 client::Session session_of(const storage::Session& stored) {
   client::Session session;
@@ -57,8 +58,8 @@ class Reader {
     const bool all = count >= frames_;
     for (std::uint64_t i = 0; i < (all ? frames_ : count * 4) && chosen.size() < count; ++i) {
       const std::uint64_t number = all ? i : std::uniform_int_distribution<std::uint64_t>(0, frames_ - 1)(random);
-      const Share& share = *std::prev(std::upper_bound(
-          shares_.begin(), shares_.end(), number, [](std::uint64_t n, const Share& s) { return n < s.before; }));
+      const Share& share = *std::prev(std::upper_bound(shares_.begin(), shares_.end(), number,
+                                                       [](std::uint64_t n, const Share& s) { return n < s.before; }));
       // Gaps make indices sparse: the first frame from there on that exists.
       std::uint64_t index = share.session.first + (number - share.before);
       while (index <= share.session.last && !view_.hot({share.session.number, static_cast<std::uint32_t>(index)}))
@@ -70,8 +71,16 @@ class Reader {
 
   KnownFrame frame(FrameId id) const {
     const auto hot = view_.hot(id);
-    KnownFrame known{id, hot->time_us, hot->labels, hot->edges.size(), hot->landmarks.size(),
-                     view_.warm(id)->observations.size(), hot->appearance_count, {}, {}, {}};
+    KnownFrame known{id,
+                     hot->time_us,
+                     hot->labels,
+                     hot->edges.size(),
+                     hot->landmarks.size(),
+                     view_.warm(id)->observations.size(),
+                     hot->appearance_count,
+                     {},
+                     {},
+                     {}};
     for (const storage::Edge& edge : hot->edges)
       if (edge.in_graph()) known.neighbours.push_back({edge.a, edge.b, edge.T_ab});
     const StereoCamera camera = view_.session(id.session)->header.camera;
@@ -160,16 +169,16 @@ Status ask_sessions(client::Client& daemon, const KnownMap& known, QuestionCount
     if (found == answers.end()) return differs(about, "that there is none", "'" + wanted.name + "'");
     const client::Session& answer = *found->second;
     ++counts.sessions;
-    const Status same = Comparison(about)
-                            .equal("uuid", answer.uuid, wanted.uuid)
-                            .equal("robot", answer.robot, wanted.robot)
-                            .equal("name", answer.name, wanted.name)
-                            .count("frames", answer.frames, wanted.frames)
-                            .count("first frame", answer.first, wanted.first)
-                            .count("last frame", answer.last, wanted.last)
-                            .equal("state", std::string(client::name_of(answer.state)),
-                                   std::string(client::name_of(wanted.state)))
-                            .status();
+    const Status same =
+        Comparison(about)
+            .equal("uuid", answer.uuid, wanted.uuid)
+            .equal("robot", answer.robot, wanted.robot)
+            .equal("name", answer.name, wanted.name)
+            .count("frames", answer.frames, wanted.frames)
+            .count("first frame", answer.first, wanted.first)
+            .count("last frame", answer.last, wanted.last)
+            .equal("state", std::string(client::name_of(answer.state)), std::string(client::name_of(wanted.state)))
+            .status();
     if (!same.ok()) return same;
   }
   return {};
@@ -232,8 +241,10 @@ Status ask_place(client::Client& daemon, const KnownFrame& known, QuestionCounts
   const auto matches = daemon.match_image(view);
   if (!matches.ok()) return matches.status();
   ++counts.places;
+  // A place is named by one of its frames: that of the question, or one beside it.
   const bool recognised = std::any_of(matches->places.begin(), matches->places.end(), [&](const auto& place) {
-    return place.frame == known.id && place.verification != client::Verification::kNone;
+    const auto apart = std::int64_t{place.frame.index} - std::int64_t{known.id.index};
+    return place.frame.session == known.id.session && std::abs(apart) <= kBeside;
   });
   if (recognised) return {};
   return differs("place of what frame " + known.id.to_string() + " saw",

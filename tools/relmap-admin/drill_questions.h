@@ -24,7 +24,7 @@ struct KnownFrame {
   std::size_t edges = 0, landmarks = 0, observations = 0, appearance = 0;
   std::vector<KnownEdge> neighbours;        // edges of the graph that are stored with it
   std::vector<AppearanceFeature> features;  // empty: too few to recognise a place by
-  FrameId reachable;       // a later frame of its session, along the robot's motion; session 0: there is none
+  FrameId reachable;        // a later frame of its session, along the robot's motion; session 0: there is none
   double metres_there = 0;  // along that motion, so that no shortest route is longer
 };
 
@@ -46,8 +46,8 @@ struct QuestionCounts {
   std::uint64_t frames = 0, transforms = 0, routes = 0, places = 0, sessions = 0;
 };
 
-// Asks about all that is known. `progress` is called with the number of frames asked about; if it returns a status other
-// than OK, that is the result. INTERNAL: an answer is not the known one; the message names question and answer.
+// Asks about all that is known. `progress` is called with the number of frames asked about; if it returns a status
+// other than OK, that is the result. INTERNAL: an answer is not the known one; the message names question and answer.
 Status ask_questions(client::Client& daemon, const KnownMap& known,
                      const std::function<Status(std::uint64_t done, std::uint64_t total)>& progress,
                      QuestionCounts& counts);

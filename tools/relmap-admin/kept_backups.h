@@ -29,8 +29,8 @@ class KeptBackups {
   // The path of the next backup. It sorts behind all that the map has here, also if the clock was set back.
   std::string next(std::int64_t now_s) const;
 
-  // Removes the oldest backups of the map beyond the `keep` newest, and what interrupted backups and removals of it left
-  // that are older than `newest`, a path of next(). `removed` is called with the path of each backup that is gone.
+  // Removes the oldest backups of the map beyond the `keep` newest, and what interrupted backups and removals of it
+  // left that are older than `newest`, a path of next(). `removed` is called with the path of each backup that is gone.
   // Anything else in the folder stays: other names, backups of other maps, links, and what another process uses. A
   // backup that is too many and cannot be removed is the status, after the others are: FOLDER_LOCKED; WRONG_MAP (it
   // holds another map than its name says); WRONG_STATE (its map has changed since it was made); DATA_LOSS (it cannot be
