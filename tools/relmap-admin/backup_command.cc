@@ -77,8 +77,10 @@ Answer back_up_and_thin(const Context& context, const Target& target, const std:
   if (!backup.ok()) return {backup.status(), false, {}};
   made = std::move(*backup);
   const Status thinned = kept->thin(keep, made->folder, [&](const std::string& path) { removed.push_back(path); });
-  return {
-      thinned.ok() ? Status() : Status(thinned.reason(), "the backup is made, but " + thinned.message()), false, {}};
+  if (thinned.ok()) return {};
+  return {Status(thinned.reason(), "the backup is made, but " + thinned.message()),
+          thinned.reason() == Reason::DATA_LOSS,
+          {}};
 }
 
 Answer back_up_map(const BackupAsked& asked, Context& context) {
