@@ -11,7 +11,7 @@ namespace {
 
 constexpr char kFooter[] = R"(
 DIR is the data folder of a map. If a running relmapd owns it, that daemon does verify, backup, compact and stats;
-repair, restore, migrate and reindex need it to be stopped first. --server names a daemon instead of a folder, which may
+repair, restore, migrate and reindex need it to be stopped first. drill and migrate --check rehearse, and change nothing. --server names a daemon instead of a folder, which may
 be on another machine; paths are then paths on that machine.
 
 Data goes to stdout, everything else to stderr. With --json each finding is a document, and the last document gives the
@@ -24,7 +24,10 @@ Examples:
   relmap-admin verify /var/lib/relmap
   relmap-admin backup /var/lib/relmap /backup/map-monday
   relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday
+  relmap-admin backup /var/lib/relmap /backup --keep 7
+  relmap-admin drill /backup
   relmap-admin restore /backup/map-monday /var/lib/relmap
+  relmap-admin migrate /var/lib/relmap --check
   relmap-admin repair /var/lib/relmap
   relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab
   relmap-admin credentials ca /etc/relmap/credentials --host map.example
@@ -79,7 +82,7 @@ ExitCode exit_code(const Answer& answer) {
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal) {
   CLI::App app(
-      "Looks after relmap data folders (verify, repair, back up, restore, compact, migrate, reindex), and makes "
+      "Looks after relmap data folders (verify, repair, back up, drill, restore, compact, migrate, reindex), and makes "
       "the credentials of a fleet.",
       "relmap-admin");
   terminal::Console console(out, err);
