@@ -19,7 +19,7 @@
 #include "tests/paths.h"
 #include "tests/support/generic_calls.h"
 #include "tests/support/running_daemon.h"
-#include "tests/support/stored_map.h"
+#include "tools/relmap-admin/drill_questions.h"
 
 namespace relmap::testing {
 namespace {
@@ -43,7 +43,7 @@ class RehearsalTest : public ::testing::Test {
     std::string reason() const { return document.value("reason", "(none)"); }
     std::string message() const { return document.value("message", "(none)"); }
   };
-  static Run admin(std::vector<std::string> arguments, const std::vector<std::string>& environment = {}) {
+  static Run run_admin(std::vector<std::string> arguments, const std::vector<std::string>& environment = {}) {
     arguments.insert(arguments.begin(), {built_program("relmap-admin"), "--json", "-q"});
     const Finished done = run_program(arguments, kPatience, environment);
     Run run{done.exit_code, {}, done.standard_output + done.standard_error};
@@ -111,7 +111,7 @@ class RehearsalTest : public ::testing::Test {
 class KeptBackupsTest : public RehearsalTest {
  protected:
   std::string backup(const std::string& keep) const {
-    const Run made = admin({"backup", map_, backups_, "--keep", keep});
+    const Run made = run_admin({"backup", map_, backups_, "--keep", keep});
     EXPECT_EQ(made.exit_code, kFine) << made.said;
     return fs::path(made.document.value("folder", "")).filename().string();
   }
@@ -146,7 +146,7 @@ TEST_F(KeptBackupsTest, TheOldestOfTheMapGoAndNothingElse) {
   fs::create_directory(backups_ + "/2001-01-01T00-00-06Z-" + digits + ".removed");
   std::ofstream(backups_ + "/2001-01-01T00-00-06Z-" + digits + ".removed/rest") << "x";
 
-  const Run third = admin({"backup", map_, backups_, "--keep", "2"});
+  const Run third = run_admin({"backup", map_, backups_, "--keep", "2"});
   ASSERT_EQ(third.exit_code, kFine) << third.said;
   EXPECT_THAT(third.document.at("removed"), ElementsAre(backups_ + "/" + first));
   std::vector<std::string> expected = others;
@@ -154,15 +154,15 @@ TEST_F(KeptBackupsTest, TheOldestOfTheMapGoAndNothingElse) {
   expected.push_back(fs::path(third.document.value("folder", "")).filename());
   EXPECT_THAT(names(backups_), ::testing::UnorderedElementsAreArray(expected));
   EXPECT_EQ(read_text(folder_ / "elsewhere/precious"), "x");
-  EXPECT_EQ(admin({"verify", backups_ + "/" + second}).exit_code, kFine);
+  EXPECT_EQ(run_admin({"verify", backups_ + "/" + second}).exit_code, kFine);
 
   // A running daemon makes it, and another map's are not counted.
   make_map(folder_ / "other", "2");
-  ASSERT_EQ(admin({"backup", folder_ / "other", backups_, "--keep", "1"}).document.at("removed").size(), 0u);
+  ASSERT_EQ(run_admin({"backup", folder_ / "other", backups_, "--keep", "1"}).document.at("removed").size(), 0u);
   RunningDaemon daemon({.data = map_, .lcm = "", .more = {"--backup-root", backups_}});
   for (const std::vector<std::string>& by : {std::vector<std::string>{"backup", map_, backups_, "--keep", "1"},
                                              {"--server", daemon.address(), "backup", backups_, "--keep", "1"}}) {
-    const Run made = admin(by);
+    const Run made = run_admin(by);
     EXPECT_EQ(made.exit_code, kFine) << made.said;
     EXPECT_THAT(made.document.at("removed"), Not(IsEmpty()));
   }
@@ -175,14 +175,14 @@ TEST_F(KeptBackupsTest, WhatCannotBeRemovedIsAFailureAfterTheBackup) {
   const std::string first = backups_ + "/" + backup("1");
   const auto refused = [&] {
     const std::size_t before = names(backups_).size();
-    const Run run = admin({"backup", map_, backups_, "--keep", "1"});
+    const Run run = run_admin({"backup", map_, backups_, "--keep", "1"});
     EXPECT_EQ(run.exit_code, run.reason() == "FOLDER_LOCKED" ? kOwned
                              : run.reason() == "DATA_LOSS"   ? kDamage
                                                              : kFailed)
         << run.said;
     EXPECT_THAT(run.message(), HasSubstr("the backup is made, but " + first + " is not removed"));
     EXPECT_TRUE(fs::exists(first + "/FORMAT"));
-    EXPECT_EQ(admin({"verify", run.document.value("folder", "")}).exit_code, kFine);
+    EXPECT_EQ(run_admin({"verify", run.document.value("folder", "")}).exit_code, kFine);
     EXPECT_LE(names(backups_).size(), before + 1);
     return run.reason();
   };
@@ -202,16 +202,16 @@ TEST_F(KeptBackupsTest, WhatCannotBeRemovedIsAFailureAfterTheBackup) {
   EXPECT_EQ(refused(), "DATA_LOSS");
   fs::remove_all(first);
   make_map(folder_ / "other", "2");
-  ASSERT_EQ(admin({"backup", folder_ / "other", first}).exit_code, kFine);
+  ASSERT_EQ(run_admin({"backup", folder_ / "other", first}).exit_code, kFine);
   EXPECT_EQ(refused(), "WRONG_MAP");
 }
 
 TEST_F(KeptBackupsTest, WhereOldOnesCannotBeRemovedNoBackupIsMade) {
   make_map(map_);
-  EXPECT_EQ(admin({"backup", map_, backups_, "--keep", "0"}).exit_code, kUsage);
+  EXPECT_EQ(run_admin({"backup", map_, backups_, "--keep", "0"}).exit_code, kUsage);
   fs::create_directory(backups_);
   ::chmod(backups_.c_str(), 0777);
-  const Run open = admin({"backup", map_, backups_, "--keep", "1"});
+  const Run open = run_admin({"backup", map_, backups_, "--keep", "1"});
   EXPECT_EQ(open.exit_code, kFailed) << open.said;
   EXPECT_EQ(open.reason(), "NOT_ALLOWED");
 
@@ -223,7 +223,7 @@ TEST_F(KeptBackupsTest, WhereOldOnesCannotBeRemovedNoBackupIsMade) {
     status.set_map_uuid(SessionUuid::random().to_string());
     return std::optional(status.SerializeAsString());
   });
-  const Run far = admin({"--server", "unix:" + folder_ / "socket", "backup", folder_ / "far", "--keep", "1"});
+  const Run far = run_admin({"--server", "unix:" + folder_ / "socket", "backup", folder_ / "far", "--keep", "1"});
   EXPECT_EQ(far.exit_code, kFailed) << far.said;
   EXPECT_EQ(far.reason(), "UNSUPPORTED");
   EXPECT_THAT(names(backups_), IsEmpty());
@@ -240,7 +240,7 @@ TEST_F(KeptBackupsTest, KillsAndInterruptsLeaveNothingThatStays) {
   backup("2"), backup("2");
   const std::vector<std::string> left = names(backups_);
   EXPECT_THAT(left, SizeIs(2));
-  for (const std::string& name : left) EXPECT_EQ(admin({"verify", backups_ + "/" + name}).exit_code, kFine) << name;
+  for (const std::string& name : left) EXPECT_EQ(run_admin({"verify", backups_ + "/" + name}).exit_code, kFine) << name;
 }
 
 // ---- drill
@@ -249,12 +249,12 @@ class DrillTest : public RehearsalTest {
  protected:
   void SetUp() override {
     make_map(map_);
-    ASSERT_EQ(admin({"backup", map_, backup_}).exit_code, kFine);
+    ASSERT_EQ(run_admin({"backup", map_, backup_}).exit_code, kFine);
     fs::create_directory(scratch_);
   }
   Run drill(const std::string& backup, std::vector<std::string> more = {}) const {
     more.insert(more.begin(), {"drill", backup, "--scratch", scratch_, "--questions", "30"});
-    return admin(more);
+    return run_admin(more);
   }
   // The same backup with one file changed.
   std::string spoiled(const std::function<void(const std::string&)>& spoil) const {
@@ -286,15 +286,15 @@ TEST_F(DrillTest, AGoodBackupPassesAndIsNotTouched) {
   EXPECT_GE(asked.at("routes"), 29);
 
   // The newest of kept ones, beside them; where that cannot be written to, in $TMPDIR.
-  ASSERT_EQ(admin({"backup", map_, backups_, "--keep", "2"}).exit_code, kFine);
-  const Run newest = admin({"drill", backups_, "--questions", "5"});
+  ASSERT_EQ(run_admin({"backup", map_, backups_, "--keep", "2"}).exit_code, kFine);
+  const Run newest = run_admin({"drill", backups_, "--questions", "5"});
   EXPECT_EQ(newest.exit_code, kFine) << newest.said;
   EXPECT_EQ(newest.document.at("backup"), backups_ + "/" + names(backups_).back());
   EXPECT_THAT(names(backups_), SizeIs(1));
 
   const Run kept = drill(backup_, {"--keep-scratch"});
   EXPECT_EQ(kept.exit_code, kFine) << kept.said;
-  EXPECT_EQ(admin({"verify", std::string(kept.document.at("scratch")) + "/map"}).exit_code, kFine);
+  EXPECT_EQ(run_admin({"verify", std::string(kept.document.at("scratch")) + "/map"}).exit_code, kFine);
   EXPECT_EQ(drill(backup_).exit_code, kFine);
   EXPECT_THAT(names(scratch_), SizeIs(1)) << "it stays until somebody removes it";
 }
@@ -386,6 +386,46 @@ TEST_F(DrillTest, AnInterruptedOneLeavesNothingAndAKilledOneIsCleanedUpByTheNext
   EXPECT_THAT(names(scratch_), IsEmpty());
 }
 
+// A drill that could not notice a wrong answer would be worth nothing: what is known is changed, one thing at a time.
+TEST_F(DrillTest, EveryWrongAnswerIsNoticed) {
+  const auto known = [&] {
+    storage::RocksDbOptions reading;
+    reading.read_only = true;
+    return admin::read_known_map(storage::open_rocksdb(map_, reading).or_throw(), 8, 3).or_throw();
+  };
+  const admin::KnownMap right = known();
+  ASSERT_THAT(right.sample, SizeIs(8));
+  RunningDaemon daemon({.data = map_, .lcm = "", .more = {}});
+  const auto client = daemon.client();
+  const auto answer_to = [&](const std::function<void(admin::KnownMap&)>& change) {
+    admin::KnownMap wrong = right;
+    change(wrong);
+    admin::QuestionCounts counts;
+    return admin::ask_questions(
+               *client, wrong, [](auto, auto) { return Status(); }, counts)
+        .to_string();
+  };
+  EXPECT_EQ(answer_to([](auto&) {}), Status().to_string());
+  const auto expect_noticed = [&](const char* what, const std::function<void(admin::KnownMap&)>& change) {
+    EXPECT_THAT(answer_to(change), ::testing::AllOf(::testing::StartsWith("INTERNAL"), HasSubstr(what)));
+  };
+  expect_noticed("status, frames", [](auto& map) { ++map.frames; });
+  expect_noticed("status, epoch", [](auto& map) { ++map.identity.epoch; });
+  expect_noticed("status, accepted closures", [](auto& map) { ++map.closures_accepted; });
+  expect_noticed("session 1, name", [](auto& map) { map.first_sessions.at(0).name = "another"; });
+  expect_noticed("time", [](auto& map) { ++map.sample.at(2).time_us; });
+  expect_noticed("labels", [](auto& map) { map.sample.at(2).labels.emplace_back("gate"); });
+  expect_noticed("landmarks", [](auto& map) { ++map.sample.at(2).landmarks; });
+  expect_noticed("transform from", [](auto& map) {
+    for (admin::KnownEdge& edge : map.sample.at(2).neighbours) edge.T_ab.t.x() += 1e-3;
+  });
+  expect_noticed("route from", [](auto& map) {
+    for (admin::KnownFrame& frame : map.sample) frame.metres_there *= 0.01;
+  });
+  expect_noticed("place of what", [](auto& map) { map.sample.at(0).features = map.sample.at(7).features; });
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
 // ---- migrate --check
 
 class MigrationCheckTest : public RehearsalTest {};
@@ -395,7 +435,7 @@ TEST_F(MigrationCheckTest, RehearsesAndChangesNothing) {
     const std::string old = unpacked(folder_ / ("old-" + std::to_string(format)), format);
     const auto before = files(old);
     const auto beside = names(folder_ / "");
-    const Run run = admin({"migrate", old, "--check"});
+    const Run run = run_admin({"migrate", old, "--check"});
     ASSERT_EQ(run.exit_code, kFine) << run.said;
     EXPECT_EQ(run.document.at("from"), format);
     EXPECT_EQ(run.document.at("to"), 3);
@@ -410,10 +450,10 @@ TEST_F(MigrationCheckTest, RehearsesAndChangesNothing) {
       reading.read_only = true;
       reading.format = format;
       const auto owner = storage::open_rocksdb(old, reading).or_throw();
-      EXPECT_EQ(admin({"migrate", old, "--check"}).exit_code, kOwned);
+      EXPECT_EQ(run_admin({"migrate", old, "--check"}).exit_code, kOwned);
     }
-    EXPECT_EQ(admin({"migrate", old}).exit_code, kFine);
-    const Run again = admin({"migrate", old, "--check"});
+    EXPECT_EQ(run_admin({"migrate", old}).exit_code, kFine);
+    const Run again = run_admin({"migrate", old, "--check"});
     EXPECT_EQ(again.exit_code, kFine) << again.said;
     EXPECT_EQ(again.document.at("from"), again.document.at("to"));
   }
@@ -423,7 +463,7 @@ TEST_F(MigrationCheckTest, FindsDamageBeforeTheMigrationDoes) {
   const std::string old = unpacked(folder_ / "old", 2);
   flip(largest(old, ".sst"));
   const auto before = files(old);
-  const Run run = admin({"migrate", old, "--check"});
+  const Run run = run_admin({"migrate", old, "--check"});
   EXPECT_EQ(run.exit_code, kDamage) << run.said;
   EXPECT_EQ(run.reason(), "DATA_LOSS");
   EXPECT_EQ(files(old), before);
@@ -433,7 +473,7 @@ TEST_F(MigrationCheckTest, FindsDamageBeforeTheMigrationDoes) {
 TEST_F(MigrationCheckTest, ACurrentMapNeedsNoneAlsoWhileItIsServed) {
   make_map(map_);
   RunningDaemon daemon({.data = map_, .lcm = "", .more = {}});
-  const Run run = admin({"migrate", map_, "--check"});
+  const Run run = run_admin({"migrate", map_, "--check"});
   EXPECT_EQ(run.exit_code, kFine) << run.said;
   EXPECT_EQ(run.document.at("from"), run.document.at("to"));
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
