@@ -77,8 +77,8 @@ void fill_special(Message& message) {
 
 // Types whose fields fill_special() sets, or else leaves unset.
 bool is_special(const FieldDescriptor& field) {
-  static const std::set<std::string> kWhole{"relmap.v1.Quaternion", "relmap.v1.Vector3", "relmap.v1.Covariance", "relmap.v1.Camera",
-                                            "relmap.v1.RawCamera"};
+  static const std::set<std::string> kWhole{"relmap.v1.Quaternion", "relmap.v1.Vector3", "relmap.v1.Covariance",
+                                            "relmap.v1.Camera", "relmap.v1.RawCamera"};
   const std::string& type = field.containing_type()->full_name();
   return kWhole.contains(type) || field.full_name() == "relmap.v1.ExportedFrame.landmarks" ||
          (type == "relmap.v1.RawStereo" && !field.message_type());
