@@ -149,6 +149,8 @@ struct View {
   bool either_eye = false;
   // If set, the view is what this frame of the map saw, and all of the above is ignored.
   std::optional<FrameId> frame = {};
+  // Not empty: features instead of pictures, of the rectified left picture of the camera, which must be named.
+  std::vector<AppearanceFeature> features = {};
 };
 
 struct Localisation {

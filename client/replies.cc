@@ -30,7 +30,10 @@ v1::View view_message(const View& view) {
     *message.mutable_frame() = to_wire(*view.frame);
     return message;
   }
-  message.mutable_left()->set_data(view.left);
+  if (view.features.empty())
+    message.mutable_left()->set_data(view.left);
+  else
+    *message.mutable_features() = to_wire(view.features);
   if (!view.right.empty()) message.mutable_right()->set_data(view.right);
   if (const auto* camera = std::get_if<StereoCamera>(&view.camera)) *message.mutable_camera() = to_wire(*camera);
   if (const auto* raw = std::get_if<StereoCalibration>(&view.camera)) *message.mutable_raw() = to_wire(*raw);

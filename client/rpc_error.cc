@@ -27,6 +27,8 @@ Reason nearest(grpc::StatusCode code) {
       return Reason::NOT_ALLOWED;
     case grpc::StatusCode::INVALID_ARGUMENT:
       return Reason::INVALID_ARGUMENT;
+    case grpc::StatusCode::DATA_LOSS:
+      return Reason::DATA_LOSS;
     default:
       return Reason::INTERNAL;
   }
@@ -45,8 +47,14 @@ Status status_of(const grpc::Status& status) {
   if (status.ok()) return {};
   v1::Error error;
   if (!status.error_details().empty() && error.ParseFromString(status.error_details()) &&
-      error.reason() != v1::REASON_OK)
-    return {reason_from_wire(error.reason()), error.message() + where_to_look(error)};
+      error.reason() != v1::REASON_OK) {
+    if (v1::Reason_IsValid(error.reason()))
+      return {reason_from_wire(error.reason()), error.message() + where_to_look(error)};
+    // A reason of a later version. Whatever it is, this daemon answers.
+    const bool answers = status.error_code() == grpc::StatusCode::UNAVAILABLE;
+    return {answers ? Reason::INTERNAL : nearest(status.error_code()),
+            error.message() + " (reason " + std::to_string(error.reason()) + " of a newer relmapd)"};
+  }
   return {nearest(status.error_code()), status.error_message()};
 }
 

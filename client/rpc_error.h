@@ -9,8 +9,8 @@ class Status;
 
 namespace relmap::client {
 
-// The daemon's reason and message, from relmap.v1.Error in the status details. Without one, the reason that corresponds
-// to gRPC's code.
+// The daemon's reason and message, from relmap.v1.Error in the status details. Without one, or if the reason is one of
+// a later version, the reason that corresponds to gRPC's code.
 Status status_of(const grpc::Status& status);
 
 }  // namespace relmap::client

@@ -20,6 +20,7 @@
 #include "storage/map/pending_frames.h"
 #include "storage/migrate/format1.h"
 #include "storage/rocksdb/folder.h"
+#include "storage/rocksdb/map_files.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
 namespace relmap::storage {
@@ -203,12 +204,8 @@ std::uint64_t copy_format2(const Engine& source, const std::string& from, const 
     for (const auto& entry : fs::directory_iterator(from + part)) {
       const std::string name = entry.path().filename().string(), target = to + part + "/" + name;
       if (!entry.is_regular_file() || name == "LOCK") continue;
-      std::error_code not_linked = std::make_error_code(std::errc::not_supported);
-      if (entry.path().extension() == ".sst" || entry.path().extension() == ".blob")
-        fs::create_hard_link(entry.path(), target, not_linked);
-      if (!not_linked) continue;
-      const auto file = files->open_read(entry.path().string()).or_throw();
-      throw_if(copy_file(*file, file->size(), *files, target, [](std::uint64_t) { return Status(); }));
+      throw_if(
+          copy_map_file(*files, entry.path().string(), target, /*share=*/true, [](std::uint64_t) { return Status(); }));
       if (progress) progress(0, frames);
     }
   }
@@ -242,10 +239,7 @@ Result<MigrateSummary> migrate(const std::string& directory, const Progress& pro
     if (Status kept = keep(*former); !kept.ok()) return kept;
     return summary;
   }
-  if (format < kOldest || format > kFolderFormat)
-    return Status(Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map of format " + std::to_string(format) +
-                                                      "; this build migrates format " + std::to_string(kOldest) +
-                                                      " to " + std::to_string(kFolderFormat));
+  if (Status known = check_migratable(directory, format); !known.ok()) return known;
   if (fs::exists(directory + ".format-" + std::to_string(format)))
     return Status(Reason::INVALID_ARGUMENT, directory + ".format-" + std::to_string(format) + " is in the way");
 
@@ -273,6 +267,13 @@ Result<MigrateSummary> migrate(const std::string& directory, const Progress& pro
 }
 
 }  // namespace
+
+Status check_migratable(const std::string& directory, int format) {
+  if (format >= kOldest && format <= kFolderFormat) return {};
+  return {Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map of format " + std::to_string(format) +
+                                              "; this build migrates format " + std::to_string(kOldest) + " to " +
+                                              std::to_string(kFolderFormat)};
+}
 
 Result<MigrateSummary> migrate_folder(const std::string& directory, const Progress& progress) {
   try {

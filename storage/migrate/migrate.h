@@ -15,6 +15,9 @@ struct MigrateSummary {
   std::string kept;          // folder with the map as it was; empty if there was nothing to do
 };
 
+// Whether this build can migrate a map of this format. UNKNOWN_FORMAT_VERSION.
+Status check_migratable(const std::string& directory, int format);
+
 // The new map is made in DIRECTORY.migrating, and changes places with the old one when it is whole and durable; the old
 // one is kept as DIRECTORY.format-N. If interrupted at any moment, DIRECTORY is one of the two; another run starts
 // over. From format 1 every frame is written anew, and estimates are rounded to the precision that is kept since

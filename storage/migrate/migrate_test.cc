@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "storage/format/chunk_codec.h"
 #include "storage/format/keys.h"
@@ -13,6 +14,8 @@
 #include "storage/journal/journal_segment.h"
 #include "storage/maintenance/verify.h"
 #include "storage/map/map.h"
+#include "storage/migrate/facts.h"
+#include "storage/migrate/rehearsal.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/paths.h"
@@ -195,6 +198,42 @@ TEST_F(Migrate, FinishesWhatWasInterruptedAfterTheMapsChangedPlaces) {
   ASSERT_TRUE(summary.ok());
   EXPECT_EQ(summary->kept, map_ + ".format-1");
   expect_the_map_of_format1();
+}
+
+TEST_F(Migrate, ARehearsalSeesEveryFactThatDiffers) {
+  unpack(kFormat2);
+  fs::create_directory(folder_ / "scratch");
+  const auto rehearsal =
+      rehearse_migration(map_, folder_ / "scratch", [](const char*, auto, auto) { return Status(); });
+  ASSERT_TRUE(rehearsal.ok()) << rehearsal.status().to_string();
+  EXPECT_EQ(rehearsal->differences, std::vector<std::string>{});
+  EXPECT_EQ(rehearsal->facts.frames, 137U);
+  EXPECT_EQ(rehearsal->facts.labels, 2U);
+  EXPECT_EQ(rehearsal->facts.journal_records, 1U);
+
+  const auto facts = [&] { return sum_facts(*open_rocksdb(rehearsal->map, {}).or_throw(), 3, {}).or_throw(); };
+  EXPECT_EQ(facts(), rehearsal->facts);
+  const auto edited = [&](const std::function<void(Map&)>& edit) {
+    {
+      const auto engine = open_rocksdb(rehearsal->map, {}).or_throw();
+      const auto map = open(engine, engine->acquire().or_throw());
+      edit(*map);
+      EXPECT_TRUE(map->commit().ok());
+    }
+    return facts();
+  };
+  MapFactSums last = facts();
+  const auto expect_changed = [&](const char* what, const std::function<void(Map&)>& edit) {
+    const MapFactSums now = edited(edit);
+    EXPECT_NE(now.hash, last.hash) << what;
+    last = now;
+  };
+  expect_changed("a label", [](Map& map) { map.set_label({1, 9}, "gate", true); });
+  EXPECT_EQ(last.labels, 3U);
+  expect_changed("a time", [](Map& map) { ++map.edit_hot({1, 9}).time_us; });
+  expect_changed("an estimate", [](Map& map) { map.edit_hot({1, 9}).edges.front().T_ab.t.x() += 1e-6; });
+  expect_changed("a pixel", [](Map& map) { map.edit_warm({1, 9}).observations.front().v += 0.5F; });
+  expect_changed("a session's name", [](Map& map) { map.edit_session(1).display_name = "another"; });
 }
 
 TEST_F(Migrate, RefusesWhatItDoesNotKnow) {

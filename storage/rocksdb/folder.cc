@@ -85,13 +85,25 @@ Result<std::unique_ptr<FolderLock>> FolderLock::take(const std::string& director
   return lock;
 }
 
+Result<std::unique_ptr<FolderLock>> FolderLock::take_unwritten(const std::string& directory) {
+  const std::string path = directory + "/LOCK";
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0 && errno != ENOENT) return failed(path);
+  std::unique_ptr<FolderLock> lock(new FolderLock(fd));
+  if (fd < 0 || ::flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
+  if (errno != EWOULDBLOCK) return failed(path);
+  return Status(Reason::FOLDER_LOCKED, directory + " is owned by " + lock_owner(directory));
+}
+
 std::string lock_owner(const std::string& directory) {
   long long process = 0;
   std::ifstream(directory + "/LOCK") >> process;
   return process > 0 ? "process " + std::to_string(process) : "another process";
 }
 
-FolderLock::~FolderLock() { ::close(fd_); }
+FolderLock::~FolderLock() {
+  if (fd_ >= 0) ::close(fd_);
+}
 
 Result<int> read_format(const std::string& directory) {
   const std::string path = directory + "/FORMAT";

@@ -15,13 +15,16 @@ class FolderLock {
  public:
   // FOLDER_LOCKED, with the owner's process id; IO_ERROR.
   static Result<std::unique_ptr<FolderLock>> take(const std::string& directory);
+  // The same for a folder that is only read: not even LOCK is written. Without the file LOCK nobody owns the folder,
+  // and whoever comes to own it meanwhile is not kept out.
+  static Result<std::unique_ptr<FolderLock>> take_unwritten(const std::string& directory);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
 
  private:
   explicit FolderLock(int fd) : fd_(fd) {}
-  const int fd_;
+  const int fd_;  // -1: there is no file LOCK
 };
 
 // The owner of the lock, as far as its file tells: "process 4711".

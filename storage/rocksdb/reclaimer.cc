@@ -10,8 +10,6 @@
 namespace relmap::storage {
 namespace {
 
-using Properties = rocksdb::DB::Properties;
-
 constexpr std::uint64_t kCommitsPerLook = 32;
 constexpr std::uint64_t kMinBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kShare = 2;  // collected at half of what is kept: freeing a byte moves two
@@ -46,8 +44,8 @@ Reclaimer::~Reclaimer() {
 
 bool Reclaimer::parts_due() const {
   auto* parts = map_.families().front();
-  const std::uint64_t all = number(map_.db(), parts, Properties::kLiveBlobFileSize);
-  const std::uint64_t garbage = number(map_.db(), parts, Properties::kLiveBlobFileGarbageSize);
+  const std::uint64_t all = number(map_.db(), parts, rocksdb::DB::Properties::kLiveBlobFileSize);
+  const std::uint64_t garbage = number(map_.db(), parts, rocksdb::DB::Properties::kLiveBlobFileGarbageSize);
   return garbage >= kMinBytes && kShare * garbage >= all - garbage;
 }
 
@@ -55,8 +53,8 @@ bool Reclaimer::parts_due() const {
 bool Reclaimer::was_deleted() const {
   auto* once = map_.families().back();
   rocksdb::DB& db = map_.db();
-  if (number(db, once, Properties::kLiveBlobFileGarbageSize) > 0 ||
-      number(db, once, Properties::kNumDeletesActiveMemTable) > 0)
+  if (number(db, once, rocksdb::DB::Properties::kLiveBlobFileGarbageSize) > 0 ||
+      number(db, once, rocksdb::DB::Properties::kNumDeletesActiveMemTable) > 0)
     return true;
   rocksdb::TablePropertiesCollection tables;
   if (!db.GetPropertiesOfAllTables(once, &tables).ok()) return true;

@@ -8,6 +8,7 @@
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
 #include "storage/io/file.h"
+#include "storage/rocksdb/map_files.h"
 #include "storage/rocksdb/partial_folder.h"
 #include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -19,17 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr SessionNumber kSkippedSessions = 1u << 20;
 
-// The files of a map, relative to its folder. The file of the present owner (LOCK) is left out.
-std::vector<std::string> files_of_map(const std::string& folder) {
-  std::vector<std::string> files{"FORMAT"};
-  if (fs::exists(folder + "/HASH")) files.push_back("HASH");
-  for (const char* part : {"journal", "map"})
-    for (const auto& entry : fs::directory_iterator(folder + "/" + part))
-      if (entry.is_regular_file() && entry.path().filename() != "LOCK")
-        files.push_back(part + ("/" + entry.path().filename().string()));
-  return files;
-}
-
 Status copy_files(const std::string& from, const std::string& to, const EngineProgress& progress) {
   const auto disk = posix_file_system();
   for (const char* part : {"/journal", "/map"})
@@ -38,10 +28,8 @@ Status copy_files(const std::string& from, const std::string& to, const EnginePr
   std::uint64_t done = 0, total = 0;
   for (const std::string& file : files) total += fs::file_size(from + "/" + file);
   for (const std::string& file : files) {
-    const auto in = disk->open_read(from + "/" + file);
-    if (!in.ok()) return in.status();
-    const Status copied = copy_file(**in, (*in)->size(), *disk, to + "/" + file,
-                                    [&](std::uint64_t bytes) { return progress(done += bytes, total); });
+    const Status copied = copy_map_file(*disk, from + "/" + file, to + "/" + file, /*share=*/false,
+                                        [&](std::uint64_t bytes) { return progress(done += bytes, total); });
     if (!copied.ok()) return copied;
   }
   return {};
@@ -96,13 +84,15 @@ Result<Restored> mark(const std::string& directory, std::uint64_t now_us) {
 }  // namespace
 
 Result<Restored> restore_folder(const std::string& backup, const std::string& to, std::uint64_t now_us,
-                                const EngineProgress& progress) try {
+                                const EngineProgress& progress, const CheckCopy& check) try {
   if (!fs::exists(backup + "/FORMAT")) return Status(Reason::NO_SUCH_FILE, backup + " holds no map");
-  const auto owned = FolderLock::take(backup);
+  const auto owned = FolderLock::take_unwritten(backup);
   if (!owned.ok()) return owned.status();
   const auto copy = PartialFolder::begin(to, backup);
   if (!copy.ok()) return copy.status();
   if (Status copied = copy_files(backup, (*copy)->path(), progress); !copied.ok()) return (*copy)->named(copied);
+  if (check)
+    if (Status sound = check((*copy)->path()); !sound.ok()) return (*copy)->named(sound);
   const auto restored = mark((*copy)->path(), now_us);
   if (!restored.ok()) return (*copy)->named(restored.status());
   if (Status complete = (*copy)->complete(); !complete.ok()) return complete;

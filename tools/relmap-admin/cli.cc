@@ -12,7 +12,7 @@ namespace {
 
 constexpr char kFooter[] = R"(
 DIR is the data folder of a map. If a running relmapd owns it, that daemon does verify, backup, compact and stats;
-repair, restore, migrate and reindex need it to be stopped first. --server names a daemon instead of a folder, which may
+repair, restore, migrate and reindex need it to be stopped first. drill and migrate --check rehearse, and change nothing. --server names a daemon instead of a folder, which may
 be on another machine; paths are then paths on that machine.
 
 Data goes to stdout, everything else to stderr. With --json each finding is a document, and the last document gives the
@@ -32,7 +32,10 @@ Examples:
   relmap-admin verify /var/lib/relmap
   relmap-admin backup /var/lib/relmap /backup/map-monday
   relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday
+  relmap-admin backup /var/lib/relmap /backup --keep 7
+  relmap-admin drill /backup
   relmap-admin restore /backup/map-monday /var/lib/relmap
+  relmap-admin migrate /var/lib/relmap --check
   relmap-admin repair /var/lib/relmap
   relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab
   relmap-admin credentials ca /etc/relmap/credentials --host map.example
@@ -55,8 +58,8 @@ void declare(CLI::App& app, Context& context, Action& action) {
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
   terminal::add_standard_options(app);
-  for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
-                         add_stats, add_log_level, add_credentials, add_explain})
+  for (const auto add : {add_verify, add_repair, add_backup, add_drill, add_restore, add_compact, add_migrate,
+                         add_reindex, add_stats, add_log_level, add_credentials, add_explain})
     add(app, action);
 }
 
@@ -88,7 +91,7 @@ ExitCode exit_code(const Answer& answer) {
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal) {
   CLI::App app(
-      "Looks after relmap data folders (verify, repair, back up, restore, compact, migrate, reindex), makes the "
+      "Looks after relmap data folders (verify, repair, back up, drill, restore, compact, migrate, reindex), makes the "
       "credentials of a fleet, and explains reasons and alerts.",
       "relmap-admin");
   terminal::Console console(out, err);

@@ -38,6 +38,7 @@ using Action = std::function<Answer(Context&)>;
 void add_verify(CLI::App& app, Action& action);
 void add_repair(CLI::App& app, Action& action);
 void add_backup(CLI::App& app, Action& action);
+void add_drill(CLI::App& app, Action& action);
 void add_restore(CLI::App& app, Action& action);
 void add_compact(CLI::App& app, Action& action);
 void add_migrate(CLI::App& app, Action& action);

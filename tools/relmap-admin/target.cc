@@ -19,6 +19,8 @@ std::string owner_of(const std::string& directory) {
   return "relmapd (process " + std::to_string(where->pid) + ") at " + where->address;
 }
 
+}  // namespace
+
 Status check_map(const std::string& directory) {
   std::error_code error;
   const bool folder = std::filesystem::is_directory(directory, error);
@@ -29,8 +31,6 @@ Status check_map(const std::string& directory) {
   if (!map) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
   return {};
 }
-
-}  // namespace
 
 Result<std::unique_ptr<client::Client>> connect_daemon(const Context& context, const std::string& server) {
   client::ClientOptions options = client::ClientOptions::from_environment();

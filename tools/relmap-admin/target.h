@@ -26,6 +26,8 @@ Result<Target> open_target(const Context& context, const std::string& directory,
 
 // Connects to the daemon that serves a data folder, or that is at HOST:PORT. As client::Client::connect().
 Result<std::unique_ptr<client::Client>> connect_daemon(const Context& context, const std::string& server);
+// Checks that the folder holds a map. NO_SUCH_FILE, NOT_ALLOWED.
+Status check_map(const std::string& directory);
 
 // Checks that the folder holds a map that no process owns. FOLDER_LOCKED with the daemon to stop; NO_SUCH_FILE.
 Status check_free(const std::string& directory);
