@@ -1,10 +1,14 @@
 // What `cmake --install` installs is complete: the programs find what belongs to them, and a stranger's program builds
 // against the client, by CMake and by pkg-config, and asks a running daemon.
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <regex>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -77,16 +81,21 @@ TEST_F(Installed, UnitsNameTheProgramsOfTheirPrefix) {
 
 TEST_F(Installed, TheSampleOfTheConfigurationIsSound) {
   install("server");
-  const std::string sample = prefix_ + "/share/relmap/relmapd.yaml";
-  const Finished checked = run_program(
-      {prefix_ + "/bin/relmapd", "--config", sample, "--data", folder_ / "map", "--check-config"}, kPatience);
-  // A machine that never had the package lacks the group; all else is read before.
-  if (checked.exit_code != 0) EXPECT_THAT(checked.standard_error, HasSubstr("group")) << checked.standard_error;
+  // With folders of this test's and a group that this machine has.
+  std::string sample = read_text(prefix_ + "/share/relmap/relmapd.yaml");
+  sample = std::regex_replace(sample, std::regex("/var/lib/relmap|/run/relmap"), folder_ / "");
+  sample = std::regex_replace(sample, std::regex("socket_group: relmap"),
+                              std::string("socket_group: ") + getgrgid(getgid())->gr_name);
+  fs::create_directories(folder_ / "backups");
+  std::ofstream(folder_ / "relmapd.yaml") << sample;
+  const Finished checked =
+      run_program({prefix_ + "/bin/relmapd", "--config", folder_ / "relmapd.yaml", "--check-config"}, kPatience);
+  EXPECT_EQ(checked.exit_code, 0) << checked.standard_error;
 }
 
 TEST_F(Installed, AProgramOfAUserBuildsAndAsksADaemon) {
   install("dev");
-  EXPECT_THAT(files("bin").size(), 0u) << "of other components";
+  EXPECT_FALSE(fs::exists(prefix_ + "/bin")) << "of other components";
   const std::string by_cmake = folder_ / "build/where_am_i", by_pkg_config = folder_ / "where_am_i";
   must_run({"cmake", "-S", kSources, "-B", folder_ / "build", "-DCMAKE_PREFIX_PATH=" + prefix_});
   must_run({"cmake", "--build", folder_ / "build"});
