@@ -79,6 +79,36 @@ TEST_F(Installed, UnitsNameTheProgramsOfTheirPrefix) {
   }
 }
 
+TEST_F(Installed, UnitsAreSoundAndClosed) {
+  for (const char* component : {"server", "frontend"}) install(component);
+  const std::string units = prefix_ + "/lib/systemd/system/";
+  for (const std::string& unit : {units + "relmapd.service", units + "relmap-frontend@.service"}) {
+    const Finished closed =
+        run_program({"systemd-analyze", "security", "--offline=true", "--threshold=30", "--no-pager", unit});
+    EXPECT_EQ(closed.exit_code, 0) << closed.standard_output << closed.standard_error;
+    const Finished sound = run_program({"systemd-analyze", "verify", "--man=no", "--recursive-errors=no", unit});
+    EXPECT_EQ(sound.exit_code, 0) << sound.standard_error;
+  }
+  const Finished users = run_program({"systemd-sysusers", "--dry-run", prefix_ + "/lib/sysusers.d/relmapd.conf",
+                                      prefix_ + "/lib/sysusers.d/relmap-frontend.conf"});
+  EXPECT_EQ(users.exit_code, 0) << users.standard_error;
+}
+
+TEST_F(Installed, WhatNoRestartMendsIsNotTriedAgain) {
+  const std::string unit = read_text(RELMAP_SOURCE_DIR "/tools/ops/systemd/relmapd.service");
+  EXPECT_THAT(unit, HasSubstr("\nRestartPreventExitStatus=2 5 6\n"));
+  const std::string help = run_program({built_program("relmapd"), "--help"}).standard_output;
+  EXPECT_THAT(help, HasSubstr("\n  2  BAD_CONFIG"));
+  EXPECT_THAT(help, HasSubstr("\n  5  the data folder cannot be used"));
+  EXPECT_THAT(help, HasSubstr("\n  6  the vocabulary cannot be used"));
+}
+
+TEST_F(Installed, ThePackagesHaveTheVersionOfThePrograms) {
+  const std::string changelog = read_text(RELMAP_SOURCE_DIR "/debian/changelog");
+  const std::string version = changelog.substr(changelog.find('(') + 1, changelog.find(')') - changelog.find('(') - 1);
+  EXPECT_THAT(run_program({built_program("relmapd"), "--version"}).standard_output, HasSubstr(version));
+}
+
 TEST_F(Installed, TheSampleOfTheConfigurationIsSound) {
   install("server");
   // With folders of this test's and a group that this machine has.
