@@ -73,3 +73,6 @@ install(FILES ${CMAKE_SOURCE_DIR}/tests/installed/where_am_i.cc ${CMAKE_SOURCE_D
 
 add_custom_target(relmap_installed DEPENDS relmapd relmap-frontend relmap-camera relmap-camera-1394 relmap relmap-admin
                   relmap-vocab relmap-sim relmap_client_archive)
+if(TARGET relmap_manuals)
+  add_dependencies(relmap_installed relmap_manuals)
+endif()
