@@ -33,7 +33,7 @@ Result<VerifySummary> Client::verify(const std::vector<SessionNumber>& sessions,
   v1::VerifyRequest request;
   for (const SessionNumber session : sessions) request.add_sessions(session);
   grpc::ClientContext context;
-  context.set_deadline(impl_->deadline());
+  impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->Verify(&context, request);
   VerifySummary summary;
   const Status end = read_all(context, *stream, [&](const v1::VerifyReply& reply) {
@@ -55,7 +55,7 @@ Result<Backup> Client::backup(const std::string& folder, const OnProgress& on_pr
   request.set_folder(folder);
   if (Status texts = check_texts(request); !texts.ok()) return texts;
   grpc::ClientContext context;
-  context.set_deadline(impl_->deadline());
+  impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->Backup(&context, request);
   Backup backup;
   const Status end = read_all(context, *stream, [&](const v1::Progress& reply) {
@@ -70,7 +70,7 @@ Result<Backup> Client::backup(const std::string& folder, const OnProgress& on_pr
 
 Result<Compaction> Client::compact(const OnProgress& on_progress) {
   grpc::ClientContext context;
-  context.set_deadline(impl_->deadline());
+  impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->Compact(&context, v1::CompactRequest());
   Compaction compaction;
   const Status end = read_all(context, *stream, [&](const v1::Progress& reply) {
@@ -100,6 +100,15 @@ Result<StoreStats> Client::stats() {
   return stats;
 }
 
+Result<std::string> Client::set_log_level(const std::string& level) {
+  v1::SetLogLevelRequest request;
+  request.set_level(level);
+  v1::SetLogLevelReply reply;
+  const Status status = impl_->ask(*impl_->admin, &v1::Admin::Stub::SetLogLevel, request, reply, impl_->deadline());
+  if (!status.ok()) return status;
+  return reply.former();
+}
+
 Status Client::freeze_session(SessionNumber session, bool frozen) {
   v1::FreezeSessionRequest request;
   request.set_session(session);
@@ -115,7 +124,7 @@ Status Client::delete_session(SessionNumber session, const std::string& uuid, co
   request.set_uuid(uuid);
   if (Status texts = check_texts(request); !texts.ok()) return texts;
   grpc::ClientContext context;
-  context.set_deadline(impl_->deadline());
+  impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->DeleteSession(&context, request);
   return read_all(context, *stream, [&](const v1::Progress& reply) {
     impl_->tell(reply);

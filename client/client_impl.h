@@ -30,6 +30,13 @@ struct Client::Impl {
 
   Clock::time_point deadline() const { return Clock::now() + options.deadline; }
 
+  // Gives the call its deadline, and what names it in the daemon's logs.
+  void begin(grpc::ClientContext& context, Clock::time_point until) const {
+    context.set_deadline(until);
+    if (!options.request_id.empty()) context.AddMetadata("x-request-id", options.request_id);
+    if (!options.traceparent.empty()) context.AddMetadata("traceparent", options.traceparent);
+  }
+
   void tell(const google::protobuf::Message& reply) const {
     if (!options.on_reply) return;
     google::protobuf::util::JsonPrintOptions print;
@@ -42,7 +49,7 @@ struct Client::Impl {
   Status ask(Stub& stub, Method method, const Request& request, Reply& reply, Clock::time_point until) const {
     if (Status texts = check_texts(request); !texts.ok()) return texts;
     grpc::ClientContext context;
-    context.set_deadline(until);
+    begin(context, until);
     const Status status = status_of((stub.*method)(&context, request, &reply));
     if (status.ok()) tell(reply);
     return status;
@@ -73,7 +80,7 @@ struct Client::Impl {
     const Clock::time_point until = deadline();
     for (int broken = 0;;) {
       grpc::ClientContext context;
-      context.set_deadline(until);
+      begin(context, until);
       const auto stream = ((*map).*method)(&context, request);
       Reply reply;
       while (stream->Read(&reply)) {

@@ -395,13 +395,20 @@ struct DoubtfulCamera {
 
 struct DaemonStatus {
   std::string version, boot_id, data_folder, lcm_url;
-  MapIdentity map;  // not known() if the daemon does not report it
+  std::string commit;     // of the source that the daemon was built from; empty: not known
+  std::string log_level;  // trace, debug, info, warning or error
+  MapIdentity map;        // not known() if the daemon does not report it
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;
   bool deterministic = false;
   // Not ok: why the daemon accepts nothing, nothing over LCM, fewer connections than was configured, an access list
   // that is out of date, or soon nobody over TLS.
   Status storage, lcm, connections, access, certificate;
+  // Parts of the daemon, and what is wrong with each: storage, worker, intake. Empty if the daemon does not tell.
+  std::vector<std::pair<std::string, Status>> components;
+  // Steps of the system's clock by more than a second since the start, and the last of them.
+  std::uint64_t clock_steps = 0;
+  double clock_step_s = 0;
   std::uint64_t connections_open = 0, connections_refused = 0,
                 connections_displaced = 0;  // the last two: since the start
 

@@ -1,5 +1,9 @@
 #include "client/relmap_client.h"
 
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
 #include "client/channel.h"
 #include "client/client_impl.h"
 #include "client/replies.h"
@@ -52,7 +56,23 @@ std::string why_not(v1::Map::Stub& map) {
              : ": " + text.substr(at + sizeof kLast - 1);
 }
 
+// gRPC would end the process over a header that is none.
+Status check_names(const ClientOptions& options) {
+  for (const auto& [text, what] :
+       {std::pair(&options.request_id, "name of a request"), std::pair(&options.traceparent, "traceparent")})
+    if (!std::all_of(text->begin(), text->end(), [](char c) { return c > ' ' && c <= '~'; }))
+      return {Reason::INVALID_ARGUMENT, "'" + *text + "' is no " + what};
+  return {};
+}
+
 }  // namespace
+
+ClientOptions ClientOptions::from_environment() {
+  ClientOptions options;
+  if (const char* const id = std::getenv("RELMAP_REQUEST_ID")) options.request_id = id;
+  if (const char* const parent = std::getenv("TRACEPARENT")) options.traceparent = parent;
+  return options;
+}
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Client::~Client() = default;
@@ -60,6 +80,7 @@ Client::~Client() = default;
 Result<std::unique_ptr<Client>> Client::connect(const std::string& server, ClientOptions options) {
   const auto where = resolve_server(server);
   if (!where.ok()) return where.status();
+  if (Status names = check_names(options); !names.ok()) return names;
   const Impl::Clock::time_point until = Impl::Clock::now() + options.connect_timeout;
   auto channel = open_channel(*where, options.credentials, channel_arguments());
   if (!channel.ok()) return channel.status();
@@ -74,7 +95,7 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
 
   // After a crash the file `endpoint` remains, and another daemon may use its port by now.
   grpc::ClientContext context;
-  context.set_deadline(until);
+  impl->begin(context, until);
   v1::GetStatusReply reply;
   if (Status status = status_of(impl->map->GetStatus(&context, {}, &reply)); !status.ok()) return status;
   if (reply.boot_id() != where->boot_id)

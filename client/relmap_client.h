@@ -20,11 +20,19 @@
 namespace relmap::client {
 
 struct ClientOptions {
+  // With the names that $RELMAP_REQUEST_ID and $TRACEPARENT give the calls, as programs of a trace pass them on.
+  static ClientOptions from_environment();
+
   std::chrono::milliseconds connect_timeout{5000};
   std::chrono::milliseconds deadline{60000};  // of each call; a whole stream or list is one call
   // File that proves who the caller is (proto/access/credentials.h), for daemons that serve TLS at HOST:PORT. Empty:
   // none, and no TLS. A daemon of this machine, named by its data folder, needs none.
   std::string credentials;
+  // Names the calls in the daemon's logs (x-request-id: at most 64 letters, digits and "-_."); empty: the daemon makes
+  // a name for each.
+  std::string request_id;
+  // The trace that the calls belong to (traceparent of W3C Trace Context), for the daemon's logs; empty: none.
+  std::string traceparent;
   // Called with the canonical proto3 JSON of each message received, in order, by the calling thread.
   std::function<void(const std::string& json)> on_reply;
 };
@@ -90,6 +98,9 @@ class Client {
   Result<Backup> backup(const std::string& folder, const OnProgress& on_progress);
   Result<Compaction> compact(const OnProgress& on_progress);
   Result<StoreStats> stats();
+  // Changes what the daemon's log tells, until the next change or start, and returns the former level. Empty: only
+  // asks. INVALID_ARGUMENT: there is no such level.
+  Result<std::string> set_log_level(const std::string& level);
   // A frozen session accepts no keyframes, and its edges and landmarks do not change.
   Status freeze_session(SessionNumber session, bool frozen = true);
   // Returns when all frames of the session are deleted. DEADLINE: the daemon continues the deletion. `uuid` must be

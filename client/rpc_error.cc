@@ -2,6 +2,8 @@
 
 #include <grpcpp/support/status.h>
 
+#include <string>
+
 #include "proto/wire/convert.h"
 
 namespace relmap::client {
@@ -30,6 +32,13 @@ Reason nearest(grpc::StatusCode code) {
   }
 }
 
+// Failures that the daemon's log tells more about.
+std::string where_to_look(const v1::Error& error) {
+  const Reason reason = reason_from_wire(error.reason());
+  const bool logged = reason == Reason::INTERNAL || reason == Reason::IO_ERROR || reason == Reason::DATA_LOSS;
+  return logged && !error.request_id().empty() ? " (request " + error.request_id() + " in relmapd's log)" : "";
+}
+
 }  // namespace
 
 Status status_of(const grpc::Status& status) {
@@ -37,7 +46,7 @@ Status status_of(const grpc::Status& status) {
   v1::Error error;
   if (!status.error_details().empty() && error.ParseFromString(status.error_details()) &&
       error.reason() != v1::REASON_OK)
-    return {reason_from_wire(error.reason()), error.message()};
+    return {reason_from_wire(error.reason()), error.message() + where_to_look(error)};
   return {nearest(status.error_code()), status.error_message()};
 }
 

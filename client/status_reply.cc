@@ -66,6 +66,12 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.lookup_lag = m.lookup_lag();
   s.lookup_lag_s = m.lookup_lag_s();
   s.pending_frames = m.pending_frames();
+  s.commit = m.commit();
+  s.log_level = m.log_level();
+  for (const v1::Component& part : m.components())
+    s.components.emplace_back(part.name(), Status(reason_from_wire(part.reason()), part.message()));
+  s.clock_steps = m.clock_steps();
+  s.clock_step_s = m.last_clock_step_s();
   s.relaxation_p50_us = m.relaxation().p50_us();
   s.relaxation_p99_us = m.relaxation().p99_us();
   s.relaxation_max_us = m.relaxation().max_us();

@@ -44,6 +44,8 @@ if(RELMAP_SERVERS)
   find_package(Protobuf REQUIRED)  # module mode first: gRPC's config expects its targets
   find_package(gRPC REQUIRED)
   find_package(RocksDB REQUIRED)
+  find_package(Boost 1.74 REQUIRED)              # headers only: Beast and Asio
+  find_package(prometheus-cpp REQUIRED CONFIG)  # only its core, which writes the text format
   pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
   find_program(LCM_GEN lcm-gen REQUIRED)
   find_program(GRPC_CPP_PLUGIN grpc_cpp_plugin REQUIRED)

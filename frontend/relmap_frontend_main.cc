@@ -41,29 +41,38 @@ constexpr const char* kFooter =
     "  relmap-frontend --source iidc 7140058 --rate 15 --robot cart --session morning\n"
     "  relmap-frontend --source raw drive.raw --robot cart --server /srv/map\n"
     "\n"
-    "Sources: kitti (image_0, image_1, calib.txt, times.txt), euroc (mav0/, or cam0 and cam1), images (left and "
-    "right,\n"
-    "cam0 and cam1, ...; with --calibration or one in the folder), sim (a folder written by relmap-sim: pictures, or\n"
-    "keyframes.bin), log (keyframes that lcm-logger recorded), raw (what relmap-camera recorded), iidc (a live stereo\n"
-    "camera: relmap-camera list; always --live, until Ctrl-C), auto (the one of the others that the folder or file "
-    "looks\n"
-    "like). A camera of one eye is refused, since it cannot measure metres. With --mono its pictures make a mono\n"
-    "session, whose frames can be recognised (relmap match) but have no edges; it needs no calibration.\n"
+    "Sources:\n"
+    "  kitti   image_0, image_1, calib.txt, times.txt\n"
+    "  euroc   mav0/, or cam0 and cam1\n"
+    "  images  left and right, cam0 and cam1, ...; with --calibration or one in the folder\n"
+    "  sim     a folder written by relmap-sim: pictures, or keyframes.bin\n"
+    "  log     keyframes that lcm-logger recorded\n"
+    "  raw     what relmap-camera recorded\n"
+    "  iidc    a live stereo camera (relmap-camera list); always --live, until Ctrl-C\n"
+    "  auto    the one of the others, except iidc, that the folder or file looks like\n"
+    "\n"
+    "A camera of one eye is refused, since it cannot measure metres. With --mono its pictures make a mono session,\n"
+    "whose frames can be recognised (relmap match) but have no edges; it needs no calibration.\n"
+    "\n"
     "Keyframes that relmapd has not settled stay in the spool; the same command continues where it stopped. With\n"
     "--spool none and a --uuid, repeating the command after an interruption starts the recording over: it gives the\n"
     "same keyframes, and those that relmapd has are not sent again.\n"
-    "--progress json prints {\"pairs\", \"of\", \"keyframes\", \"settled\", \"path_m\", \"trouble\"} four times a "
-    "second.\n"
-    "--report writes a tab-separated line for each pair (or picture), and a summary in comment lines. --show draws\n"
-    "the tracks on the left pictures.\n"
     "\n"
-    "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (also a\n"
-    "session that belongs to another recording), 3 keyframes left unsettled, refused, or given up\n"
-    "(gaps in the map), 4 interrupted, 5 done, but not to be trusted: fewer than 80 % of the expected\n"
-    "pairs were measured, or the eyes are not as the calibration says (the summary begins with it).\n"
-    "1, 2 and 4 take precedence over 3, and 3 over 5. If the eyes are plainly wrong in the first\n"
-    "pairs (NOT_STEREO, ROWS_APART, EYE_DEAD), a recording ends with 1 before a session begins; a\n"
-    "live camera continues with a warning.";
+    "--progress json prints {\"pairs\", \"of\", \"keyframes\", \"settled\", \"path_m\", \"trouble\"} four times a\n"
+    "second. --report writes a tab-separated line for each pair (or picture), and a summary in comment lines. --show\n"
+    "draws the tracks on the left pictures.\n"
+    "\n"
+    "Exit codes:\n"
+    "  0  everything settled\n"
+    "  1  failed; the reason is printed\n"
+    "  2  wrong usage; also a session that belongs to another recording\n"
+    "  3  keyframes left unsettled, refused, or given up (gaps in the map)\n"
+    "  4  interrupted\n"
+    "  5  done, but not to be trusted: fewer than 80 % of the expected pairs were measured, or the eyes are not as\n"
+    "     the calibration says (the summary begins with it)\n"
+    "\n"
+    "1, 2 and 4 take precedence over 3, and 3 over 5. If the eyes are plainly wrong in the first pairs (NOT_STEREO,\n"
+    "ROWS_APART, EYE_DEAD), a recording ends with 1 before a session begins; a live camera continues with a warning.";
 
 int main_function(int argc, char** argv) {
   RunOptions a;
@@ -71,17 +80,20 @@ int main_function(int argc, char** argv) {
   bool json = false;
   CLI::App app("Turns stereo pictures into keyframes of a relative map and publishes them.", "relmap-frontend");
   app.footer(kFooter);
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   app.add_option("--source", a.source, "where pairs come from")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "raw", "log", "iidc", "auto"}))
       ->capture_default_str();
   app.add_option("path", a.path,
                  "the source's folder or file; with iidc the camera's serial number, which is optional if there is "
-                 "only one");
-  app.add_option("--robot", a.robot, "name of the robot; required, except for recorded keyframes");
-  app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
+                 "only one")
+      ->type_name("FILE|FOLDER");
+  app.add_option("--robot", a.robot, "name of the robot; required, except for recorded keyframes")->type_name("NAME");
+  app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)")
+      ->type_name("NAME");
   auto* const recorded =
-      app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
+      app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)")
+          ->type_name("SESSION");
   bool list = false;
   app.add_flag("--list", list,
                "only print what a recording is, one JSON object a line: what identifies it, the sessions of a log,\n"
@@ -89,32 +101,37 @@ int main_function(int argc, char** argv) {
       ->excludes(recorded);
   auto* const uuid =
       app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")
+          ->type_name("UUID")
           ->check([](const std::string& text) { return SessionUuid::parse(text) ? "" : "not a uuid: " + text; });
   app.add_flag("--as-recorded", a.as_recorded,
                "keep the identity of a log's session: keyframes that the map already has are not added again")
       ->excludes(uuid);
-  app.add_option("--calibration", a.calibration, "KITTI, OpenCV, EuRoC, kalibr or ROS file, or a folder with one");
+  app.add_option("--calibration", a.calibration, "KITTI, OpenCV, EuRoC, kalibr or ROS file, or a folder with one")
+      ->type_name("FILE|FOLDER");
   app.add_option("--cameras", a.camera_folder,
                  "folder of calibrations and settings by the cameras' serial numbers (default:\n"
-                 "~/.config/relmap/cameras; $XDG_CONFIG_HOME moves it)");
+                 "~/.config/relmap/cameras; $XDG_CONFIG_HOME moves it)")
+      ->type_name("FOLDER");
   app.add_option("--bus", a.bus, "where cameras are looked for")
       ->check(CLI::IsMember({"auto", "usb", "1394"}))
       ->capture_default_str();
   auto* const imu =
       app.add_option("--imu", a.imu, "recording of an inertial unit: a file or folder, auto (the data set's), or none")
+          ->type_name("FILE|FOLDER|WORD")
           ->capture_default_str();
   auto* const to =
       app.add_option("--to", a.to,
                      "where keyframes go: to relmapd over lcm or grpc, or into a file (default: grpc with\n"
                      "--server, file with --out, else lcm)")
           ->check(CLI::IsMember({"lcm", "grpc", "file"}));
-  auto* const lcm = app.add_option("--lcm", a.publisher.lcm_url, "LCM URL")->capture_default_str();
+  auto* const lcm = app.add_option("--lcm", a.publisher.lcm_url, "LCM URL")->type_name("URL")->capture_default_str();
   auto* const server =
       app.add_option("--server", a.server, "where relmapd answers over gRPC: its data folder, or HOST:PORT")
+          ->type_name("FOLDER|HOST:PORT")
           ->excludes(lcm);
   app.add_option("--credentials", a.credentials,
-                 "file that proves which robot this is, over TLS and over LCM (relmap-admin credentials makes it);\n"
-                 "$RELMAP_CREDENTIALS")
+                 "file that proves which robot this is, over TLS and over LCM (relmap-admin credentials makes it)")
+      ->type_name("FILE")
       ->envname("RELMAP_CREDENTIALS");
   app.add_option("--map", map,
                  "UUID of the map into which to send, and no other (relmap status shows it; default: that of the\n"
@@ -123,15 +140,18 @@ int main_function(int argc, char** argv) {
   auto* const spool = app.add_option("--spool", a.publisher.spool,
                                      "folder that keeps keyframes until they are settled (default:\n"
                                      "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it); none "
-                                     "keeps\nthem in memory, for sources that can be read again");
+                                     "keeps\nthem in memory, for sources that can be read again")
+                          ->type_name("FOLDER");
   auto* const spool_bytes =
       app.add_option("--spool-bytes", a.publisher.spool_bytes, "maximum size of the unsettled keyframes; at least 1MB")
           ->transform(CLI::AsSizeValue(false))
           ->capture_default_str();
   app.add_option("--out", a.out, "the file to write instead of sending: FILE.part until it is complete")
+      ->type_name("FILE")
       ->excludes(lcm, server, spool, spool_bytes);
   app.add_flag("--wait", a.wait, "wait for a camera that is not there yet or not available");
   app.add_option("--rate", rate, "pairs a second, or max (for a camera, the rate in its settings or else its maximum)")
+      ->type_name("RATE")
       ->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
   auto* const all_keyframes =
@@ -146,8 +166,9 @@ int main_function(int argc, char** argv) {
   app.add_option("--patience", a.patience_s, "seconds without progress before giving up on a silent daemon")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
-  app.add_option("--report", a.report, "file for the figures of every pair");
-  auto* const show = app.add_option("--show", a.show, "folder for PNG pictures of the tracks, or an .mp4");
+  app.add_option("--report", a.report, "file for the figures of every pair")->type_name("FILE");
+  auto* const show =
+      app.add_option("--show", a.show, "folder for PNG pictures of the tracks, or an .mp4")->type_name("FILE|FOLDER");
   auto* const live =
       app.add_flag("--live", a.live, "treat the source as a camera, which cannot wait: excess pairs are dropped");
   auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");

@@ -1,5 +1,4 @@
 // relmapd: the map server.
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 
@@ -15,11 +14,15 @@
 #include <string>
 #include <vector>
 
+#include "server/monitor/last_words.h"
+#include "server/monitor/log.h"
+#include "server/monitor/service_manager.h"
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
-#include "server/ops/last_words.h"
 #include "server/ops/process.h"
+#include "server/ops/settings.h"
 #include "server/ops/signals.h"
+#include "server/rpc/log_level.h"
 #include "tools/terminal/command_line.h"
 
 namespace {
@@ -29,26 +32,30 @@ using relmap::Status;
 using relmap::ops::Config;
 using Who = relmap::ingest::LcmAuthentication::Who;
 
-constexpr const char* kFooter = R"(examples:
+constexpr const char* kFooter = R"(Examples:
   relmapd --data /srv/map
   relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0' --credentials /etc/relmap/credentials
   relmapd --config /etc/relmapd.yaml --check-config
   relmap-admin credentials ca /etc/relmap/credentials --host map.lab
   relmapd --data /srv/map --listen 0.0.0.0:50070 --credentials /etc/relmap/credentials
+  relmapd --data /srv/map --http 50071                     # curl 127.0.0.1:50071/readyz, /livez, /metrics
   relmapd --data map --listen 127.0.0.1:50070 --insecure   # anyone who can reach the port may edit the map
 
 gRPC is served at the Unix socket DIR/socket, which only the user that runs the daemon can open: relmap --server DIR
 uses it. --listen serves over TCP, too, and docs/security.md tells who may do what there.
 
-Some settings have no option and are set in the configuration file: ingest.* (which robots may send, and how much),
-tls.*, access, lcm.*, socket_group, rpc.*, routes.mixes, rba.*, lookup_threads, disk_low_water_mb, commit_interval_ms.
-server/README.md describes them.
+All settings can be given in the configuration file; some have no option: ingest.* (which robots may send, and how
+much), tls.*, access, lcm.*, socket, rpc.*, routes.mixes, rba.* and others. --sample-config prints a file with all of
+them, explained, and --print-config what is in force.
 
-SIGHUP reads the access list and the log level again; certificates are read within ten seconds after they change.
+SIGHUP reads the configuration file and the access list again, and puts in force what can change while the daemon runs
+(log_level, ingest.*, hung_after_s); of the rest the log says NEEDS_RESTART. Certificates are read within ten seconds
+after they change. Under systemd (Type=notify) the daemon tells when it serves, and feeds the watchdog as long as its
+journal and its worker make progress.
 SIGTERM or SIGINT stops the daemon after everything acknowledged is applied and committed. A second signal ends it at
 once, without loss: the next start applies the rest.
 
-exit codes:
+Exit codes:
   0  stopped by a signal; with --check-config: the configuration is sound
   1  the last commit failed, memory ran out (BUDGET_EXCEEDED), or an internal error; nothing acknowledged is lost
   2  BAD_CONFIG, or wrong usage
@@ -87,10 +94,12 @@ int exit_code(Reason reason) {
 // The options of the command line. What they leave out keeps the value of the configuration file, or the default.
 struct CommandLine {
   std::string config_file;
-  std::optional<std::string> data, listen, credentials, lcm, lcm_authentication, vocabulary, log_level;
+  std::optional<std::string> data, listen, http, credentials, lcm, lcm_authentication, vocabulary, log_level,
+      log_format;
   std::vector<std::string> backup_roots;
   std::optional<std::uint64_t> memory_budget_mb;
   bool deterministic = false, insecure = false, no_closures = false, check_config = false;
+  bool print_config = false, sample_config = false;
 
   void declare(CLI::App& app) {
     app.add_option("--data", data, "Data folder of the map, which holds nothing else; created if it does not exist")
@@ -101,6 +110,11 @@ struct CommandLine {
                    "Address at which gRPC is served over TCP, too; port 0 takes any free port, which is written to "
                    "DIR/endpoint; none: only at DIR/socket (default)")
         ->type_name("HOST:PORT");
+    app.add_option(
+           "--http", http,
+           "Serves metrics for Prometheus (/metrics) and health (/livez, /readyz) over HTTP; a PORT alone is of "
+           "this machine, where nobody needs credentials; none: off (default)")
+        ->type_name("[HOST:]PORT");
     app.add_option("--credentials", credentials,
                    "Folder made by relmap-admin credentials: the certificate to serve TLS with, who may call, and the "
                    "secret of the keys by which robots are known over LCM")
@@ -122,7 +136,13 @@ struct CommandLine {
     app.add_option("--memory-budget-mb", memory_budget_mb,
                    "Memory budget for everything that grows with map and load, in MB (default 1024, at least 32)");
     app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
-    app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)");
+    app.add_option("--log-level", log_level, "What the log tells (default info)")
+        ->check(CLI::IsMember(relmap::rpc::log_levels()));
+    app.add_option(
+           "--log-format", log_format,
+           "Form of the log's lines: text, json, journal (with systemd's priorities), or auto, which is journal "
+           "where standard error leads to it and else text (default)")
+        ->check(CLI::IsMember(relmap::monitor::log_formats()));
     app.add_flag(
         "--deterministic", deterministic,
         "Look up places and relax at fixed points of the input, so that the same input gives the same map; slower");
@@ -132,7 +152,9 @@ struct CommandLine {
                  "Serve --listen without TLS: everyone who can reach the port may edit the map");
     app.add_flag("--check-config", check_config,
                  "Check whether the daemon could start with these settings, write nothing, and exit");
-    relmap::terminal::add_version(app);
+    app.add_flag("--print-config", print_config, "Print all settings as they would be in force, and exit");
+    app.add_flag("--sample-config", sample_config, "Print a configuration file with all settings explained, and exit");
+    relmap::terminal::add_standard_options(app);
   }
 
   Status apply(Config& config) const {
@@ -141,6 +163,7 @@ struct CommandLine {
         return {Reason::BAD_CONFIG, status.message()};
     if (data) config.data = *data;
     if (listen) config.listen = relmap::ops::unless_none(*listen);
+    if (http) config.http = relmap::ops::unless_none(*http);
     if (credentials) config.credentials = *credentials;
     if (lcm) config.lcm = relmap::ops::unless_none(*lcm);
     if (lcm_authentication) config.lcm_authentication = *lcm_authentication == "all" ? Who::kAll : Who::kNobody;
@@ -148,6 +171,7 @@ struct CommandLine {
       config.backup_roots.push_back(std::filesystem::absolute(root).lexically_normal().string());
     if (vocabulary) config.vocabulary = *vocabulary;
     if (log_level) config.log_level = *log_level;
+    if (log_format) config.log_format = *log_format;
     if (memory_budget_mb) {
       const std::string text = "memory_budget_mb: " + std::to_string(*memory_budget_mb);
       if (Status status = relmap::ops::parse_config(text, "--memory-budget-mb", config); !status.ok()) return status;
@@ -168,24 +192,8 @@ int fail(const Status& status) {
   return exit_code(status.reason());
 }
 
-// At SIGHUP: what can change while the daemon runs is read again. Nothing of it can end the daemon.
-void reload(const CommandLine& line, relmap::ops::Daemon& daemon) try {
-  Config fresh;
-  const Status status = line.apply(fresh);
-  if (status.ok())
-    spdlog::set_level(spdlog::level::from_str(fresh.log_level));
-  else
-    spdlog::error("SIGHUP: the log level stays as it was: {}", status.to_string());
-  if (daemon.reload() && status.ok())
-    spdlog::info(
-        "SIGHUP: access list and log level were read again, and the files of TLS are within ten seconds; other "
-        "settings need a restart");
-} catch (const std::exception& error) {
-  spdlog::error("SIGHUP: not everything was read again: {}", error.what());
-}
-
 // So few that connections cannot take the files that the map needs. They are counted over TCP and again at the socket.
-void limit_connections(Config& config) {
+void limit_connections(Config& config, bool tell = true) {
   const std::size_t files = relmap::ops::raise_file_limit();
   const std::size_t most = std::max(kFewConnections, (files - std::min(files, kOwnFiles)) / 2);
   if (config.connections.total <= most) return;
@@ -193,20 +201,48 @@ void limit_connections(Config& config) {
                                                             std::to_string(config.connections.total) +
                                                             " connections; " + std::to_string(most) +
                                                             " are taken. Raise the hard limit (LimitNOFILE=)"};
-  spdlog::warn("{}", config.connections.lowered.to_string());
+  if (tell) spdlog::warn("{}", config.connections.lowered.to_string());
   config.connections.total = most;
   config.connections.per_peer = std::min(config.connections.per_peer, most);
 }
 
+// At SIGHUP: what can change while the daemon runs is read again. Nothing of it can end the daemon.
+void reload(const CommandLine& line, relmap::ops::Daemon& daemon) try {
+  Config fresh;
+  if (const Status status = line.apply(fresh); !status.ok()) {
+    spdlog::error("SIGHUP: the settings stay as they were: {}", status.to_string());
+  } else {
+    limit_connections(fresh, /*tell=*/false);
+    if (daemon.reload(fresh))
+      spdlog::info("SIGHUP: settings and access list were read again, and the files of TLS are within ten seconds");
+  }
+} catch (const std::exception& error) {
+  spdlog::error("SIGHUP: not everything was read again: {}", error.what());
+}
+
 int run(const CommandLine& line, Config config) {
+  relmap::monitor::ServiceManager manager;
   limit_connections(config);
   auto daemon = relmap::ops::Daemon::start(config);
   if (!daemon.ok()) return fail(daemon.status());
+  const auto state = [&] {
+    return relmap::monitor::ServiceManager::State{(*daemon)->health().live, (*daemon)->status_line()};
+  };
+  struct Stops {  // before the daemon is gone, of which the manager's thread asks
+    relmap::monitor::ServiceManager& told;
+    ~Stops() { told.stops(); }
+  } const stops{manager};
+  manager.serves(state);
   std::optional<int> signal;
   while (!(signal = relmap::ops::wait_for_signal(std::chrono::seconds(1))) || *signal == SIGHUP) {
-    if (signal) reload(line, **daemon);
+    if (signal) {
+      manager.reloads();
+      reload(line, **daemon);
+      manager.serves(state);
+    }
     (*daemon)->tick();
   }
+  manager.stops();
   spdlog::info("signal {}: stopping", *signal);
   const Status stopped = (*daemon)->stop();
   if (!stopped.ok()) return fail(stopped);
@@ -218,12 +254,12 @@ int run(const CommandLine& line, Config config) {
 
 int main(int argc, char** argv) {
   relmap::ops::block_stop_signals();  // first, so that a SIGHUP while the daemon starts does not end it
-  relmap::ops::name_reason_of_sudden_end();
+  relmap::monitor::name_reason_of_sudden_end();
   umask(S_IRWXG | S_IRWXO);  // what the daemon writes is nobody else's
   // Silences gRPC's own log (of a port in use, for example): relmapd reports such errors itself.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
-  spdlog::set_default_logger(spdlog::stderr_color_mt("relmapd"));
-  CLI::App app("relmapd: a map server for fleets of stereo robots", "relmapd");
+  relmap::monitor::set_up_log("auto");
+  CLI::App app("A map server for fleets of stereo robots.", "relmapd");
   app.footer(kFooter);
   CommandLine line;
   line.declare(app);
@@ -232,9 +268,18 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return relmap::terminal::end_with(app, error, std::cout, std::cerr, 2);
   }
+  if (line.sample_config) {
+    std::cout << relmap::ops::sample_config();
+    return 0;
+  }
   Config config;
   if (Status status = line.apply(config); !status.ok()) return fail(status);
-  spdlog::set_level(spdlog::level::from_str(config.log_level));
+  relmap::monitor::set_up_log(config.log_format);
+  relmap::rpc::set_log_level(config.log_level);
+  if (line.print_config) {
+    std::cout << relmap::ops::print_config(config);
+    return 0;
+  }
   if (line.check_config) {
     if (Status sound = relmap::ops::Daemon::check(config); !sound.ok()) return fail(sound);
     std::cout << "the configuration is sound\n";

@@ -103,7 +103,7 @@ TEST_F(CredentialsTest, LetEachDoWhatItsRoleMayUntilTheyAreRevoked) {
   const auto patience = std::chrono::steady_clock::now() + kPatience;
   while (daemon.log().find("SIGHUP") == std::string::npos && std::chrono::steady_clock::now() < patience)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP: access list"));
+  EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP: settings and access list were read again"));
   const std::string server = read_text(folder_ / "fleet/server.pem");
   std::ofstream(folder_ / "fleet/server.pem") << "no certificate";
   daemon.process().signal(SIGHUP);
@@ -299,10 +299,10 @@ TEST_F(CredentialsTest, TheLogLevelIsReadAgain) {
   configure("info");
   daemon.process().signal(SIGHUP);
   const auto patience = std::chrono::steady_clock::now() + kPatience;
-  while (daemon.log().find("SIGHUP: access list and log level were read again") == std::string::npos &&
+  while (daemon.log().find("SIGHUP: settings and access list were read again") == std::string::npos &&
          std::chrono::steady_clock::now() < patience)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP: access list and log level were read again"));
+  EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP: settings and access list were read again"));
 }
 
 }  // namespace

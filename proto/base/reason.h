@@ -103,6 +103,8 @@ namespace relmap {
   X(UNAUTHENTICATED, 123) /* no credentials, or they are unknown, expired or revoked */                               \
   X(REPLAYED, 124)        /* a sealed message that came before, or is not of these seconds */                         \
   X(TOO_MANY_FILES, 125)  /* the process may open no more files and connections */                                    \
+  X(STALLED, 126)         /* a thread of the daemon has been at one piece of work for seconds: a disk that hangs */   \
+  X(NEEDS_RESTART, 127)   /* a setting that was changed takes effect only when the daemon is started again */         \
   /* A camera. */                                                                                                     \
   X(NO_CAMERA, 140)        /* none at all, or none of that serial number */                                           \
   X(CAMERA_GONE, 141)      /* unplugged, or the process that serves its bus has ended */                              \

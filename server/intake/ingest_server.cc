@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "proto/base/busy_since.h"
 #include "proto/base/clock.h"
 #include "proto/base/mutex.h"
 #include "server/intake/part_queue.h"
@@ -46,17 +47,21 @@ struct IngestServer::Impl {
   void run() {
     for (bool last = false; !last;) {
       SteadyTime next;
+      busy.begin();
       {
         const MutexLock lock(mutex);
         next = planned = intake.next_due(now());
       }
+      busy.end();
       {
         MutexLock lock(wake_mutex);
         wake_condition.wait_until(wake_mutex, next, [this]() RELMAP_REQUIRES(wake_mutex) { return woken || stopping; });
         woken = false;
         last = stopping;
       }
+      busy.begin();
       say();
+      busy.end();
     }
     const MutexLock lock(subscribers_mutex);
     all_said = true;
@@ -257,6 +262,7 @@ struct IngestServer::Impl {
   const DaemonIdentity identity;
   storage::Budget& budget;
   const std::size_t queue_bytes;
+  BusySince busy;  // the thread of run()
 
   // Outlive the intake, which the sink's threads wake until it is gone.
   Mutex wake_mutex;
@@ -389,6 +395,13 @@ std::vector<RobotStats> IngestServer::robots() const {
   }
   return robots;
 }
+
+void IngestServer::limit(const IntakeLimits& limits) {
+  const MutexLock lock(impl_->mutex);
+  impl_->intake.limit(limits);
+}
+
+double IngestServer::busy_s() const { return impl_->busy.seconds(); }
 
 const DaemonIdentity& IngestServer::identity() const { return impl_->identity; }
 

@@ -41,6 +41,11 @@ class IngestServer {
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
   std::vector<RobotStats> robots() const;
+  // From now on these limits are in force.
+  void limit(const IntakeLimits& limits);
+  // Seconds that the thread which answers robots has been at its present round, or waits for those that take in; 0
+  // between two rounds. Waits for nobody.
+  double busy_s() const;
   // What robots are told before anything else.
   const DaemonIdentity& identity() const;
 

@@ -23,14 +23,8 @@ namespace relmap::intake {
 
 inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // of one gap message
 
-struct IntakeOptions {
-  AcknowledgementTimes times;
-  // Sessions at a time. A new one replaces the longest silent of those that have nothing pending or have not begun, but
-  // none that a robot has announced which has fewer than the newcomer; or else of a party that has more of them than
-  // its own.
-  std::size_t max_sessions = 1024;
-  std::chrono::seconds patience{60};   // after so long a silence a robot's unfinished keyframes are dropped
-  std::chrono::seconds remember{600};  // robots() lists a robot that did not end for so long after it was last heard
+// What may be sent; it can change while the daemon runs.
+struct IntakeLimits {
   // Mean number of keyframes that a session may send in parts, per second; 0: no limit. A session that sent less may
   // catch up by kIntakeWindow keyframes or two seconds' worth, whichever is more.
   double max_keyframes_per_s = 0;
@@ -38,8 +32,18 @@ struct IntakeOptions {
   // once. Who proves nothing may begin ten times as many together with all others of the same address, or of unknown
   // addresses. 0: no limit.
   double max_new_sessions_per_min = 0;
-  std::set<std::string> robots;   // names of the robots whose keyframes are taken; empty: all
-  std::set<std::string> proving;  // for these nobody may send who proves nothing (Sender::anyone)
+  std::set<std::string> robots;  // names of the robots whose keyframes are taken; empty: all
+};
+
+struct IntakeOptions : IntakeLimits {
+  AcknowledgementTimes times;
+  // Sessions at a time. A new one replaces the longest silent of those that have nothing pending or have not begun, but
+  // none that a robot has announced which has fewer than the newcomer; or else of a party that has more of them than
+  // its own.
+  std::size_t max_sessions = 1024;
+  std::chrono::seconds patience{60};   // after so long a silence a robot's unfinished keyframes are dropped
+  std::chrono::seconds remember{600};  // robots() lists a robot that did not end for so long after it was last heard
+  std::set<std::string> proving;       // for these nobody may send who proves nothing (Sender::anyone)
 };
 
 class Intake {
@@ -48,6 +52,9 @@ class Intake {
   Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IntakeOptions options,
          std::function<void()> wake);
   ~Intake();
+
+  // From now on these limits are in force.
+  void limit(const IntakeLimits& limits) { static_cast<IntakeLimits&>(options_) = limits; }
 
   // What must be read of the map before a message of this session, or of a keyframe with this sequence, can be taken in
   // without waiting for the disk; nullopt: nothing. The answer is passed to know(). What was not asked for is read when
@@ -194,7 +201,7 @@ class Intake {
   KeyframeSink& sink_;
   storage::Budget& budget_;
   const BootId boot_;
-  const IntakeOptions options_;
+  IntakeOptions options_;
   const std::shared_ptr<Outcomes> outcomes_;
   IngestStats stats_;
   Reassembly reassembly_;

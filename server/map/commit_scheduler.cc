@@ -80,8 +80,11 @@ void CommitScheduler::begin() {
     under_way_ = true;
   }
   Status begun;
+  busy_.begin();
   try {
     begun = map_->begin_commit([this, number] {
+      commits_.add(busy_.seconds());
+      busy_.end();
       {
         const MutexLock lock(mutex_);
         written_ = number;
@@ -93,6 +96,7 @@ void CommitScheduler::begin() {
   }
   budget_->set(storage::Share::kEngine, engine_->memory_bytes());
   if (begun.ok()) return;
+  busy_.end();
   finish();  // the previous commit, unless it was the one that failed
   {
     const MutexLock lock(mutex_);
@@ -117,6 +121,7 @@ void CommitScheduler::note(const Status& outcome) {
   if (!outcome.ok() && !failing_) spdlog::error("commits fail: {}", outcome.to_string());
   if (outcome.ok() && failing_) spdlog::info("commits go through again");
   failing_ = !outcome.ok();
+  if (failing_) ++failures_;
   hooks_.on_outcome(outcome);
 }
 

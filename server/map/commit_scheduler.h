@@ -11,6 +11,8 @@
 #include <memory>
 #include <set>
 
+#include "proto/base/busy_since.h"
+#include "proto/base/duration_histogram.h"
 #include "proto/base/ids.h"
 #include "proto/base/mutex.h"
 #include "proto/base/status.h"
@@ -46,6 +48,11 @@ class CommitScheduler {
   bool done(std::uint64_t ticket) const;
   // Whether the worker should call run() now: somebody asked for a commit, or a written one waits to be finished.
   bool wants_worker() const;
+  // Seconds that the commit has taken so far which is being written; 0: none is.
+  double busy_s() const { return busy_.seconds(); }
+  // How long commits took until they were written, and how many failed.
+  DurationCounts commits() const { return commits_.counts(); }
+  std::uint64_t failures() const { return failures_; }
   // Ends committing. Call when a record could not be applied: half of it may be in the map.
   void close() { closed_ = true; }
 
@@ -75,6 +82,9 @@ class CommitScheduler {
   Clock::time_point last_ = Clock::now();
   bool failing_ = false;
   std::atomic<bool> closed_ = false;
+  BusySince busy_;
+  DurationHistogram commits_;
+  std::atomic<std::uint64_t> failures_ = 0;
 
   mutable Mutex mutex_;
   bool under_way_ RELMAP_GUARDED_BY(mutex_) = false;

@@ -48,7 +48,7 @@ Status JournalWriter::submit(storage::JournalRecord record, Done done) {
   if (!health_.ok()) return health_;
   if (!budget_->try_charge(storage::Share::kQueues, bytes))
     return {Reason::BUDGET_EXCEEDED, "the queue of keyframes waiting to be applied is full"};
-  queue_.push_back({std::move(record), std::move(done), bytes});
+  queue_.push_back({std::move(record), std::move(done), bytes, std::chrono::steady_clock::now()});
   wake_.notify_all();
   return {};
 }
@@ -109,6 +109,9 @@ void JournalWriter::write(std::vector<Queued> group) {
     if (last.ok()) durable_ = *last;
   }
   if (!last.ok()) return refuse(std::move(group), last.status());
+  const auto now = std::chrono::steady_clock::now();
+  for (const Queued& queued : group)
+    if (std::holds_alternative<storage::KeyframeRecord>(queued.record)) acknowledgements_.add(now - queued.submitted);
   const std::uint64_t first = *last - group.size() + 1;
   std::vector<DurableRecord> durable;
   durable.reserve(group.size());
@@ -127,9 +130,17 @@ Result<std::uint64_t> JournalWriter::append(std::span<const Queued> group) try {
   records.reserve(group.size());
   const std::uint64_t acknowledged = durable_through();
   for (const Queued& queued : group) records.push_back(storage::encode_record(queued.record, acknowledged));
-  return engine_->append(epoch_, records);
+  return append_to_engine(records);
 } catch (const std::exception&) {
   return caught_status();
+}
+
+Result<std::uint64_t> JournalWriter::append_to_engine(std::span<const Bytes> records) {
+  const BusySince::Work work(busy_);
+  const auto begun = std::chrono::steady_clock::now();
+  auto appended = engine_->append(epoch_, records);
+  if (!records.empty()) appends_.add(std::chrono::steady_clock::now() - begun);
+  return appended;
 }
 
 void JournalWriter::refuse(std::vector<Queued> group, const Status& why) {
@@ -153,7 +164,7 @@ void JournalWriter::set_health(const Status& status) {
 
 Result<std::uint64_t> JournalWriter::append_follow_up(const storage::JournalRecord& record) {
   const Bytes bytes = storage::encode_record(record, durable_through());
-  auto sequence = engine_->append(epoch_, std::span(&bytes, 1));
+  auto sequence = append_to_engine(std::span(&bytes, 1));
   const MutexLock lock(mutex_);
   set_health(sequence.status());
   if (sequence.ok()) durable_ = *sequence;

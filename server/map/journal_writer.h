@@ -3,12 +3,15 @@
 // five times a second, would take records again. So callers keep what was refused, and no record overtakes another.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <thread>
 #include <vector>
 
+#include "proto/base/busy_since.h"
+#include "proto/base/duration_histogram.h"
 #include "proto/base/mutex.h"
 #include "storage/engine/engine.h"
 #include "storage/journal/journal_record.h"
@@ -52,6 +55,12 @@ class JournalWriter {
   bool idle() const;            // nothing queued, nothing being written, and everybody told
   Status health() const;        // not ok: why nothing is taken now
 
+  // Seconds that the append has taken so far which the engine is at; 0: none is.
+  double busy_s() const { return busy_.seconds(); }
+  // How long appends have taken, and how long keyframes from submit() until they were durable.
+  DurationCounts appends() const { return appends_.counts(); }
+  DurationCounts acknowledgements() const { return acknowledgements_.counts(); }
+
   // Writes what is queued, then ends the thread.
   void stop();
 
@@ -60,10 +69,12 @@ class JournalWriter {
     storage::JournalRecord record;
     Done done;
     std::size_t bytes;
+    std::chrono::steady_clock::time_point submitted;
   };
   void run();
   void write(std::vector<Queued> group);
   Result<std::uint64_t> append(std::span<const Queued> group);
+  Result<std::uint64_t> append_to_engine(std::span<const Bytes> records);
   void refuse(std::vector<Queued> group, const Status& why);
   void set_health(const Status& status) RELMAP_REQUIRES(mutex_);
 
@@ -73,6 +84,9 @@ class JournalWriter {
   const bool one_at_a_time_;
   const OnDurable on_durable_;
   const OnIdle on_idle_;
+
+  BusySince busy_;
+  DurationHistogram appends_, acknowledgements_;
 
   mutable Mutex mutex_;
   ConditionVariable wake_;

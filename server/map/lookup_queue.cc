@@ -201,9 +201,11 @@ LookupQueue::End LookupQueue::look_up_and_journal(const Pushed& pushed) {
     try {
       const auto begin = std::chrono::steady_clock::now();
       const std::vector<storage::JournalRecord> found = look_up_(pushed.frame, later);
+      const double took_s = seconds_since(begin);
+      lookups_.add(took_s);
       {
         const MutexLock lock(mutex_);
-        lookup_s_ += kOfTheLatest * (seconds_since(begin) - lookup_s_);
+        lookup_s_ += kOfTheLatest * (took_s - lookup_s_);
       }
       return journal(pushed, found);
     } catch (const std::exception& error) {

@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "proto/base/duration_histogram.h"
 #include "proto/base/ids.h"
 #include "proto/base/mutex.h"
 #include "server/map/lookup.h"
@@ -74,6 +75,8 @@ class LookupQueue {
   bool is_waiting(SessionNumber session) const;
   // For how many seconds the frame that waits longest has been pushed; 0 if none waits.
   double lag_s() const;
+  // How long lookups took, those of the caller of open() apart.
+  DurationCounts lookups() const { return lookups_.counts(); }
   // Whether no more keyframes should be taken in before some have been looked up: the frames that wait, and the
   // `queued` records that may become such frames, are kMaxWaiting or more, or would take longer than `max_lag`, as
   // lookups have taken recently, or the next of them has waited for longer. A single lookup that takes long, or has to
@@ -105,6 +108,7 @@ class LookupQueue {
 
   const std::shared_ptr<storage::Budget> budget_;
   const std::chrono::milliseconds max_lag_;
+  DurationHistogram lookups_;
   mutable Mutex mutex_;
   ConditionVariable changed_;
   std::deque<Pushed> queue_ RELMAP_GUARDED_BY(mutex_);  // for the threads

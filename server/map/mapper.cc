@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "proto/base/busy_since.h"
 #include "proto/base/clock.h"
 #include "proto/base/hex.h"
 #include "proto/base/mutex.h"
@@ -133,6 +134,8 @@ struct Mapper::Impl {
   Timings timings RELMAP_GUARDED_BY(mutex);
   std::uint64_t relaxations RELMAP_GUARDED_BY(mutex) = 0, active_frames RELMAP_GUARDED_BY(mutex) = 0;
   std::atomic<bool> failed = false;
+  BusySince worker_busy;
+  DurationHistogram relax_times, lookup_times;  // the latter in deterministic mode
 
   // Declared before the map, whose threads call them.
   CommitScheduler commits{options.commit_interval, engine, budget, commit_hooks()};
@@ -194,11 +197,18 @@ DeterministicDriver::Hooks Mapper::Impl::driver_hooks() {
   return {.append = [this](const storage::JournalRecord& record) { return append_patiently(record); },
           .apply =
               [this](std::uint64_t sequence, const storage::JournalRecord& record) {
+                worker_busy.begin();
                 Applied result = builder->apply(sequence, record);
                 note_applied(sequence, record, result);
                 closures.announce(*map->view(), result.closures);
               },
-          .look_up = [this](FrameId frame) { return recognition->look_up(*map->view(), frame); },
+          .look_up =
+              [this](FrameId frame) {
+                const Clock::time_point begun = Clock::now();
+                auto found = recognition->look_up(*map->view(), frame);
+                lookup_times.add(Clock::now() - begun);
+                return found;
+              },
           .relaxation_pending = [this] { return !map->state().pending.empty(); },
           .next_removal = [this] { return next_removal_patiently(); }};
 }
@@ -312,7 +322,10 @@ void Mapper::Impl::start() {
 void Mapper::Impl::catch_up() {
   if (failed) return;
   const std::set<FrameId> open = lookups.open_frames();
-  for (const FrameId frame : open) follow_up(map->state().applied_sequence, frame);
+  for (const FrameId frame : open) {
+    worker_busy.begin();
+    follow_up(map->state().applied_sequence, frame);
+  }
   constexpr std::uint32_t kAll = DeterministicDriver::kSlices;
   const auto done = static_cast<int>(std::min(map->state().idle_records, kAll));
   if (open.empty()) follow_up(map->state().applied_sequence, std::nullopt, DeterministicDriver::kSlices - done);
@@ -325,13 +338,16 @@ Clock::time_point Mapper::Impl::next_due() const {
 }
 
 void Mapper::Impl::work() {
+  worker_busy.begin();
   if (options.deterministic) catch_up();
   MutexLock lock(mutex);
   applying = false;
   changed.notify_all();
   for (;;) {
+    worker_busy.end();
     changed.wait_until(mutex, next_due(),
                        [&]() RELMAP_REQUIRES(mutex) { return !durable.empty() || stopping || commits.wants_worker(); });
+    worker_busy.begin();
     if (durable.empty() && stopping) break;
     if (!durable.empty()) {
       applying = true;
@@ -348,6 +364,7 @@ void Mapper::Impl::work() {
   }
   lock.unlock();
   commits.commit();
+  worker_busy.end();
 }
 
 void Mapper::Impl::apply_one(RecordQueue::Next next) {
@@ -394,6 +411,7 @@ void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRe
   }
   if (result.frame) {
     timings.add(result.relax_seconds);
+    relax_times.add(result.relax_seconds);
     ++relaxations;
     active_frames += result.relaxation.active_frames;
   }
@@ -413,6 +431,7 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
 
 // The worker waits a while for the disk, and only commits. False if the daemon stops.
 bool Mapper::Impl::wait_for_disk() {
+  worker_busy.begin();
   commits.begin_if_due();
   MutexLock lock(mutex);
   return !changed.wait_for(mutex, kDiskFails, [this]() RELMAP_REQUIRES(mutex) { return shutting_down; });
@@ -657,6 +676,14 @@ MapperStats Mapper::stats() const {
     stats.places_left_out = impl_->recognition->places().left_out();
     stats.doubts = impl_->recognition->doubts();
   }
+  stats.waiting = impl_->writer->waiting();
+  stats.worker_lag_s = impl_->durable.lag_s();
+  stats.commit_failures = impl_->commits.failures();
+  stats.acknowledgements = impl_->writer->acknowledgements();
+  stats.appends = impl_->writer->appends();
+  stats.relaxations = impl_->relax_times.counts();
+  stats.lookups = impl_->options.deterministic ? impl_->lookup_times.counts() : impl_->lookups.lookups();
+  stats.commits = impl_->commits.commits();
   stats.pending_frames = impl_->map->view()->pending_frames();
   const Status journal = impl_->writer->health();
   const MutexLock lock(impl_->mutex);
@@ -672,6 +699,11 @@ MapperStats Mapper::stats() const {
   stats.active_frames_mean =
       impl_->relaxations == 0 ? 0 : static_cast<double>(impl_->active_frames) / static_cast<double>(impl_->relaxations);
   return stats;
+}
+
+MapperProgress Mapper::progress() const {
+  return {impl_->writer->busy_s(), impl_->worker_busy.seconds(), impl_->commits.busy_s(), impl_->durable.lag_s(),
+          impl_->health()};
 }
 
 Status Mapper::stop() { return impl_->stop(); }

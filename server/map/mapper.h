@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/base/duration_histogram.h"
 #include "server/map/camera_doubts.h"
 #include "server/map/edge_changes.h"
 #include "server/map/way_around.h"
@@ -46,7 +47,9 @@ struct MapperOptions {
 struct MapperStats {
   std::uint64_t durable_sequence = 0;  // journal sequences
   std::uint64_t applied_sequence = 0;
+  std::size_t waiting = 0;     // records submitted but not durable
   std::size_t queued = 0;      // records durable but not applied
+  double worker_lag_s = 0;     // for how long the first of these has waited
   std::size_t lookup_lag = 0;  // keyframes applied but not looked up
   double lookup_lag_s = 0;     // for how long the one that waits longest has been in the map, or since the start
   std::size_t places = 0;
@@ -57,9 +60,21 @@ struct MapperStats {
   double rba_p50_us = 0, rba_p99_us = 0, rba_max_us = 0;
   double active_frames_mean = 0;
   std::uint64_t rba_solves = 0;
+  std::uint64_t commit_failures = 0;
+  // Since the start. Acknowledgements: from submit() of a keyframe until it was durable.
+  DurationCounts acknowledgements, appends, relaxations, lookups, commits;
   // Not ok: why nothing is taken in (READ_ONLY lasts until the next start, other reasons until the disk recovers), or
   // why commits fail.
   Status storage;
+};
+
+// For how many seconds each of the mapper's threads has been at its present piece of work; 0: it waits for one.
+struct MapperProgress {
+  double journal_s = 0;  // an append, which waits for the disk
+  double worker_s = 0;   // applying a record, or waiting for the previous commit
+  double commit_s = 0;   // writing a commit
+  double queued_s = 0;   // for how long the first durable record has waited for the worker
+  Status storage;        // as MapperStats::storage
 };
 
 class Mapper {
@@ -136,6 +151,8 @@ class Mapper {
   storage::Budget& budget() const;
   storage::Engine& engine() const;
   MapperStats stats() const;
+  // What tells whether the map is alive. Waits for no thread that may hang with the disk.
+  MapperProgress progress() const;
 
   // Takes no more records, applies those that are durable, and commits.
   Status stop();

@@ -19,9 +19,11 @@ namespace relmap::ops {
 
 struct Config {
   std::string data;          // folder of the map
+  std::string socket;        // path of the Unix socket; empty: DIR/socket
   std::string socket_group;  // whose members may use DIR/socket, besides the user that runs the daemon; empty: nobody
   std::string listen;        // HOST:PORT of gRPC over TCP; port 0: any free port; empty: only the socket
-  bool insecure = false;     // no TLS: everyone who can reach `listen` is an operator
+  bool insecure = false;     // no TLS: everyone who can reach `listen` or `http` is an operator
+  std::string http;          // HOST:PORT or PORT of metrics and health over HTTP; empty: none
   std::string credentials;   // folder of `relmap-admin credentials`, whose files the next two take if they name none
   rpc::TlsFiles tls;
   std::string audit;   // file of the audit log; empty: audit.jsonl in `data`; "none": there is none
@@ -39,6 +41,8 @@ struct Config {
   std::vector<std::string> backup_roots;  // absolute paths of folders below which backups may be made; empty: nowhere
   std::string vocabulary;                 // file; empty: the shipped one
   std::string log_level = "info";
+  std::string log_format = "auto";  // monitor::log_formats()
+  double hung_after_s = 10;         // at one piece of work; then the daemon counts as dead (monitor::judge())
   rpc::RpcLimits rpc;
   map::MapperOptions map;
   // Metrics, beside distance and time, for which operators get routes in milliseconds. Each takes memory.
@@ -68,6 +72,10 @@ void complete_config(Config& config);
 
 // BAD_CONFIG if settings contradict each other or a necessary one is missing.
 Status check_config(const Config& config);
+
+// Where HTTP is served: HOST:PORT, or a PORT of this machine alone. BAD_CONFIG.
+struct HostPort;
+Result<HostPort> parse_http(std::string_view text);
 
 struct HostPort {
   std::string host;

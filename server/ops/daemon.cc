@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <numeric>
@@ -11,14 +12,22 @@
 #include "proto/base/clock.h"
 #include "proto/base/hex.h"
 #include "proto/base/mutex.h"
+#include "proto/base/version.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
+#include "server/monitor/clock_watch.h"
+#include "server/monitor/health.h"
+#include "server/monitor/http_server.h"
+#include "server/monitor/metrics_page.h"
+#include "server/monitor/periodic.h"
 #include "server/ops/endpoint.h"
 #include "server/ops/private_folder.h"
 #include "server/ops/process.h"
+#include "server/ops/settings.h"
 #include "server/ops/socket_path.h"
 #include "server/route/overlay/route_index.h"
 #include "server/rpc/handshake_log.h"
+#include "server/rpc/log_level.h"
 #include "server/rpc/server.h"
 #include "storage/io/file.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -30,6 +39,7 @@ namespace {
 constexpr std::chrono::seconds kPatience{5};  // that running calls get to end at a stop
 constexpr std::chrono::minutes kReportInterval{1};
 constexpr std::chrono::seconds kCertificateInterval{10};
+constexpr std::chrono::milliseconds kPulse{500};  // between looks at the daemon's health
 
 rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
   rpc::IngestFacts facts;
@@ -92,10 +102,18 @@ void log(const intake::RobotEvent& event) {
 }  // namespace
 
 struct Daemon::Impl {
-  explicit Impl(Config c) : config(std::move(c)) {}
+  explicit Impl(Config c) : config(std::move(c)), hung_after_s(config.hung_after_s) {}
 
   Status open_map();
   Status serve();
+  Status serve_http();
+  Status write_endpoints() const;
+  void remove_endpoints() const;
+  std::string socket_folder() const;  // where a second file `endpoint` lies; empty: nowhere
+  monitor::Signs signs() const;
+  rpc::HealthFacts health() const;
+  monitor::HttpPage page(std::string_view path);
+  void beat();
   void start_lcm();
   DaemonStatus lcm_status() const;
   void report() const;
@@ -103,7 +121,10 @@ struct Daemon::Impl {
   void look_at_certificate();
   Status stop();
 
-  const Config config;
+  Config config;  // of the main thread; live settings change
+  std::atomic<double> hung_after_s;
+  std::atomic<bool> leaving = false;
+  monitor::ClockWatch clock;
   const BootId boot = SessionUuid::random().bytes;
   const std::int64_t started_us = now_us();
 
@@ -121,7 +142,10 @@ struct Daemon::Impl {
   std::unique_ptr<rpc::AuditLog> audit;
   std::unique_ptr<rpc::TlsWatch> tls_watch;  // null without TLS
   std::unique_ptr<rpc::RpcServer> server;
-  std::string socket, address;
+  std::unique_ptr<monitor::MetricsPage> metrics;
+  std::unique_ptr<monitor::HttpServer> http;
+  std::unique_ptr<monitor::Periodic> pulse;
+  std::string socket, address, http_address;
   access::SealKey lcm_secret{};
   std::uint64_t lcm_access_version = 0;  // of the access list that LCM uses
   // With the access list and the certificate, which is logged once.
@@ -155,7 +179,7 @@ Status Daemon::Impl::open_map() {
   if (!engine.ok()) return engine.status();
   const auto stats = (*engine)->stats();
   if (stats.ok() && !stats->dropped.empty()) spdlog::warn("{}: {}", config.data, stats->dropped);
-  remove_endpoint(config.data);  // left by a daemon that crashed
+  remove_endpoints();  // left by a daemon that crashed
   map::MapperOptions map_options = config.map;
   map_options.folder = config.data;
   auto opened = map::Mapper::open(*engine, budget, *vocabulary, map_options);
@@ -179,7 +203,8 @@ Status Daemon::Impl::open_map() {
 
 Status Daemon::Impl::serve() {
   rpc::DaemonFacts facts;
-  facts.version = RELMAP_VERSION;
+  facts.version = version();
+  facts.commit = build_commit();
   facts.boot_id = hex(boot);
   facts.data_folder = std::filesystem::absolute(config.data).string();
   facts.lcm_url = config.lcm;
@@ -193,7 +218,10 @@ Status Daemon::Impl::serve() {
     return facts_of(ingest->stats(), lcm_refusal);
   };
   core->intake.server = ingest.get();
-  core->process = [] { return rpc::ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
+  core->process = [] {
+    return rpc::ProcessFacts{resident_bytes(), peak_resident_bytes(), cpu_seconds(), open_files(), max_files()};
+  };
+  core->health = [this] { return health(); };
   core->routes.index = std::make_unique<route::RouteIndex>(
       route::RouteIndexOptions{config.data, 2 * low_water, config.route_metrics()}, [this] { return mapper->view(); },
       budget);
@@ -203,7 +231,7 @@ Status Daemon::Impl::serve() {
   core->routes.index->start();
   mapper->use_route_map([this] { return core->routes.index->snapshot(); });
 
-  auto path = socket_path(config.data);
+  auto path = config.socket.empty() ? socket_path(config.data) : config.socket;
   if (!path.ok()) return path.status();
   socket = std::move(*path);
   rpc::ServerOptions options{socket, config.socket_group, {}, 0, config.tls, config.connections};
@@ -238,13 +266,90 @@ Status Daemon::Impl::serve() {
   server = std::move(started).value();
   if (!options.host.empty()) address = HostPort{options.host, server->port()}.to_string();
   start_lcm();
-  Status written = write_endpoint(config.data, {socket, address, getpid(), hex(boot)});
-  if (written.ok() && !config.socket_group.empty())
-    written = share_with_group(config.data + "/endpoint", config.socket_group);
+  if (Status opened = serve_http(); !opened.ok()) return opened;
+  pulse = std::make_unique<monitor::Periodic>(kPulse, [this] { beat(); });
+  const Status written = write_endpoints();
   if (written.ok() || mapper->stats().storage.reason() != Reason::READ_ONLY) return written;
   spdlog::warn("clients find the daemon only by --server unix:{}{}: {}", socket,
                address.empty() ? std::string() : " or " + address, written.to_string());
   return {};
+}
+
+Status Daemon::Impl::serve_http() {
+  if (config.http.empty()) return {};
+  const auto where = parse_http(config.http);
+  if (!where.ok()) return where.status();
+  metrics = std::make_unique<monitor::MetricsPage>(*core, config.data, low_water);
+  auto started = monitor::HttpServer::start({where->host, where->port, config.tls}, *gatekeeper,
+                                            [this](std::string_view path) { return page(path); });
+  if (!started.ok()) return started.status();
+  http = std::move(*started);
+  http_address = HostPort{where->host, http->port()}.to_string();
+  return {};
+}
+
+std::string Daemon::Impl::socket_folder() const {
+  return config.socket.empty() ? std::string() : std::filesystem::path(config.socket).parent_path().string();
+}
+
+Status Daemon::Impl::write_endpoints() const {
+  for (const std::string& folder : {config.data, socket_folder()}) {
+    if (folder.empty()) continue;
+    if (Status written = write_endpoint(folder, {socket, address, getpid(), hex(boot), http_address}); !written.ok())
+      return written;
+    if (config.socket_group.empty()) continue;
+    if (Status shared = share_with_group(folder + "/endpoint", config.socket_group); !shared.ok()) return shared;
+  }
+  return {};
+}
+
+void Daemon::Impl::remove_endpoints() const {
+  remove_endpoint(config.data);
+  if (!config.socket.empty()) remove_endpoint(socket_folder());
+}
+
+monitor::Signs Daemon::Impl::signs() const {
+  monitor::Signs signs;
+  signs.map = mapper->progress();
+  signs.intake_s = ingest->busy_s();
+  signs.stopping = leaving;
+  signs.hung_after_s = hung_after_s;
+  const MutexLock lock(lcm_mutex);
+  signs.lcm = lcm_refusal;
+  return signs;
+}
+
+rpc::HealthFacts Daemon::Impl::health() const {
+  rpc::HealthFacts health = monitor::judge(signs());
+  health.clock_steps = clock.steps();
+  health.clock_step_s = clock.last_step_s();
+  return health;
+}
+
+monitor::HttpPage Daemon::Impl::page(std::string_view path) {
+  if (path == "/livez" || path == "/readyz") {
+    const rpc::HealthFacts now = health();
+    const bool ready_asked = path == "/readyz";
+    return {(ready_asked ? now.ready() : now.live) ? 200u : 503u, monitor::health_page(now, ready_asked)};
+  }
+  if (path == "/metrics") {
+    auto text = metrics->text();
+    if (!text) return {503, "BUDGET_EXCEEDED: another scrape is under way\n"};
+    return {200, std::move(*text), "text/plain; version=0.0.4; charset=utf-8"};
+  }
+  return {404, "there are /metrics, /livez and /readyz\n"};
+}
+
+// What changes by itself is told.
+void Daemon::Impl::beat() {
+  clock.look();
+  monitor::Signs now = signs();
+  const bool live = monitor::judge(now).live;
+  now.lcm = {};  // robots over gRPC do not need it
+  server->set_serving("", live);
+  server->set_serving("relmap.v1.Map", live);
+  server->set_serving("relmap.v1.Admin", live);
+  server->set_serving("relmap.v1.Ingest", monitor::judge(now).ready());
 }
 
 void Daemon::Impl::start_lcm() {
@@ -273,7 +378,7 @@ DaemonStatus Daemon::Impl::lcm_status() const {
   const auto view = mapper->view();
   const map::MapperStats stats = mapper->stats();
   DaemonStatus status;
-  status.version = RELMAP_VERSION;
+  status.version = version();
   status.sessions = view->session_counts().all;
   status.keyframes = view->state().keyframes;
   status.refused = std::accumulate(view->state().refused.begin(), view->state().refused.end(), std::uint64_t{0});
@@ -316,12 +421,15 @@ void Daemon::Impl::reload_access() {
 Status Daemon::Impl::stop() {
   if (stopped) return {};
   stopped = true;
+  leaving = true;
+  if (server) server->announce_stop();
+  pulse.reset();
   if (mapper) mapper->watch_closures({});
   if (lcm) lcm->stop();
   if (ingest) ingest->stop();
   if (server) {
     server->stop(kPatience);
-    remove_endpoint(config.data);
+    remove_endpoints();
   }
   if (core && core->routes.index) core->routes.index->stop();
   const Status stopped_in_order = mapper ? mapper->stop() : Status();
@@ -330,8 +438,10 @@ Status Daemon::Impl::stop() {
     mapper->use_route_map({});
     const Status saved = stopped_in_order.ok() ? core->routes.index->save() : Status();
     if (!saved.ok()) spdlog::warn("cells of routes will be made anew: {}", saved.to_string());
+    http.reset();  // its pages tell of the index
     core->routes.index.reset();
   }
+  http.reset();
   return stopped_in_order;
 }
 
@@ -357,8 +467,9 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
   std::unique_ptr<Daemon> daemon(new Daemon(std::make_unique<Impl>(config)));
   if (Status status = daemon->impl_->open_map(); !status.ok()) return with_advice(status, config);
   if (Status status = daemon->impl_->serve(); !status.ok()) return status;
-  spdlog::info("relmapd {} serves {} at {}{}{}", RELMAP_VERSION, config.data, daemon->socket(),
+  spdlog::info("relmapd {} serves {} at {}{}{}{}", version(), config.data, daemon->socket(),
                daemon->address().empty() ? std::string() : ", gRPC on " + daemon->address(),
+               daemon->http().empty() ? std::string() : ", HTTP on " + daemon->http(),
                daemon->impl_->lcm ? ", LCM on " + config.lcm : std::string());
   return daemon;
 }
@@ -382,7 +493,27 @@ void Daemon::tick() {
   }
 }
 
-bool Daemon::reload() {
+const std::string& Daemon::http() const { return impl_->http_address; }
+
+rpc::HealthFacts Daemon::health() const { return impl_->health(); }
+
+std::string Daemon::status_line() const {
+  const auto view = impl_->mapper->view();
+  return std::to_string(view->state().keyframes) + " keyframes of " + std::to_string(view->session_counts().all) +
+         " sessions; " + monitor::in_short(health());
+}
+
+bool Daemon::reload(const Config& fresh) {
+  Config& config = impl_->config;
+  bool all = true;
+  for (const Status& refused : adopt_live(fresh, config)) {
+    spdlog::error("SIGHUP: {}", refused.to_string());
+    all = false;
+  }
+  rpc::set_log_level(config.log_level);
+  impl_->hung_after_s = config.hung_after_s;
+  impl_->ingest->limit(
+      {config.max_keyframes_per_s, config.max_new_sessions_per_min, {config.robots.begin(), config.robots.end()}});
   const Status read = impl_->gatekeeper->reload(), sound = rpc::check_files(impl_->config.tls);
   if (!read.ok()) spdlog::error("the access list stays as it was: {}", read.to_string());
   if (!sound.ok()) {
@@ -391,7 +522,7 @@ bool Daemon::reload() {
   }
   impl_->look_at_certificate();
   impl_->access_problem = read.message();
-  return read.ok() && sound.ok();
+  return all && read.ok() && sound.ok();
 }
 
 Status Daemon::stop() { return impl_->stop(); }

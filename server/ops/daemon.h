@@ -5,6 +5,7 @@
 #include <string>
 
 #include "server/ops/config.h"
+#include "server/rpc/core.h"
 
 namespace relmap::ops {
 
@@ -25,16 +26,23 @@ class Daemon {
   // Where gRPC is served: the path of the Unix socket, and HOST:PORT, which is empty without TCP.
   const std::string& socket() const;
   const std::string& address() const;
+  // HOST:PORT of HTTP; empty without it.
+  const std::string& http() const;
 
   // Periodic work. Call about once a second. Reads the access list again if it has changed.
   void tick();
-  // Reads the files of tokens and revocations again, and says in the log whether those of TLS, which are read again
-  // when they change, can be used. Settings are as they were at the start. False if something stays as it was, of which
-  // the log says why.
-  bool reload();
+  // Reads the files of tokens and revocations again, says in the log whether those of TLS, which are read again when
+  // they change, can be used, and puts what can change of `fresh` in force (Setting::live). False if something stays as
+  // it was, of which the log says why.
+  bool reload(const Config& fresh);
 
-  // Takes nothing more in, ends running calls, applies what is durable, and commits. Not OK if the last commit failed;
-  // acknowledged keyframes are in the journal even then.
+  // What is wrong with the daemon, if anything is. Waits for nothing that may hang. Thread-safe.
+  rpc::HealthFacts health() const;
+  // The same on one line, with what the daemon does.
+  std::string status_line() const;
+
+  // Tells that it stops, takes nothing more in, ends running calls, applies what is durable, and commits. Not OK if the
+  // last commit failed; acknowledged keyframes are in the journal even then.
   Status stop();
 
  private:

@@ -7,12 +7,13 @@
 
 namespace relmap::ops {
 
-Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint) {
-  const std::string path = data_folder + "/endpoint", temporary = path + ".new";
+Status write_endpoint(const std::string& folder, const Endpoint& endpoint) {
+  const std::string path = folder + "/endpoint", temporary = path + ".new";
   {
     std::ofstream file(temporary, std::ios::trunc);
     file << "socket " << endpoint.socket << "\n";
     if (!endpoint.address.empty()) file << "address " << endpoint.address << "\n";
+    if (!endpoint.http.empty()) file << "http " << endpoint.http << "\n";
     file << "pid " << endpoint.pid << "\nboot " << endpoint.boot_id << "\n";
     file.close();
     if (!file) return {Reason::IO_ERROR, "cannot write " + temporary + ": " + std::strerror(errno)};
@@ -23,10 +24,10 @@ Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint) 
   return {};
 }
 
-void remove_endpoint(const std::string& data_folder) {
+void remove_endpoint(const std::string& folder) {
   std::error_code ignored;
-  std::filesystem::remove(data_folder + "/endpoint", ignored);
-  std::filesystem::remove(data_folder + "/endpoint.new", ignored);
+  std::filesystem::remove(folder + "/endpoint", ignored);
+  std::filesystem::remove(folder + "/endpoint.new", ignored);
 }
 
 }  // namespace relmap::ops

@@ -3,6 +3,7 @@
 //
 //   socket /srv/map/socket
 //   address 0.0.0.0:50070     (if it serves over TCP, too)
+//   http 127.0.0.1:50071      (if it serves metrics and health over HTTP)
 //   pid 4711
 //   boot 3f0c...
 #pragma once
@@ -19,10 +20,11 @@ struct Endpoint {
   std::string address;  // host:port; empty: only the socket
   std::int64_t pid = 0;
   std::string boot_id;
+  std::string http = {};  // host:port; empty: none
 };
 
-// Writes the file atomically, by renaming a temporary one. IO_ERROR.
-Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint);
-void remove_endpoint(const std::string& data_folder);
+// Writes the file `endpoint` in the folder atomically, by renaming a temporary one. IO_ERROR.
+Status write_endpoint(const std::string& folder, const Endpoint& endpoint);
+void remove_endpoint(const std::string& folder);
 
 }  // namespace relmap::ops

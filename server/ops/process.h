@@ -11,6 +11,10 @@ std::size_t raise_file_limit();
 std::size_t resident_bytes();
 std::size_t peak_resident_bytes();
 
+double cpu_seconds();  // of user and system, since the start
+std::size_t open_files();
+std::size_t max_files();
+
 // What the allocator's pages in use hold beyond what was asked for: holes between what is in use. 0 without jemalloc.
 std::size_t allocator_holes_bytes();
 

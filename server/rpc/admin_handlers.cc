@@ -1,3 +1,5 @@
+#include <spdlog/spdlog.h>
+
 #include <filesystem>
 #include <memory>
 
@@ -6,6 +8,7 @@
 #include "server/rpc/charge.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/job_stream.h"
+#include "server/rpc/log_level.h"
 #include "storage/maintenance/verify.h"
 
 namespace relmap::rpc {
@@ -196,11 +199,12 @@ Result<Producer<v1::Progress>> compact(const v1::CompactRequest&, const Deadline
 
 Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest&, const Deadline& deadline, map::Mapper& mapper,
                                     const DaemonFacts& facts, const Routes& routes, const Intake& intake,
-                                    const ProcessProbe& process, const Transport& transport, const Metrics& metrics) {
+                                    const ProcessProbe& process, const Transport& transport, const HealthProbe& health,
+                                    const Metrics& metrics) {
   const auto stats = mapper.engine().stats();
   if (!stats.ok()) return stats.status();
   auto status =
-      get_status(v1::GetStatusRequest(), deadline, mapper, facts, routes, intake, process, transport, metrics);
+      get_status(v1::GetStatusRequest(), deadline, mapper, facts, routes, intake, process, transport, health, metrics);
   if (!status.ok()) return status.status();
   v1::GetStatsReply reply;
   *reply.mutable_status() = std::move(status).value();
@@ -216,6 +220,20 @@ Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest&, const Deadline& 
     property.set_name(name);
     property.set_value(value);
   }
+  return reply;
+}
+
+Result<v1::SetLogLevelReply> change_log_level(const v1::SetLogLevelRequest& request, const Deadline&) {
+  v1::SetLogLevelReply reply;
+  reply.set_former(log_level());
+  if (!request.level().empty() && !set_log_level(request.level())) {
+    std::string known;
+    for (const std::string& level : log_levels()) known += (known.empty() ? "" : ", ") + level;
+    return Status(Reason::INVALID_ARGUMENT, "there is no log level '" + request.level() + "': they are " + known);
+  }
+  reply.set_level(log_level());
+  if (reply.level() != reply.former())
+    spdlog::info("the log level is {} now, and was {}", reply.level(), reply.former());
   return reply;
 }
 

@@ -34,7 +34,9 @@ class AdminService final : public v1::Admin::CallbackService {
   Unary* Commit(Context* context, const v1::CommitRequest* request, v1::CommitReply* reply) override {
     return unary(context, "Admin.Commit", request, reply, commit, Lane::kEdits);
   }
-
+  Unary* SetLogLevel(Context* context, const v1::SetLogLevelRequest* request, v1::SetLogLevelReply* reply) override {
+    return unary(context, "Admin.SetLogLevel", request, reply, change_log_level);
+  }
   Unary* FreezeSession(Context* context, const v1::FreezeSessionRequest* request,
                        v1::FreezeSessionReply* reply) override {
     return unary(context, "Admin.FreezeSession", request, reply, freeze_session, Lane::kEdits);

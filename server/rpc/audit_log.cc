@@ -14,6 +14,7 @@
 
 #include "proto/base/clock.h"
 #include "proto/base/json.h"
+#include "proto/base/time_text.h"
 
 namespace relmap::rpc {
 
@@ -24,30 +25,20 @@ constexpr std::size_t kMaxLines = 1024;         // that wait to be written
 constexpr std::size_t kMaxCallers = 1024;       // whose failures are counted each by themselves
 constexpr std::chrono::minutes kCounted{1};
 
-std::string time_of_day(std::int64_t us) {
-  const std::time_t seconds = us / 1'000'000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[40];
-  const std::size_t size = std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
-  std::snprintf(text + size, sizeof text - size, ".%03dZ", static_cast<int>(us / 1000 % 1000));
-  return text;
-}
-
 std::string line_of(const AuditLog::Entry& entry) {
-  return Json()
-             .add("time", time_of_day(now_us()))
-             .add("who", entry.who)
-             .add("role", entry.who.empty() ? std::string() : entry.role)
-             .add("from", entry.from)
-             .add("method", entry.method)
-             .add("request", entry.request)
-             .add("request_id", entry.request_id)
-             .add("outcome", reason_name(entry.outcome.reason()))
-             .add("message", entry.outcome.message())
-             .add("seconds", 1e-6 * static_cast<double>(entry.took.count()))
-             .text() +
-         "\n";
+  Json line;
+  line.add("time", time_text(now_us()))
+      .add("who", entry.who)
+      .add("role", entry.who.empty() ? std::string() : entry.role)
+      .add("from", entry.from)
+      .add("method", entry.method)
+      .add("request", entry.request)
+      .add("request_id", entry.request_id)
+      .add("outcome", reason_name(entry.outcome.reason()))
+      .add("message", entry.outcome.message())
+      .add("seconds", 1e-6 * static_cast<double>(entry.took.count()));
+  if (!entry.trace_id.empty()) line.add("trace_id", entry.trace_id);
+  return line.text() + "\n";
 }
 
 bool write_all(int file, const std::string& text) {

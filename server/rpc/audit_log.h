@@ -43,10 +43,11 @@ class AuditLog {
     std::string method, request, request_id;
     Status outcome;
     std::chrono::microseconds took{0};
+    std::string trace_id = {};  // of the caller's traceparent; empty: none
   };
   // Keys: time (RFC 3339, UTC, with milliseconds), who, role, from, method, request, request_id, outcome (a reason),
-  // message, seconds. Returns at once. A failure to write is logged; where the disk takes too little for too long,
-  // lines are lost, and their number is written.
+  // message, seconds, and trace_id if there is one. Returns at once. A failure to write is logged; where the disk takes
+  // too little for too long, lines are lost, and their number is written.
   void write(const Entry& entry);
   // Waits until everything is written.
   void flush();

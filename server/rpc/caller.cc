@@ -43,13 +43,13 @@ Evidence evidence_of(const Metadata& metadata, const grpc::AuthContext& connecti
 
 class TurnsStrangersAway final : public grpc::AuthMetadataProcessor {
  public:
-  explicit TurnsStrangersAway(const Gatekeeper& gatekeeper) : gatekeeper_(gatekeeper) {}
+  TurnsStrangersAway(const Gatekeeper& gatekeeper, bool health) : gatekeeper_(gatekeeper), health_(health) {}
 
   bool IsBlocking() const override { return false; }
   grpc::Status Process(const InputMetadata& metadata, grpc::AuthContext* connection, OutputMetadata*,
                        OutputMetadata*) override {
     const std::string_view path = value_of(metadata, ":path");
-    if (path == kHealth) return grpc::Status::OK;
+    if (health_ && path == kHealth) return grpc::Status::OK;
     const auto identity = gatekeeper_.identify(evidence_of(metadata, *connection));
     if (identity.ok()) return grpc::Status::OK;
     spdlog::debug("{}: {}", path, identity.status().to_string());
@@ -58,6 +58,7 @@ class TurnsStrangersAway final : public grpc::AuthMetadataProcessor {
 
  private:
   const Gatekeeper& gatekeeper_;
+  const bool health_;
 };
 
 }  // namespace
@@ -66,8 +67,8 @@ Evidence evidence_of(const grpc::CallbackServerContext& context, const grpc::Aut
   return evidence_of(context.client_metadata(), connection);
 }
 
-std::shared_ptr<grpc::AuthMetadataProcessor> turn_strangers_away(const Gatekeeper& gatekeeper) {
-  return std::make_shared<TurnsStrangersAway>(gatekeeper);
+std::shared_ptr<grpc::AuthMetadataProcessor> turn_strangers_away(const Gatekeeper& gatekeeper, bool health) {
+  return std::make_shared<TurnsStrangersAway>(gatekeeper, health);
 }
 
 }  // namespace relmap::rpc

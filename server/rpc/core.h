@@ -1,6 +1,7 @@
 // What the RPC services share, and how each handler is given the parts that it uses.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -10,6 +11,7 @@
 #include <string_view>
 #include <tuple>
 #include <type_traits>
+#include <vector>
 
 #include "proto/base/mutex.h"
 #include "server/intake/ingest_server.h"
@@ -38,6 +40,7 @@ struct DaemonFacts {
   bool deterministic = false;
   std::uint64_t pid = 0;
   std::int64_t started_us = 0;                 // UTC
+  std::string commit = {};                     // of the source; empty: not known
   std::vector<std::string> backup_roots = {};  // folders below which backups may be made; empty: nowhere
 };
 
@@ -54,14 +57,41 @@ struct IngestFacts {
 
 struct ProcessFacts {
   std::size_t resident_bytes = 0, peak_resident_bytes = 0;
+  double cpu_s = 0;                           // of user and system, since the start
+  std::size_t open_files = 0, max_files = 0;  // descriptors
 };
 using ProcessProbe = std::function<ProcessFacts()>;
+
+// A part of the daemon that can be in trouble by itself.
+struct ComponentHealth {
+  std::string name;  // storage, worker, intake
+  Status state;
+};
+
+struct HealthFacts {
+  std::vector<ComponentHealth> components;
+  // Whether journal, worker and intake make progress. If not, only a new start helps.
+  bool live = true;
+  // Steps of the system's clock since the start, and the last of them, in seconds.
+  std::uint64_t clock_steps = 0;
+  double clock_step_s = 0;
+
+  // Whether keyframes are taken in and questions answered.
+  bool ready() const {
+    return live && std::all_of(components.begin(), components.end(),
+                               [](const ComponentHealth& component) { return component.state.ok(); });
+  }
+};
+using HealthProbe = std::function<HealthFacts()>;
+
+class Gateway;
 
 // What lets callers in; null while no server runs.
 struct Transport {
   const Connections* connections = nullptr;
   const Gatekeeper* gatekeeper = nullptr;
   const TlsWatch* tls = nullptr;
+  const Gateway* gateway = nullptr;
 };
 
 // The intake of keyframes.
@@ -115,8 +145,8 @@ struct Core {
         edits(m.remembered_edits()) {}
 
   auto parts() {
-    return std::tie(mapper, facts, limits, intake, process, transport, routes, metrics, views, edits, imports, pictures,
-                    maintenance);
+    return std::tie(mapper, facts, limits, intake, process, transport, health, routes, metrics, views, edits, imports,
+                    pictures, maintenance);
   }
 
   map::Mapper& mapper;
@@ -125,6 +155,7 @@ struct Core {
   Intake intake;
   ProcessProbe process;  // empty if not known
   Transport transport;
+  HealthProbe health;  // empty if not known
   Routes routes;
   Metrics metrics;
   ViewKeeper views;

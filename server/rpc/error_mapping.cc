@@ -85,6 +85,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::REMOVED_BY_OPERATOR:
     case Reason::REMOVED_WITH_SET:
     case Reason::REMOVED_ALONE:
+    case Reason::NEEDS_RESTART:
       return grpc::StatusCode::FAILED_PRECONDITION;
 
     case Reason::NOT_ALLOWED:
@@ -105,6 +106,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::DEADLINE:
       return grpc::StatusCode::DEADLINE_EXCEEDED;
     case Reason::SHUTTING_DOWN:
+    case Reason::STALLED:
     case Reason::UNREACHABLE:
     case Reason::NO_MULTICAST_ROUTE:
     case Reason::DROPPED_BY_ROBOT:

@@ -44,6 +44,12 @@ std::string choose_request_id(const grpc::CallbackServerContext& context) {
   return hex(std::uint64_t{random()});
 }
 
+std::string traceparent_of(const grpc::CallbackServerContext& context) {
+  const auto given = context.client_metadata().find("traceparent");
+  if (given == context.client_metadata().end()) return "";
+  return checked_traceparent({given->second.data(), given->second.size()});
+}
+
 std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerContext& context, double default_s) {
   const auto now = std::chrono::steady_clock::now();
   const auto left = context.deadline() - std::chrono::system_clock::now();
@@ -93,8 +99,11 @@ void Gateway::watch() {
       if (call->stalled(now)) stalled.push_back(call);
     for (Call* call : stalled) {
       if (!open_.contains(call)) continue;
-      spdlog::warn("{} [{}] from {}: it has taken no message for {} s, and is cancelled", call->method_,
-                   call->request_id_, call->context_->peer(), limits_.stalled_s);
+      {
+        const RequestScope scope(call->request_);
+        spdlog::warn("{} from {}: it has taken no message for {} s, and is cancelled", call->method_,
+                     call->context_->peer(), limits_.stalled_s);
+      }
       call->written();
       cancelling_ = call;
       {
@@ -200,13 +209,14 @@ Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* m
       context_(context),
       method_(method),
       lane_(lane),
-      request_id_(choose_request_id(*context)),
+      request_{choose_request_id(*context), traceparent_of(*context)},
       deadline_{deadline_of(*context, gateway.limits_.default_deadline_s), [this]() -> Status {
                   if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
                   if (cancelled_) return {Reason::DEADLINE, "the caller has gone"};
                   return check_caller();
                 }} {
-  context_->AddInitialMetadata("x-request-id", request_id_);
+  context_->AddInitialMetadata("x-request-id", request_.request_id);
+  if (!request_.traceparent.empty()) context_->AddInitialMetadata("traceparent", request_.traceparent);
 }
 
 Call::~Call() {
@@ -309,19 +319,19 @@ void Call::asks(const google::protobuf::Message& request) {
 }
 
 grpc::Status Call::end(const Status& status) {
+  const RequestScope scope(request_);
   leave();
   writing();
   const auto took = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - begun_);
-  gateway_.metrics_.count(method_, status.reason(), took);
+  gateway_.metrics_.count(method_, status.reason(), std::chrono::duration<double>(took).count());
   if (status.reason() == Reason::INTERNAL || status.reason() == Reason::IO_ERROR ||
       status.reason() == Reason::DATA_LOSS)
-    spdlog::error("{} [{}] from {}: {}", method_, request_id_, context_->peer(), status.to_string());
+    spdlog::error("{} from {}: {}", method_, context_->peer(), status.to_string());
   else if ((status.reason() == Reason::NOT_ALLOWED || status.reason() == Reason::UNAUTHENTICATED) &&
            gateway_.tells_of(counted_as(caller_, context_->peer()) + " " + method_))
-    spdlog::warn("{} [{}] from {}: {}", method_, request_id_, context_->peer(), status.to_string());
+    spdlog::warn("{} from {}: {}", method_, context_->peer(), status.to_string());
   else
-    spdlog::debug("{} [{}] from {}: {} in {} us", method_, request_id_, context_->peer(), status.to_string(),
-                  took.count());
+    spdlog::debug("{} from {}: {} in {} us", method_, context_->peer(), status.to_string(), took.count());
   if (gateway_.audit_ && is_audited(method_)) {
     AuditLog::Entry entry;
     entry.who = caller_.name;
@@ -329,12 +339,13 @@ grpc::Status Call::end(const Status& status) {
     entry.from = context_->peer();
     entry.method = method_;
     entry.request = asked_;
-    entry.request_id = request_id_;
+    entry.request_id = request_.request_id;
+    entry.trace_id = request_.trace_id();
     entry.outcome = status;
     entry.took = took;
     gateway_.audit_->write(entry);
   }
-  return to_grpc(status, request_id_);
+  return to_grpc(status, request_.request_id);
 }
 
 }  // namespace relmap::rpc

@@ -26,6 +26,7 @@
 #include "server/rpc/limits.h"
 #include "server/rpc/metrics.h"
 #include "server/rpc/producer.h"
+#include "server/rpc/request_context.h"
 #include "server/rpc/task_pool.h"
 #include "storage/memory/budget.h"
 
@@ -53,6 +54,11 @@ class Gateway {
   void drain() { draining_ = true; }
   // The number of calls that gRPC still holds; their answers may still be in transit.
   int calls() const { return calls_; }
+  // Lanes whose calls are counted together, so that those of others have room.
+  enum class Kind : std::uint8_t { kQuestion, kStream, kEdit, kWait };
+  static constexpr std::size_t kKinds = 4;
+  // The number of calls of the kind that are not answered yet.
+  int running(Kind kind) const { return running_[static_cast<std::size_t>(kind)]; }
 
   // Answers a unary call. `handler` is a Result<Reply>(const Request&, const Deadline&).
   template <typename Request, typename Reply, typename Handler>
@@ -69,9 +75,6 @@ class Gateway {
 
   void watch();
   void forget(Call* call);
-  // Lanes whose calls are counted together, so that those of others have room.
-  enum class Kind : std::uint8_t { kQuestion, kStream, kEdit, kWait };
-  static constexpr std::size_t kKinds = 4;
   static Kind kind_of(Lane lane);
   struct Limit {
     int all, per_caller;
@@ -159,7 +162,7 @@ class Call {
   const char* const method_;
   const Lane lane_;
   const std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-  std::string request_id_;
+  const RequestContext request_;
   Identity caller_;
   std::atomic<bool> cancelled_{false};
   Deadline deadline_;
@@ -174,6 +177,7 @@ class Call {
 
 template <typename Body>
 Status Call::guarded(Body body) {
+  const RequestScope scope(request_);
   try {
     return body();
   } catch (...) {

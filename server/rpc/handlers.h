@@ -30,7 +30,9 @@ class SetEdgeStateReply;
 class ProposeEdgeRequest;
 class ProposeEdgeReply;
 class SetLabelRequest;
+class SetLogLevelRequest;
 class SetLabelReply;
+class SetLogLevelReply;
 class ImportGraphRequest;
 class ImportGraphReply;
 class FindLabelsRequest;
@@ -107,7 +109,7 @@ Result<v1::FreezeSessionReply> freeze_session(const v1::FreezeSessionRequest& re
 Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest& request, const Deadline& deadline,
                                       map::Mapper& mapper, const DaemonFacts& facts, const Routes& routes,
                                       const Intake& intake, const ProcessProbe& process, const Transport& transport,
-                                      const Metrics& metrics);
+                                      const HealthProbe& health, const Metrics& metrics);
 Result<Producer<v1::ExportReply>> export_trajectories(const v1::ExportRequest& request, const Deadline& deadline,
                                                       map::Mapper& mapper, ViewKeeper& views);
 Result<v1::WaitIdleReply> wait_idle(const v1::WaitIdleRequest& request, const Deadline& deadline, map::Mapper& mapper);
@@ -125,7 +127,9 @@ Result<Producer<v1::Progress>> compact(const v1::CompactRequest& request, const 
                                        MaintenanceTurn& maintenance);
 Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest& request, const Deadline& deadline, map::Mapper& mapper,
                                     const DaemonFacts& facts, const Routes& routes, const Intake& intake,
-                                    const ProcessProbe& process, const Transport& transport, const Metrics& metrics);
+                                    const ProcessProbe& process, const Transport& transport, const HealthProbe& health,
+                                    const Metrics& metrics);
+Result<v1::SetLogLevelReply> change_log_level(const v1::SetLogLevelRequest& request, const Deadline& deadline);
 Result<v1::CommitReply> commit(const v1::CommitRequest& request, const Deadline& deadline, map::Mapper& mapper);
 
 }  // namespace relmap::rpc

@@ -111,10 +111,30 @@ Result<std::vector<ListeningSocket>> ListeningSocket::at_host(const std::string&
   return sockets;
 }
 
-std::uint16_t ListeningSocket::port() const {
+namespace {
+
+sockaddr_storage address_of(int socket) {
   sockaddr_storage address{};
   socklen_t size = sizeof address;
-  if (getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return 0;
+  (void)getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size);
+  return address;
+}
+
+}  // namespace
+
+bool ListeningSocket::is_v6() const { return address_of(fd_).ss_family == AF_INET6; }
+
+bool ListeningSocket::is_local() const {
+  const sockaddr_storage address = address_of(fd_);
+  if (address.ss_family == AF_INET6)
+    return IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<const sockaddr_in6&>(address).sin6_addr);
+  constexpr std::uint32_t kLoopbackNet = 127;
+  return address.ss_family == AF_INET &&
+         ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr) >> 24 == kLoopbackNet;
+}
+
+std::uint16_t ListeningSocket::port() const {
+  const sockaddr_storage address = address_of(fd_);
   return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(address).sin6_port
                                              : reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }

@@ -36,6 +36,8 @@ class ListeningSocket {
 
   int fd() const { return fd_; }
   std::uint16_t port() const;  // of TCP
+  bool is_v6() const;
+  bool is_local() const;  // of TCP: only this machine itself can reach it
 
  private:
   explicit ListeningSocket(int fd) : fd_(fd) {}

@@ -1,44 +1,43 @@
-// Metrics of every RPC: calls, time, and refusals by reason.
+// Metrics of every RPC: calls by method and outcome, and how long they took.
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
+#include <string_view>
 
+#include "proto/base/duration_histogram.h"
 #include "proto/base/mutex.h"
 #include "proto/base/reason.h"
 
 namespace relmap::rpc {
 
 struct MethodMetrics {
-  std::uint64_t calls = 0;  // finished
-  std::uint64_t total_us = 0;
-  std::uint64_t max_us = 0;
-  std::map<Reason, std::uint64_t> failures;
+  double max_s = 0;                            // of all outcomes
+  std::map<Reason, DurationCounts> durations;  // of finished calls, by outcome
 };
 
 // Thread-safe.
 class Metrics {
  public:
-  void count(const std::string& method, Reason outcome, std::chrono::microseconds took) {
+  void count(std::string_view method, Reason outcome, double took_s) {
     const MutexLock lock(mutex_);
-    MethodMetrics& m = methods_[method];
-    ++m.calls;
-    const auto us = static_cast<std::uint64_t>(took.count());
-    m.total_us += us;
-    m.max_us = std::max(m.max_us, us);
-    if (outcome != Reason::OK) ++m.failures[outcome];
+    auto found = methods_.find(method);
+    if (found == methods_.end()) found = methods_.emplace(method, MethodMetrics()).first;
+    found->second.max_s = std::max(found->second.max_s, took_s);
+    found->second.durations[outcome].add(took_s);
   }
-  std::map<std::string, MethodMetrics> methods() const {
+  using Methods = std::map<std::string, MethodMetrics, std::less<>>;
+  Methods methods() const {
     const MutexLock lock(mutex_);
     return methods_;
   }
 
  private:
   mutable Mutex mutex_;
-  std::map<std::string, MethodMetrics> methods_ RELMAP_GUARDED_BY(mutex_);
+  Methods methods_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::rpc

@@ -42,6 +42,7 @@ constexpr std::array kTable{
     Entry{"Admin.GetStats", Role::kOperator},
     Entry{"Admin.WaitIdle", Role::kOperator},
     Entry{"Admin.Commit", Role::kOperator},
+    Entry{"Admin.SetLogLevel", Role::kOperator},
     Entry{"Admin.FreezeSession", Role::kOperator},
     Entry{"Admin.DeleteSession", Role::kOperator},
 };

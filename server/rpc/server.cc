@@ -8,6 +8,8 @@
 #include <grpcpp/security/tls_credentials_options.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -83,7 +85,7 @@ struct RpcServer::Impl {
       : transport(core.transport),
         connections(options.connections),
         gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {
-    transport = {&connections, &gatekeeper, options.tls_watch};
+    transport = {&connections, &gatekeeper, options.tls_watch, &gateway};
   }
   ~Impl() { transport = {}; }
 
@@ -94,6 +96,7 @@ struct RpcServer::Impl {
   std::unique_ptr<grpc::Server> server;  // destroyed before the services
   std::unique_ptr<Listener> listener;    // destroyed before the server
   std::uint16_t port = 0;
+  std::atomic<bool> leaving = false;  // nothing is SERVING any more
   bool stopped = true;
 };
 
@@ -141,7 +144,8 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
     if (!options.tls.certificate.empty()) {
       if (Status sound = check_files(options.tls); !sound.ok()) return sound;
       credentials = tls_credentials(options.tls);
-      credentials->SetAuthMetadataProcessor(turn_strangers_away(gatekeeper));
+      const bool local = std::all_of(sockets->begin(), sockets->end(), [](const auto& one) { return one.is_local(); });
+      credentials->SetAuthMetadataProcessor(turn_strangers_away(gatekeeper, local));
     }
     listen_at(std::move(*sockets), std::move(credentials));
   }
@@ -158,11 +162,21 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
 
 std::uint16_t RpcServer::port() const { return impl_->port; }
 
+void RpcServer::set_serving(const std::string& service, bool serving) {
+  if (auto* health = impl_->server->GetHealthCheckService(); health && !impl_->leaving)
+    health->SetServingStatus(service, serving);
+}
+
+void RpcServer::announce_stop() {
+  if (impl_->leaving.exchange(true)) return;
+  if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
+}
+
 void RpcServer::stop(std::chrono::milliseconds patience) {
   if (impl_->stopped) return;
   impl_->stopped = true;
+  announce_stop();
   impl_->listener->stop();
-  if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
   impl_->gateway.drain();
   // Waits for calls only: Shutdown() would also wait for idle connections, whose clients may take seconds to notice.
   const auto deadline = std::chrono::steady_clock::now() + patience;

@@ -36,6 +36,12 @@ class RpcServer {
 
   std::uint16_t port() const;  // of TCP; 0 without it
 
+  // What gRPC's health service tells of "relmap.v1.Map", "relmap.v1.Ingest", "relmap.v1.Admin", or of the whole ("").
+  // All are SERVING at first. Thread-safe.
+  void set_serving(const std::string& service, bool serving);
+  // From now on health tells NOT_SERVING of everything, while calls go on. Thread-safe.
+  void announce_stop();
+
   // Stops the server: health reports NOT_SERVING, new calls are refused, and running ones are interrupted. Calls that
   // have not ended after `patience` are cut off.
   void stop(std::chrono::milliseconds patience);

@@ -7,6 +7,7 @@
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/status.pb.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/log_level.h"
 #include "server/rpc/messages.h"
 
 namespace relmap::rpc {
@@ -17,6 +18,7 @@ constexpr std::chrono::milliseconds kWaitSlice{100};
 
 void put_daemon(const DaemonFacts& facts, v1::GetStatusReply& reply) {
   reply.set_version(facts.version);
+  reply.set_commit(facts.commit);
   reply.set_boot_id(facts.boot_id);
   reply.mutable_protocol()->set_major(kProtocolMajor);
   reply.mutable_protocol()->set_minor(kProtocolMinor);
@@ -136,19 +138,35 @@ void put_connections(const Connections& connections, v1::GetStatusReply& reply) 
   counts.set_message(now.trouble.message());
 }
 
+void put_health(const HealthFacts& health, v1::GetStatusReply& reply) {
+  for (const ComponentHealth& component : health.components) {
+    v1::Component& added = *reply.add_components();
+    added.set_name(component.name);
+    added.set_reason(to_wire(component.state.reason()));
+    added.set_message(component.state.message());
+  }
+  reply.set_clock_steps(health.clock_steps);
+  reply.set_last_clock_step_s(health.clock_step_s);
+}
+
 void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
   for (const auto& [name, counted] : metrics.methods()) {
     v1::MethodCount& method = *reply.add_methods();
     method.set_method(name);
-    method.set_calls(counted.calls);
-    method.set_mean_us(static_cast<double>(counted.total_us) / static_cast<double>(counted.calls));
-    method.set_max_us(static_cast<double>(counted.max_us));
-    std::uint64_t failures = 0;
-    for (const auto& [reason, count] : counted.failures) {
+    std::uint64_t calls = 0, failures = 0;
+    double sum_s = 0;
+    for (const auto& [outcome, durations] : counted.durations) {
+      const std::uint64_t count = durations.total();
+      calls += count;
+      sum_s += durations.sum_s;
+      if (outcome == Reason::OK) continue;
       failures += count;
-      add_count(*method.mutable_failures_by_reason(), reason, count);
+      add_count(*method.mutable_failures_by_reason(), outcome, count);
     }
+    method.set_calls(calls);
     method.set_failures(failures);
+    method.set_mean_us(sum_s * 1e6 / static_cast<double>(calls));
+    method.set_max_us(counted.max_s * 1e6);
   }
 }
 
@@ -156,7 +174,8 @@ void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
 
 Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadline&, map::Mapper& mapper,
                                       const DaemonFacts& facts, const Routes& routes, const Intake& intake,
-                                      const ProcessProbe& process, const Transport& transport, const Metrics& metrics) {
+                                      const ProcessProbe& process, const Transport& transport,
+                                      const HealthProbe& health, const Metrics& metrics) {
   v1::GetStatusReply reply;
   put_daemon(facts, reply);
   const auto view = mapper.view();
@@ -182,6 +201,8 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadlin
     reply.set_certificate_reason(to_wire(state.reason()));
     reply.set_certificate_message(state.message());
   }
+  if (health) put_health(health(), reply);
+  reply.set_log_level(log_level());
   put_methods(metrics, reply);
   return reply;
 }

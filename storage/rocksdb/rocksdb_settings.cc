@@ -78,7 +78,7 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   auto files = wanted.map_files ? wanted.map_files : gradual_deletion(rocksdb::FileSystem::Default());
   settings.forgive_torn_manifest = std::make_shared<std::atomic<bool>>(false);
   // What these do for RocksDB is noexcept where it takes memory: RocksDB does not survive that an exception passes it,
-  // so the process ends at once, and says why (server/ops/last_words.h).
+  // so the process ends at once, and says why (server/monitor/last_words.h).
   settings.env = rocksdb::NewCompositeEnv(lossy_info_log(
       retryable_files(torn_manifest(durable_manifest(std::move(files)), settings.forgive_torn_manifest))));
   o.env = settings.env.get();

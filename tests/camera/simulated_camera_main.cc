@@ -75,18 +75,25 @@ int main(int argc, char** argv) {
   CLI::App app("Runs a program with a simulated IIDC stereo camera.", "relmap-simulated-camera");
   relmap::testing::Options options;
   app.add_option("--drive", options.drive,
-                 "Folder of relmap-sim whose pictures are shown, back and forth (default: a moving texture)");
+                 "Folder of relmap-sim whose pictures are shown, back and forth (default: a moving texture)")
+      ->type_name("FOLDER");
   app.add_option("--rate", options.rate, "Frames a second")->check(CLI::Range(0.1, 48.0))->capture_default_str();
   app.add_option("--pairs", options.pairs, "Interrupt the program once this many were sent (0: it ends by itself)");
-  app.add_option("--output", options.output, "File for the program's standard output");
-  app.add_option("--errors", options.errors, "File for the program's standard error");
-  app.add_option("--report", options.report, "File for a JSON object: exit_code, frames, lost, cpu_s")->required();
+  app.add_option("--output", options.output, "File for the program's standard output")->type_name("FILE");
+  app.add_option("--errors", options.errors, "File for the program's standard error")->type_name("FILE");
+  app.add_option("--report", options.report, "File for a JSON object: exit_code, frames, lost, cpu_s")
+      ->type_name("FILE")
+      ->required();
   app.add_option("command", options.command, "The program and its arguments, behind --")->required();
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.footer(
       "Example:\n"
       "  relmap-simulated-camera --report r.json -- $PWD/build/release/bin/relmap-camera record a.raw --frames 100\n"
-      "Exit codes: 0 done, 1 failed, 2 wrong usage.");
+      "\n"
+      "Exit codes:\n"
+      "  0  done\n"
+      "  1  failed\n"
+      "  2  wrong usage");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

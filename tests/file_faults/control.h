@@ -22,10 +22,12 @@ struct FaultControl {
   std::atomic<std::uint64_t> recorded{0};                         // operations
   std::array<std::atomic<std::uint64_t>, kFaultKinds> counts{};   // of each kind so far
   std::array<std::atomic<std::uint64_t>, kFaultKinds> failing{};  // its number, from 1; 0: none
+  std::atomic<std::uint32_t> lasting{0};                          // 1: and so do all of its kind that follow
   std::atomic<std::int32_t> error{0};                             // 0: it does not fail
   std::atomic<std::uint32_t> hang_ms{0};                          // before it fails or succeeds
   std::atomic<std::uint32_t> hits{0};                             // faults that happened
   std::atomic<std::uint32_t> hanging{0};                          // that hang now
+  std::atomic<std::int64_t> clock_step_s{0};                      // by which the time of day has been set forward
 };
 
 enum class OperationKind : std::uint32_t {

@@ -47,6 +47,7 @@ Function* next(const char* name, Function* /*as*/) {
   }())
 
 constexpr int kDescriptors = 1 << 16;
+constexpr std::uint32_t kNap_ms = 10;
 bool watched[kDescriptors];  // descriptors of files below the root
 std::string* root = nullptr;
 FaultControl* control = nullptr;
@@ -109,12 +110,15 @@ bool faulty(FaultKind kind) {
   if (control == nullptr) return false;
   const auto at = static_cast<std::size_t>(kind);
   const std::uint64_t n = ++control->counts[at];
-  if (n != control->failing[at]) return false;
+  const std::uint64_t failing = control->failing[at];
+  if (failing == 0 || n < failing || (n > failing && control->lasting == 0)) return false;
   ++control->hits;
   if (const std::uint32_t ms = control->hang_ms; ms > 0) {
-    timespec left{ms / 1000, static_cast<long>(ms % 1000) * 1000000};
     ++control->hanging;
-    while (::nanosleep(&left, &left) != 0 && errno == EINTR) {
+    // In short pieces, so that it goes on when the disk is mended.
+    for (std::uint32_t slept = 0; slept < ms && control->failing[at] != 0; slept += kNap_ms) {
+      const timespec nap{0, kNap_ms * 1000000L};
+      ::nanosleep(&nap, nullptr);
     }
     --control->hanging;
   }
@@ -604,6 +608,13 @@ int posix_fallocate(int fd, off_t offset, off_t size) {
                  static_cast<std::uint64_t>(offset + size));
 }
 int posix_fallocate64(int fd, off64_t offset, off64_t size) { return posix_fallocate(fd, offset, size); }
+
+// What std::chrono and the program itself ask for the time of day.
+int clock_gettime(clockid_t clock, timespec* time) {
+  const int failed = NEXT(clock_gettime)(clock, time);
+  if (failed == 0 && clock == CLOCK_REALTIME && control) time->tv_sec += control->clock_step_s;
+  return failed;
+}
 
 int fsync(int fd) {
   return synced(fd, [&] { return NEXT(fsync)(fd); });

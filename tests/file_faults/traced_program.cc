@@ -44,6 +44,16 @@ void FileFaults::fail(FaultKind kind, std::uint64_t n, int error, std::chrono::m
   control_->failing[static_cast<std::size_t>(kind)] = n;
 }
 
+void FileFaults::fail_from_now_on(FaultKind kind, int error, std::chrono::milliseconds hang) {
+  control_->lasting = 1;
+  fail(kind, 1, error, hang);
+}
+
+void FileFaults::mend() {
+  for (auto& failing : control_->failing) failing = 0;
+  control_->lasting = 0;
+}
+
 std::vector<FileOperation> FileFaults::operations() const { return read_trace(notes_ + "/trace"); }
 
 }  // namespace relmap::testing

@@ -29,7 +29,13 @@ class FileFaults {
   void fail(FaultKind kind, std::uint64_t n, int error, std::chrono::milliseconds hang = {});
   std::uint64_t count(FaultKind kind) const { return control_->counts[static_cast<std::size_t>(kind)]; }
   bool hit() const { return control_->hits > 0; }
+  // All operations of the kind from now on, until mend(). Those that hang already still do.
+  void fail_from_now_on(FaultKind kind, int error, std::chrono::milliseconds hang = {});
+  void mend();
   bool hanging() const { return control_->hanging > 0; }  // now
+
+  // From now on the program's time of day is ahead of the machine's by so much.
+  void set_clock(std::int64_t ahead_s) { control_->clock_step_s = ahead_s; }
 
   // The operations so far: whatever the program has told somebody since then rests on these.
   std::uint64_t recorded() const { return control_->recorded; }

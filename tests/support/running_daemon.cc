@@ -80,6 +80,8 @@ bool RunningDaemon::serving() const { return endpoint("pid") == std::to_string(p
 
 std::string RunningDaemon::address() const { return endpoint("address"); }
 
+std::string RunningDaemon::http() const { return endpoint("http"); }
+
 std::unique_ptr<client::Client> RunningDaemon::client() const {
   return client::Client::connect(options_.data).or_throw();
 }

@@ -35,6 +35,7 @@ class RunningDaemon {
   // Whether DIR/endpoint names this process.
   bool serving() const;
   std::string address() const;  // over TCP
+  std::string http() const;     // HOST:PORT; empty without --http
   std::unique_ptr<client::Client> client() const;
   std::string log() const;
 

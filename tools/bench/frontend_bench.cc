@@ -355,11 +355,11 @@ Run declare_frontend(CLI::App& app) {
   options->world.frames = 5000;
   app.footer(
       "Examples:\n"
-      "  relmap-bench frontend --source kitti ~/kitti/06 --reference klt     a data set with poses.txt\n"
-      "  relmap-bench frontend --seeds 5 --exposure 0.005 --exposure-jumps 1  five simulated drives of 1 km\n"
-      "  relmap-bench frontend --faults all --rate 20 --step 0.1 --imu        what can go wrong\n"
+      "  relmap-bench frontend --source kitti ~/kitti/06 --reference klt   # a data set with poses.txt\n"
+      "  relmap-bench frontend --seeds 5 --exposure 0.005 --exposure-jumps 1   # five simulated drives of 1 km\n"
+      "  relmap-bench frontend --faults all --rate 20 --step 0.1 --imu   # what can go wrong\n"
       "  relmap-bench frontend --scene motorway --frames 1000 --reference klt\n"
-      "  relmap-bench frontend --frames 30000 --scale 0.5                    memory over a long run");
+      "  relmap-bench frontend --frames 30000 --scale 0.5   # memory over a long run");
   app.add_option("--source", options->source, "kind of the data set")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "auto"}))
       ->capture_default_str();

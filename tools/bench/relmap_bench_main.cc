@@ -29,6 +29,9 @@ const Subcommand kSubcommands[] = {
     {"frontend", "Run the stereo front-end alone on pictures with truth: speed, drift, covariances",
      relmap::bench::declare_frontend},
     {"ingest", "Take in keyframes with pictures: speed, cost, lag of lookups, closures", relmap::bench::declare_ingest},
+    {"operations",
+     "How soon faults show in health and metrics, what scrapes cost beside a fleet, how long a stop takes",
+     relmap::bench::declare_operations},
     {"places", "Measure the place index in memory, and with its lists on disk", relmap::bench::declare_places},
     {"rba", "Measure adaptive relative bundle adjustment: figure of eight, loops, laps, exploration",
      relmap::bench::declare_rba},
@@ -58,12 +61,16 @@ int main(int argc, char** argv) {
     own->footer(std::string("Example:\n  relmap-bench ") + subcommand.name + " --json");
     runs.emplace_back(own, subcommand.declare(*own));  // subcommands with required options set their own footer
   }
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.footer(
       "Examples:\n"
       "  relmap-bench rba --json\n"
       "  relmap-bench routes --help\n"
-      "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
+      "\n"
+      "Exit codes:\n"
+      "  0  done\n"
+      "  1  failed; the reason is printed\n"
+      "  2  wrong usage");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

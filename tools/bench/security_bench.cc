@@ -615,8 +615,8 @@ Run declare_security(CLI::App& app) {
   app.footer(
       "Examples:\n"
       "  relmap-bench security --json\n"
-      "  relmap-bench security --seconds 0 --strangers 10000    without the fleets\n"
-      "  relmap-bench security --seconds 0 --strangers 0        only TLS and crowds");
+      "  relmap-bench security --seconds 0 --strangers 10000   # without the fleets\n"
+      "  relmap-bench security --seconds 0 --strangers 0   # only TLS and crowds");
   app.add_option("--seconds", options->seconds, "of each fleet; 0: no fleets")->capture_default_str();
   app.add_option("--robots", options->robots, "of each fleet")->capture_default_str();
   app.add_option("--rounds", options->rounds, "pairs of fleets, without seals and with them")->capture_default_str();

@@ -25,6 +25,7 @@ Run declare_fleet(CLI::App& app);
 Run declare_fleet_robots(CLI::App& app);
 Run declare_frontend(CLI::App& app);
 Run declare_ingest(CLI::App& app);
+Run declare_operations(CLI::App& app);
 Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);
 Run declare_rides(CLI::App& app);

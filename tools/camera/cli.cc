@@ -14,8 +14,13 @@ constexpr char kFooter[] = R"(
 CAMERA is a serial number or GUID, as `relmap-camera list` prints them; it may be left out if there is only one camera.
 show and check also take the file of a recording. Calibrations and settings are kept in a folder by serial number
 (docs/cameras.md). Data goes to stdout, everything else to stderr.
-Exit codes: 0 done; 1 failed (the first word on stderr is the reason); 2 wrong usage; 3 check found something wrong;
-4 interrupted.
+
+Exit codes:
+  0  done
+  1  failed; the first word on stderr is the reason
+  2  wrong usage
+  3  check found something wrong
+  4  interrupted
 
 Examples:
   relmap-camera list
@@ -38,13 +43,14 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   app.add_option("--bus", options.bus, "bus on which cameras are looked for")
       ->check(CLI::IsMember({"auto", "usb", "1394"}))
       ->capture_default_str();
   app.add_option("--cameras", options.camera_folder,
                  "folder of calibrations and settings by serial number (default:\n"
-                 "$XDG_CONFIG_HOME/relmap/cameras, or ~/.config/relmap/cameras)");
+                 "$XDG_CONFIG_HOME/relmap/cameras, or ~/.config/relmap/cameras)")
+      ->type_name("FOLDER");
   app.add_flag("--json", options.json, "print answers as JSON, one object a line");
   app.add_flag("--quiet", options.quiet, "show no progress");
   for (const auto add : {add_list, add_info, add_set, add_show, add_check, add_record, add_replay}) add(app, action);

@@ -169,7 +169,9 @@ void add_record(CLI::App& app, Action& action) {
       "record", "record raw frames to a file; it stays readable whatever happens to the program or the camera");
   command->footer("Example:\n  relmap-camera record drive.raw --seconds 600");
   auto wish = std::make_shared<RecordOptions>();
-  command->add_option("FILE", wish->file, "the recording; an existing file is not overwritten")->required();
+  command->add_option("FILE", wish->file, "the recording; an existing file is not overwritten")
+      ->type_name("FILE")
+      ->required();
   command->add_option("CAMERA", wish->camera, "serial number or GUID");
   command->add_option("--seconds", wish->seconds, "record for so many seconds (default: until Ctrl-C)")
       ->check(CLI::NonNegativeNumber);
@@ -178,8 +180,10 @@ void add_record(CLI::App& app, Action& action) {
       ->add_option("--rate", wish->rate_hz,
                    "frames a second (default: that of the camera's settings, else the highest)")
       ->check(CLI::PositiveNumber);
-  command->add_option("--calibration", wish->calibration,
-                      "calibration file or folder, instead of the one kept by serial number");
+  command
+      ->add_option("--calibration", wish->calibration,
+                   "calibration file or folder, instead of the one kept by serial number")
+      ->type_name("FILE|FOLDER");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) {
       return record(options, console, *wish);
@@ -192,7 +196,7 @@ void add_replay(CLI::App& app, Action& action) {
       app.add_subcommand("replay", "give a recording to relmap-frontend; with --json only print what it holds");
   command->footer("Example:\n  relmap-camera replay drive.raw -- --robot cart --server /srv/map");
   auto wish = std::make_shared<ReplayOptions>();
-  command->add_option("FILE", wish->file, "the recording")->required();
+  command->add_option("FILE", wish->file, "the recording")->type_name("FILE")->required();
   command
       ->add_option("--rate", wish->rate,
                    "recorded, max, a number of pairs a second, or a factor of the recorded rate, as 2x")

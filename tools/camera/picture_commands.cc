@@ -247,17 +247,21 @@ void add_show(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand("show", "write pictures of both eyes, side by side, as PNG files");
   command->footer("Example:\n  relmap-camera show 7140058 --out pictures/ --count 5");
   auto wish = std::make_shared<ShowOptions>();
-  command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
-  command->add_option("--out", wish->out, "folder for the pictures; created if it does not exist")
-      ->capture_default_str();
+  command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording")->type_name("CAMERA|FILE");
+  command
+      ->add_option("--out", wish->out,
+                   "folder for the pictures; created if it does not exist (default: the current one)")
+      ->type_name("FOLDER");
   command->add_option("--count", wish->count, "number of pairs")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   command->add_option("--skip", wish->skip, "skip so many pairs before the first")
       ->check(CLI::Range(0, 100'000'000))
       ->capture_default_str();
-  command->add_option("--calibration", wish->calibration,
-                      "calibration file or folder, instead of the one kept by serial number");
+  command
+      ->add_option("--calibration", wish->calibration,
+                   "calibration file or folder, instead of the one kept by serial number")
+      ->type_name("FILE|FOLDER");
   command->add_flag("--raw", wish->raw, "do not rectify the pictures");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) { return show(options, console, *wish); };
@@ -269,12 +273,14 @@ void add_check(CLI::App& app, Action& action) {
       "check", "check row error, order of the eyes, focus and exposure; point the camera at something with texture");
   command->footer("Examples:\n  relmap-camera check 7140058\n  relmap-camera check drive.raw");
   auto wish = std::make_shared<CheckOptions>();
-  command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
+  command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording")->type_name("CAMERA|FILE");
   command->add_option("--pairs", wish->pairs, "number of pairs to check")
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
-  command->add_option("--calibration", wish->calibration,
-                      "calibration file or folder, instead of the one kept by serial number");
+  command
+      ->add_option("--calibration", wish->calibration,
+                   "calibration file or folder, instead of the one kept by serial number")
+      ->type_name("FILE|FOLDER");
   command->add_flag("--raw", wish->raw, "check without a calibration; row errors are not measured");
   command->callback([&action, wish] {
     action = [wish](const GlobalOptions& options, terminal::Console& console) {

@@ -50,15 +50,19 @@ Answer back_up_map(const BackupAsked& asked, Context& context) {
 void add_backup(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("backup", "copy a map into a new data folder; the daemon may keep running");
   auto asked = std::make_shared<BackupAsked>();
-  command->add_option("DIR", asked->first, "data folder of the map; leave it out with --server")->required();
-  command->add_option("BACKUP", asked->second,
-                      "folder to create; with --server an absolute path on the daemon's machine");
+  command->add_option("DIR", asked->first, "data folder of the map; leave it out with --server")
+      ->type_name("FOLDER")
+      ->required();
+  command
+      ->add_option("BACKUP", asked->second, "folder to create; with --server an absolute path on the daemon's machine")
+      ->type_name("FOLDER");
   command->footer(R"(
 The backup has everything that was acknowledged before the command began. It is a data folder that relmapd can open, to
 look at it; to go on in the map's place, restore it, so that robots learn of it and no session number is given out twice.
 It gets its name only when it is complete. On the file system of the map it shares files with the map, so that one bad
 sector damages both: put it on another disk, or copy it there.
 
+Examples:
   relmap-admin backup /var/lib/relmap /backup/map-monday
   relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday)");
   command->callback([&action, asked] { action = [asked](Context& context) { return back_up_map(*asked, context); }; });

@@ -16,8 +16,15 @@ be on another machine; paths are then paths on that machine.
 
 Data goes to stdout, everything else to stderr. With --json each finding is a document, and the last document gives the
 outcome in the keys reason and message, also after a failure.
-Exit codes: 0 fine; 1 failed; 2 wrong usage; 3 damage was found, or data were lost to it; 4 another process owns the
-folder and must be stopped first; 5 no daemon answers; 130 interrupted.
+
+Exit codes:
+  0    fine
+  1    failed; the first word on stderr is the reason
+  2    wrong usage
+  3    damage was found, or data were lost to it
+  4    another process owns the folder and must be stopped first
+  5    no daemon answers
+  130  interrupted
 
 Examples:
   relmap-admin stats /var/lib/relmap
@@ -45,9 +52,9 @@ void declare(CLI::App& app, Context& context, Action& action) {
   app.add_option("--deadline", context.deadline_s, "time limit of work that a daemon does, in seconds")
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
-  terminal::add_version(app);
+  terminal::add_standard_options(app);
   for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
-                         add_stats, add_credentials})
+                         add_stats, add_log_level, add_credentials})
     add(app, action);
 }
 

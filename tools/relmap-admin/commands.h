@@ -43,6 +43,7 @@ void add_compact(CLI::App& app, Action& action);
 void add_migrate(CLI::App& app, Action& action);
 void add_reindex(CLI::App& app, Action& action);
 void add_stats(CLI::App& app, Action& action);
+void add_log_level(CLI::App& app, Action& action);
 void add_credentials(CLI::App& app, Action& action);
 
 }  // namespace relmap::admin

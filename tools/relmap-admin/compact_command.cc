@@ -34,10 +34,11 @@ void add_compact(CLI::App& app, Action& action) {
   auto* command =
       app.add_subcommand("compact", "give back disk space of replaced data; needs room for a copy meanwhile");
   auto directory = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder");
+  command->add_option("DIR", *directory, "data folder")->type_name("FOLDER");
   command->footer(R"(
 RocksDB gives space back by itself, but late. This command does it at once; a daemon may keep running.
 
+Examples:
   relmap-admin compact /var/lib/relmap)");
   command->callback(
       [&action, directory] { action = [directory](Context& context) { return compact_map(*directory, context); }; });

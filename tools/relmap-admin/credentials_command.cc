@@ -295,32 +295,30 @@ Answer revoke_credentials(const std::string& folder, const std::string& name, Co
 void add_credentials(CLI::App& app, Action& action) {
   auto* all = app.add_subcommand("credentials", "make, list and revoke what lets robots and operators in");
   all->require_subcommand(1);
-  all->footer(R"(
-  relmap-admin credentials ca /etc/relmap/credentials --host map.example
-  relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot
-  relmap-admin credentials new /etc/relmap/credentials dashboard --role reader --token
-  relmap-admin credentials list /etc/relmap/credentials
-  relmap-admin credentials revoke /etc/relmap/credentials cart-1)");
   const auto days = [](CLI::App* command, int& value) {
-    command->add_option("--days", value, "until it expires")->check(CLI::Range(1, kMaxDays))->capture_default_str();
+    command->add_option("--days", value, "days until it expires")
+        ->check(CLI::Range(1, kMaxDays))
+        ->capture_default_str();
   };
 
   auto ca_options = std::make_shared<CaOptions>();
   auto* ca = all->add_subcommand(
       "ca", "make the authority of a fleet, unless it is there, and a new certificate for the daemon");
-  ca->add_option("FOLDER", ca_options->folder, "where everything is kept")->required();
+  ca->add_option("FOLDER", ca_options->folder, "where everything is kept")->type_name("FOLDER")->required();
   ca->add_option(
-      "--host", ca_options->hosts,
-      "names and addresses by which callers reach the daemon, besides localhost, this machine's name, and those "
-      "of the certificate that is renewed");
+        "--host", ca_options->hosts,
+        "names and addresses by which callers reach the daemon, besides localhost, this machine's name, and those "
+        "of the certificate that is renewed")
+      ->type_name("HOST");
   days(ca, ca_options->days);
+  ca->footer("Example:\n  relmap-admin credentials ca /etc/relmap/credentials --host map.example");
   ca->callback([&action, ca_options] {
     action = [ca_options](Context& context) { return make_authority(*ca_options, context); };
   });
 
   auto new_options = std::make_shared<NewOptions>();
   auto* fresh = all->add_subcommand("new", "issue a certificate, or a token, to a robot, an operator or a reader");
-  fresh->add_option("FOLDER", new_options->folder, "made by credentials ca")->required();
+  fresh->add_option("FOLDER", new_options->folder, "made by credentials ca")->type_name("FOLDER")->required();
   fresh->add_option("NAME", new_options->name, "of a robot: as its keyframes have it, and it may send no others")
       ->required();
   fresh->add_option("--role", new_options->role, "reader (asks), robot (also sends keyframes), operator (also edits)")
@@ -329,23 +327,36 @@ void add_credentials(CLI::App& app, Action& action) {
   fresh->add_option("--out", new_options->out, "the file to write (default: NAME.pem)")->type_name("FILE");
   days(fresh, new_options->days);
   fresh->add_flag("--token", new_options->token, "a token instead of a certificate");
+  fresh->footer(
+      "Examples:\n"
+      "  relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot\n"
+      "  relmap-admin credentials new /etc/relmap/credentials dashboard --role reader --token");
   fresh->callback([&action, new_options] {
     action = [new_options](Context& context) { return make_credentials(*new_options, context); };
   });
 
   auto folder = std::make_shared<std::string>();
   auto* list = all->add_subcommand("list", "show what was issued: role, kind, state, expiry, name");
-  list->add_option("FOLDER", *folder, "made by credentials ca")->required();
+  list->add_option("FOLDER", *folder, "made by credentials ca")->type_name("FOLDER")->required();
+  list->footer("Example:\n  relmap-admin credentials list /etc/relmap/credentials");
   list->callback(
       [&action, folder] { action = [folder](Context& context) { return list_credentials(*folder, context); }; });
 
   auto name = std::make_shared<std::string>();
   auto* revoke = all->add_subcommand("revoke", "let a name in no more, at once");
-  revoke->add_option("FOLDER", *folder, "made by credentials ca")->required();
+  revoke->add_option("FOLDER", *folder, "made by credentials ca")->type_name("FOLDER")->required();
   revoke->add_option("NAME", *name, "as it was issued")->required();
+  revoke->footer("Example:\n  relmap-admin credentials revoke /etc/relmap/credentials cart-1");
   revoke->callback([&action, folder, name] {
     action = [folder, name](Context& context) { return revoke_credentials(*folder, *name, context); };
   });
+  all->footer(R"(
+Examples:
+  relmap-admin credentials ca /etc/relmap/credentials --host map.example
+  relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot
+  relmap-admin credentials new /etc/relmap/credentials dashboard --role reader --token
+  relmap-admin credentials list /etc/relmap/credentials
+  relmap-admin credentials revoke /etc/relmap/credentials cart-1)");
 }
 
 }  // namespace relmap::admin

@@ -33,10 +33,11 @@ Answer migrate_map(const std::string& directory, Context& context) {
 void add_migrate(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("migrate", "convert a map of an older format to the current one");
   auto directory = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder; no daemon may own it")->required();
+  command->add_option("DIR", *directory, "data folder; no daemon may own it")->type_name("FOLDER")->required();
   command->footer(R"(
 The former map is kept beside the new one, so there must be room for both. Delete it when the new one works.
 
+Examples:
   relmap-admin migrate /var/lib/relmap)");
   command->callback(
       [&action, directory] { action = [directory](Context& context) { return migrate_map(*directory, context); }; });

@@ -72,7 +72,7 @@ void add_reindex(CLI::App& app, Action& action) {
       app.add_subcommand("reindex", "recompute the words of a map with another vocabulary; nothing else changes");
   auto directory = std::make_shared<std::string>();
   auto vocabulary = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder; no daemon may own it");
+  command->add_option("DIR", *directory, "data folder; no daemon may own it")->type_name("FOLDER");
   command->add_option("--vocabulary", *vocabulary, "visual vocabulary (default: the one shipped)")->type_name("FILE");
   command->footer(R"(
 A map keeps the features of its frames, and a word of the vocabulary for each. A daemon that has another vocabulary than
@@ -80,9 +80,15 @@ the words are of refuses the map (WRONG_VOCABULARY). This command recomputes the
 each processor. If they are of the given vocabulary already, it does nothing.
 
 If it is interrupted, every daemon refuses the map until a reindex, with any vocabulary, has completed.
-Exit code 0: done, or nothing to do. 1: NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION (of the vocabulary or the map),
-DISK_FULL, IO_ERROR. 3: DATA_LOSS, some of the map is damaged. 4: FOLDER_LOCKED, a daemon owns it. 130: interrupted.
 
+Exit codes:
+  0    done, or nothing to do
+  1    NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION (of the vocabulary or the map), DISK_FULL, IO_ERROR
+  3    DATA_LOSS: some of the map is damaged
+  4    FOLDER_LOCKED: a daemon owns it
+  130  interrupted
+
+Examples:
   relmap-admin reindex /var/lib/relmap
   relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab)");
   command->callback([&action, directory, vocabulary] {

@@ -104,11 +104,15 @@ void add_repair(CLI::App& app, Action& action) {
                                      "repair a damaged map: move damaged data "
                                      "aside, and rebuild derived data");
   auto directory = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder; no daemon may own it");
+  command->add_option("DIR", *directory, "data folder; no daemon may own it")->type_name("FOLDER");
   command->footer(R"(
 Damaged data are kept in DIR/quarantine. If the command is interrupted, run it again.
-Exit code 0: nothing was lost. 3: some data are lost; the summary lists them.
 
+Exit codes:
+  0  nothing was lost
+  3  some data are lost; the summary lists them
+
+Examples:
   relmap-admin repair /var/lib/relmap)");
   command->callback(
       [&action, directory] { action = [directory](Context& context) { return repair_map(*directory, context); }; });

@@ -60,14 +60,17 @@ void add_restore(CLI::App& app, Action& action) {
   auto* command =
       app.add_subcommand("restore", "make a data folder from a backup, which is verified first and not changed");
   auto asked = std::make_shared<RestoreAsked>();
-  command->add_option("BACKUP", asked->backup, "folder made by `relmap-admin backup`")->required();
-  command->add_option("DIR", asked->directory, "data folder to create; it must be empty or not exist")->required();
+  command->add_option("BACKUP", asked->backup, "folder made by `relmap-admin backup`")->type_name("FOLDER")->required();
+  command->add_option("DIR", asked->directory, "data folder to create; it must be empty or not exist")
+      ->type_name("FOLDER")
+      ->required();
   command->add_flag("--no-verify", asked->no_verify, "copy the backup without verifying it");
   command->footer(R"(
 A damaged backup is refused with exit code 3. The restored folder shares no files with the backup. Robots learn from its
 daemon that the map was restored. They send again what they still have of the keyframes after the backup, and declare
 the others as gaps. A folder that was copied by hand is taken for the map itself, and robots do neither.
 
+Examples:
   relmap-admin restore /backup/map-monday /var/lib/relmap)");
   command->callback([&action, asked] { action = [asked](Context& context) { return restore(*asked, context); }; });
 }

@@ -90,8 +90,9 @@ Answer show_stats(const std::string& directory, Context& context) {
 void add_stats(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("stats", "show sizes and counts of map and journal");
   auto directory = std::make_shared<std::string>();
-  command->add_option("DIR", *directory, "data folder");
+  command->add_option("DIR", *directory, "data folder")->type_name("FOLDER");
   command->footer(R"(
+Examples:
   relmap-admin stats /var/lib/relmap
   relmap-admin --json stats /var/lib/relmap | jq .garbage_bytes)");
   command->callback(

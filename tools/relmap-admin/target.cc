@@ -30,14 +30,14 @@ Status check_map(const std::string& directory) {
   return {};
 }
 
-Result<std::unique_ptr<client::Client>> connect(const Context& context, const std::string& server) {
-  client::ClientOptions options;
+}  // namespace
+
+Result<std::unique_ptr<client::Client>> connect_daemon(const Context& context, const std::string& server) {
+  client::ClientOptions options = client::ClientOptions::from_environment();
   options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(context.deadline_s * 1e3));
   options.credentials = context.credentials;
   return client::Client::connect(server, options);
 }
-
-}  // namespace
 
 Result<Target> open_target(const Context& context, const std::string& directory, Access access) {
   if (directory.empty() && context.server.empty())
@@ -45,7 +45,7 @@ Result<Target> open_target(const Context& context, const std::string& directory,
   if (!directory.empty() && !context.server.empty()) throw CLI::ValidationError("give DIR or --server, not both");
   Target target;
   if (!context.server.empty()) {
-    auto daemon = connect(context, context.server);
+    auto daemon = connect_daemon(context, context.server);
     if (!daemon.ok()) return daemon.status();
     target.daemon = std::move(*daemon);
     return target;
@@ -59,7 +59,7 @@ Result<Target> open_target(const Context& context, const std::string& directory,
     return target;
   }
   if (engine.reason() != Reason::FOLDER_LOCKED) return engine.status();
-  auto daemon = connect(context, directory);
+  auto daemon = connect_daemon(context, directory);
   if (!daemon.ok())
     return Status(Reason::FOLDER_LOCKED,
                   directory + " is owned by " + owner_of(directory) + ": " + daemon.status().to_string());

@@ -24,6 +24,9 @@ enum class Access { kRead, kWrite };
 // FOLDER_LOCKED if a process owns it that does not answer; UNREACHABLE.
 Result<Target> open_target(const Context& context, const std::string& directory, Access access);
 
+// Connects to the daemon that serves a data folder, or that is at HOST:PORT. As client::Client::connect().
+Result<std::unique_ptr<client::Client>> connect_daemon(const Context& context, const std::string& server);
+
 // Checks that the folder holds a map that no process owns. FOLDER_LOCKED with the daemon to stop; NO_SUCH_FILE.
 Status check_free(const std::string& directory);
 

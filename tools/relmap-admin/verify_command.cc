@@ -66,11 +66,16 @@ Answer verify_map(const VerifyAsked& asked, Context& context) {
 void add_verify(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("verify", "check every checksum, reference and count of a map; changes nothing");
   auto asked = std::make_shared<VerifyAsked>();
-  command->add_option("DIR", asked->directory, "data folder");
+  command->add_option("DIR", asked->directory, "data folder")->type_name("FOLDER");
   command->add_option("--session", asked->sessions, "check only frames of these sessions (numbers)");
   command->footer(R"(
-Prints each finding as a line, or with --json as a document. Exit code 0: the map is sound. 3: something was found.
+Prints each finding as a line, or with --json as a document.
 
+Exit codes:
+  0  the map is sound
+  3  something was found
+
+Examples:
   relmap-admin verify /var/lib/relmap
   relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')");
   command->callback([&action, asked] { action = [asked](Context& context) { return verify_map(*asked, context); }; });

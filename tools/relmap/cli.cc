@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <filesystem>
 #include <ostream>
 
 #include "client/server_address.h"
@@ -13,12 +14,18 @@ namespace relmap::cli {
 namespace {
 
 constexpr char kFooter[] = R"(
---server names the daemon: the data folder of a relmapd on this machine, or HOST:PORT. Its default is $RELMAP_SERVER.
+--server names the daemon: the data folder of a relmapd on this machine, or HOST:PORT. Its default is $RELMAP_SERVER, or
+/run/relmap where relmapd runs as a service.
 --credentials names the file that proves who asks; its default is $RELMAP_CREDENTIALS, and a folder needs none.
 A frame is written session:index, as 3:120; an edge session:index/ordinal, as 3:120/1.
 Data goes to stdout, everything else to stderr.
-Exit codes: 0 done; 1 refused or failed (the first word on stderr is the reason); 2 wrong usage; 3 no daemon answers,
-or ingest: keyframes were refused; 5 ingest: everything is in the map, but some of it cannot be trusted.
+
+Exit codes:
+  0  done
+  1  refused or failed; the first word on stderr is the reason
+  2  wrong usage
+  3  no daemon answers; ingest: keyframes were refused
+  5  ingest: everything is in the map, but some of it cannot be trusted
 
 Examples:
   relmap --server /var/lib/relmap status
@@ -42,6 +49,8 @@ Examples:
   relmap export --format tum --out map.tum     # relaxed, a file for each connected part
   relmap map --out map.png --from 1:0 --to kitchen)";
 
+constexpr char kServiceFolder[] = "/run/relmap";  // where the service of the package has its socket
+
 struct GlobalOptions {
   std::string server, credentials;
   double deadline_s = 60;
@@ -52,10 +61,16 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  terminal::add_version(app);
-  app.add_option("--server", options.server, "the daemon: its data folder, or HOST:PORT")
-      ->envname("RELMAP_SERVER")
-      ->required();
+  terminal::add_standard_options(app);
+  auto* server = app.add_option("--server", options.server,
+                                "the daemon: its data folder, that of its socket, or HOST:PORT (default where relmapd "
+                                "runs as a service: /run/relmap)")
+                     ->type_name("FOLDER|HOST:PORT")
+                     ->envname("RELMAP_SERVER");
+  if (std::error_code error; std::filesystem::is_directory(kServiceFolder, error))
+    options.server = kServiceFolder;
+  else
+    server->required();
   app.add_option("--credentials", options.credentials,
                  "file that proves who asks, for a daemon that serves TLS (relmap-admin credentials makes it)")
       ->envname("RELMAP_CREDENTIALS")
@@ -91,7 +106,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
 
   terminal::Console console(out, err);
   console.json = options.json;
-  client::ClientOptions client_options;
+  client::ClientOptions client_options = client::ClientOptions::from_environment();
   client_options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(options.deadline_s * 1e3));
   client_options.credentials = options.credentials;
   if (options.json) client_options.on_reply = [&](const std::string& document) { console.reply(document); };

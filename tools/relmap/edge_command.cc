@@ -98,7 +98,7 @@ constexpr Verb kVerbs[] = {
 };
 
 void add_how(CLI::App& command, client::EditOptions& how) {
-  command.add_option("--note", how.note, "the reason for the edit, kept in the journal");
+  command.add_option("--note", how.note, "the reason for the edit, kept in the journal")->type_name("TEXT");
   command.add_flag("--dry-run", how.dry_run, "print what would change, and change nothing");
 }
 
@@ -259,14 +259,14 @@ void add_edge(CLI::App& app, Action& action) {
   for (const Verb& verb : kVerbs) add_verb(*command, verb, action);
   add_propose(*command, action);
   command->footer(
+      "Each edit prints what it changed, and the command that undoes it.\n"
       "Examples:\n"
       "  relmap edge remove 3:120/1 --dry-run\n"
       "  relmap edge remove 3:120/1 --note 'that is the other hall'\n"
       "  relmap edge remove 3:120/1 --only-this   # those that agree with it stay\n"
       "  relmap edge restore 3:120/1\n"
       "  relmap edge accept 5:77/2 --note 'I was there'\n"
-      "  relmap edge propose 2:17 5:77 --accept\n"
-      "Each edit prints what it changed, and the command that undoes it.");
+      "  relmap edge propose 2:17 5:77 --accept");
 }
 
 }  // namespace relmap::cli

@@ -190,6 +190,7 @@ void add_label(CLI::App& app, Action& action) {
   command
       ->add_option("PLACE", options->place,
                    "a frame (session:index), or a picture: the frame that it shows, if geometry confirms it")
+      ->type_name("FRAME|PICTURE")
       ->required();
   command->add_option("NAME", options->name, "the label: 1 to 64 bytes, not only white space")->required();
   command->add_flag("--remove", options->remove, "remove the label");
@@ -239,10 +240,13 @@ void add_edges(CLI::App& app, Action& action) {
   auto* const state = command->add_option("--state", options->states, "only edges in these states");
   state->check(CLI::IsMember({"candidate", "accepted", "quarantined", "removed"}))->delimiter(',');
   auto* const loops = command->add_flag("--loops", options->loops, "only loop closures");
-  auto* const session = command->add_option("--session", options->session, "only edges with an end in this session");
-  auto* const frame = command->add_option("--frame", options->frame, "only edges with this frame as an end");
+  auto* const session = command->add_option("--session", options->session, "only edges with an end in this session")
+                            ->type_name("SESSION");
+  auto* const frame =
+      command->add_option("--frame", options->frame, "only edges with this frame as an end")->type_name("FRAME");
   command
       ->add_option("--explain", options->explain, "show the evidence and history of one edge (session:index/ordinal)")
+      ->type_name("EDGE")
       ->excludes(state, loops, session, frame);
   command->footer(
       "Examples:\n"

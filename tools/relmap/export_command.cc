@@ -342,14 +342,19 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("--format", options->format, "format of the files: tum, kitti, g2o, ply or geojson")
       ->check(CLI::IsMember({"tum", "kitti", "g2o", "ply", "geojson"}))
       ->capture_default_str();
-  command->add_option("--session", options->sessions, "export only these sessions (number or name)");
-  command->add_option("--out", options->out,
-                      "file to write (default, and -: stdout); further parts get names of their own beside it");
-  auto* root = command->add_option("--root", options->root,
-                                   "a frame, as 3:120: its part comes first, in the coordinates of this frame");
+  command->add_option("--session", options->sessions, "export only these sessions (number or name)")
+      ->type_name("SESSION");
+  command
+      ->add_option("--out", options->out,
+                   "file to write (default, and -: stdout); further parts get names of their own beside it")
+      ->type_name("FILE");
+  auto* root = command
+                   ->add_option("--root", options->root,
+                                "a frame, as 3:120: its part comes first, in the coordinates of this frame")
+                   ->type_name("FRAME");
   auto* chain =
       command->add_flag("--chain", options->chain,
-                        "tum, kitti: write each session's odometry edges, as the map has refined them, chained "
+                        "for tum and kitti: write each session's odometry edges, as the map has refined them, chained "
                         "from its first frame; the chain does not close loops");
   chain->excludes(root);
   command->add_flag("!--no-landmarks", options->landmarks, "ply: write frames and edges only");

@@ -213,9 +213,12 @@ void add_import(CLI::App& app, Action& action) {
          "FILE", options->file,
          "file of VERTEX_SE2 and EDGE_SE2 (a robot that looks along x, with y to its left), or of VERTEX_SE3:QUAT "
          "and EDGE_SE3:QUAT")
+      ->type_name("FILE")
       ->required();
-  g2o->add_option("--name", options->name, "name of the session (default: the name of the file)");
-  g2o->add_option("--robot", options->robot, "robot that the session belongs to")->capture_default_str();
+  g2o->add_option("--name", options->name, "name of the session (default: the name of the file)")->type_name("NAME");
+  g2o->add_option("--robot", options->robot, "robot that the session belongs to")
+      ->type_name("NAME")
+      ->capture_default_str();
   g2o->add_flag("--robot-axes", options->robot_axes,
                 "SE3 poses have x ahead, y left, z up (default: x right, y down, z ahead)");
   const CLI::Range positive(1e-3, 1e3), sigma(1e-9, 1e3);

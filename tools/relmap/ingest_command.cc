@@ -279,7 +279,10 @@ void add_ingest(CLI::App& app, Action& action) {
   batch::BatchOptions& how = options->batch;
   how.jobs = usual_jobs();
   how.summaries = default_summaries();
-  command->add_option("PATH", options->paths, "recordings: folders of pictures, files of keyframes, logs of lcm-logger")
+  command
+      ->add_option("PATH", options->paths,
+                   "the recordings: folders of pictures, files of keyframes, logs of lcm-logger")
+      ->type_name("FILE|FOLDER")
       ->required();
   command->add_option("--source", how.recordings.source, "kind of the recordings; auto recognises it")
       ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "raw", "log"}))
@@ -293,11 +296,13 @@ void add_ingest(CLI::App& app, Action& action) {
           "take them in one after the other, in the order given, so that the map is the same every time, even after "
           "interruptions; needs relmapd --deterministic")
       ->excludes(jobs);
-  command->add_option(
-      "--robot", how.recordings.robot,
-      "robot that the sessions belong to (default: as recorded in logs and files of keyframes, else batch)");
-  command->add_option("--calibration", how.recordings.calibration,
-                      "calibration for folders of pictures that hold none");
+  command
+      ->add_option(
+          "--robot", how.recordings.robot,
+          "robot that the sessions belong to (default: as recorded in logs and files of keyframes, else batch)")
+      ->type_name("NAME");
+  command->add_option("--calibration", how.recordings.calibration, "calibration for folders of pictures that hold none")
+      ->type_name("FILE|FOLDER");
   command->add_flag(
       "--mono", how.recordings.mono,
       "the folders hold photographs of single cameras: a session for each camera, without scale; relmap match "
@@ -327,13 +332,17 @@ void add_ingest(CLI::App& app, Action& action) {
       "  relmap ingest --mono photos/ --robot phone     # a session for each camera; subfolders are passed over\n"
       "  relmap ingest --deterministic drive-1 drive-2  # the same map every time; needs relmapd --deterministic\n"
       "  relmap --json ingest drive/ | jq '.sequences[] | select(.error)'\n"
-      "Exit codes: 0 all recordings are in the map; 1 some failed, or the command was interrupted; 2 wrong usage;\n"
-      "3 no daemon answers, or the daemon refused keyframes (the report begins with these; keyframes that a recording\n"
-      "itself lacks do not count); 5 all are in the map, but some cannot be trusted: fewer than 80 % of the expected "
-      "pairs\n"
-      "were measured, or the cameras or the map contradict the calibration (WRONG_CALIBRATION). A recording whose "
-      "stereo\n"
-      "pair is plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD) fails before any of it is in the map.");
+      "\n"
+      "Exit codes:\n"
+      "  0  all recordings are in the map\n"
+      "  1  some failed, or the command was interrupted. A recording whose stereo pair is plainly wrong (NOT_STEREO,\n"
+      "     ROWS_APART, EYE_DEAD) fails before any of it is in the map\n"
+      "  2  wrong usage\n"
+      "  3  no daemon answers, or the daemon refused keyframes (the report begins with these; keyframes that a\n"
+      "     recording itself lacks do not count)\n"
+      "  5  all are in the map, but some cannot be trusted: fewer than 80 % of the expected pairs were measured, or "
+      "the\n"
+      "     cameras or the map contradict the calibration (WRONG_CALIBRATION)");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
     if (const CLI::Option* shown = app.get_option("--credentials"); shown->count() > 0)

@@ -119,15 +119,17 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
 void add_map(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("map", "draw the map as an SVG or PNG picture");
   auto options = std::make_shared<MapOptions>();
-  command->add_option("--out", options->out, "picture to write: FILE.svg or FILE.png")->required();
+  command->add_option("--out", options->out, "picture to write: FILE.svg or FILE.png")->type_name("FILE")->required();
   command->add_option("--title", options->title, "title above the picture")->capture_default_str();
   command->add_option("--width", options->width, "width of a PNG, pixels")
       ->check(CLI::Range(600, 4800))
       ->capture_default_str();
-  command->add_option("--only", options->sessions, "draw only these sessions (number or name)");
+  command->add_option("--only", options->sessions, "draw only these sessions (number or name)")->type_name("SESSION");
   command->add_flag("--removed", options->removed, "draw also loop closures that were removed");
-  auto* query = command->add_option("--query", options->query, "localise this picture, and draw where it was taken");
+  auto* query = command->add_option("--query", options->query, "localise this picture, and draw where it was taken")
+                    ->type_name("PICTURE");
   command->add_option("--query-right", options->query_right, "the right picture of a pair whose left one is --query")
+      ->type_name("PICTURE")
       ->needs(query);
   add_route_options(*command, options->route, false);
   add_view_options(*command, options->camera);

@@ -85,10 +85,13 @@ void add_localise(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("localise", "find where a picture or a stereo pair was taken");
   auto seen = std::make_shared<Seen>();
   command->add_option("LEFT", seen->left, "picture (JPEG or PNG, of any camera), or a frame of the map, as 3:120")
+      ->type_name("PICTURE|FRAME")
       ->required();
-  command->add_option("RIGHT", seen->right, "the right picture of a stereo pair");
-  command->add_option("--near", seen->near,
-                      "search around this frame first, and in the whole map only if nothing is found there");
+  command->add_option("RIGHT", seen->right, "the right picture of a stereo pair")->type_name("PICTURE");
+  command
+      ->add_option("--near", seen->near,
+                   "search around this frame first, and in the whole map only if nothing is found there")
+      ->type_name("FRAME");
   add_view_options(*command, seen->camera);
   command->footer(
       "Prints the frame of the map that the picture shows, and the camera's pose in that frame.\n"
@@ -123,6 +126,7 @@ void add_match(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("match", "list the places of the map that a picture could show");
   auto seen = std::make_shared<Seen>();
   command->add_option("PICTURE", seen->left, "picture (JPEG or PNG, of any camera), or a frame of the map, as 3:120")
+      ->type_name("PICTURE|FRAME")
       ->required();
   command->footer(
       "Places that geometry confirms are listed first, most inliers first; then the others, most probable first. A "
@@ -142,10 +146,14 @@ void add_match(CLI::App& app, Action& action) {
       ->add_option("--verify", seen->match.max_verified,
                    "verify at most so many of the most probable places by geometry (default 10)")
       ->check(CLI::Range(1, 20));
-  command->add_option("--near", seen->near,
-                      "a frame near which the picture was taken: places around it become more probable");
-  command->add_option("--thumbnails", seen->thumbnails,
-                      "write a small picture of each place to this folder, as SESSION-INDEX.jpg");
+  command
+      ->add_option("--near", seen->near,
+                   "a frame near which the picture was taken: places around it become more probable")
+      ->type_name("FRAME");
+  command
+      ->add_option("--thumbnails", seen->thumbnails,
+                   "write a small picture of each place to this folder, as SESSION-INDEX.jpg")
+      ->type_name("FOLDER");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
     action = [seen](client::Client& client, terminal::Console& console) -> Status {

@@ -78,8 +78,12 @@ void add_route_options(CLI::App& command, RouteOptions& options, bool required) 
       "a frame (session:index), a label, a picture (.png, .jpg) or robot:NAME (where that robot is now); label:TEXT "
       "and "
       "picture:FILE tell apart what could be both; may be given again: the best of them is used";
-  auto* from = command.add_option("--from", options.from, end)->allow_extra_args(false);
-  auto* to = command.add_option("--to", options.to, end)->allow_extra_args(false)->needs(from);
+  auto* from =
+      command.add_option("--from", options.from, end)->type_name("FRAME|LABEL|PICTURE")->allow_extra_args(false);
+  auto* to = command.add_option("--to", options.to, end)
+                 ->type_name("FRAME|LABEL|PICTURE")
+                 ->allow_extra_args(false)
+                 ->needs(from);
   from->needs(to);
   if (required) from->required(), to->required();
   auto* by =
@@ -95,6 +99,7 @@ void add_route_options(CLI::App& command, RouteOptions& options, bool required) 
           "--weigh", options.weights,
           "minimise a weighted sum instead: metre=1, second=0.5 (of driving), standing=0.1 (a second of standing), "
           "variance=30 (a square metre)")
+      ->type_name("UNIT=WEIGHT")
       ->allow_extra_args(false)
       ->delimiter(',')
       ->excludes(by)
@@ -103,9 +108,11 @@ void add_route_options(CLI::App& command, RouteOptions& options, bool required) 
       .add_option("--max-cost", options.max_cost, "give up beyond this cost: metres, seconds, or the unit of --weigh")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--only-session", options.sessions, "pass only frames of this session; may be given again")
+      ->type_name("SESSION")
       ->allow_extra_args(false);
   command
       .add_option("--avoid", options.avoid, "do not pass this frame, or the frames of this label; may be given again")
+      ->type_name("FRAME|LABEL")
       ->allow_extra_args(false);
   command.add_option("--min-support", options.min_support,
                      "use only edges with at least so many observations across them");

@@ -41,7 +41,10 @@ void add_status(CLI::App& app, Action& action) {
 void add_wait(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("wait", "wait until everything received is applied, looked up and relaxed");
   command->footer(
-      "Exit code 0: nothing is left to do; 1: something still is after --deadline seconds (DEADLINE).\n"
+      "Exit codes:\n"
+      "  0  nothing is left to do\n"
+      "  1  something still is after --deadline seconds (DEADLINE)\n"
+      "\n"
       "Examples:\n"
       "  relmap wait\n"
       "  relmap --deadline 600 wait");

@@ -1,6 +1,7 @@
 #include "tools/relmap/status_view.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <ostream>
 
@@ -96,6 +97,14 @@ Facts needs_attention(const StatusMoment& now) {
   const client::DaemonStatus& s = now.status;
   Facts facts;
   if (!s.storage.ok()) facts.emplace_back("storage", s.storage.to_string());
+  for (const auto& [name, state] : s.components)
+    if (!state.ok() && state.to_string() != s.storage.to_string() && state.to_string() != s.lcm.to_string())
+      facts.emplace_back(name, state.to_string());
+  if (s.clock_steps > 0)
+    facts.emplace_back("clock", "it was set " + std::string(s.clock_step_s > 0 ? "forward" : "back") + " by " +
+                                    terminal::duration_text(std::abs(s.clock_step_s)) + ", " +
+                                    counted_text(s.clock_steps, "time") +
+                                    " since the start: times of keyframes jump as much");
   if (!s.lcm.ok()) facts.emplace_back("lcm", s.lcm.to_string());
   if (!s.connections.ok()) facts.emplace_back("connections", s.connections.to_string());
   if (!s.access.ok()) facts.emplace_back("access list", "it stays as it was: " + s.access.to_string());
@@ -125,10 +134,12 @@ void print_status(const StatusMoment& now, bool all, terminal::Console& console)
     console.out() << '\n';
   }
   Facts facts{
-      {"daemon", "relmapd " + s.version + ", process " + std::to_string(s.pid) + ", up " +
+      {"daemon", "relmapd " + s.version + (s.commit.empty() ? "" : " (" + s.commit + ")") + ", process " +
+                     std::to_string(s.pid) + ", up " +
                      terminal::duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
                      (s.deterministic ? ", deterministic" : "")},
       {"data", s.data_folder},
+      {"log level", s.log_level},
       {"storage", s.storage.ok() ? "OK" : std::string(reason_name(s.storage.reason())) + ", see above"},
       {"lcm",
        s.lcm.ok() ? (s.lcm_url.empty() ? "off" : s.lcm_url) : std::string(reason_name(s.lcm.reason())) + ", see above"},

@@ -159,13 +159,15 @@ bool is_of_right_eye(const std::string& picture, const ViewOptions& options) {
 }  // namespace
 
 void add_view_options(CLI::App& command, ViewOptions& options) {
-  auto* file =
-      command.add_option("--calibration", options.calibration,
-                         "calibration of the pictures' camera: a KITTI, OpenCV or EuRoC file, or the folder of "
-                         "a data set");
+  auto* file = command
+                   .add_option("--calibration", options.calibration,
+                               "calibration of the pictures' camera: a KITTI, OpenCV or EuRoC file, or the folder of "
+                               "a data set")
+                   ->type_name("FILE|FOLDER");
   command
       .add_option("--session", options.session,
                   "the pictures were taken with the camera of this session (number or name)")
+      ->type_name("SESSION")
       ->excludes(file);
   command
       .add_flag("--rectified", options.rectified,

@@ -93,10 +93,11 @@ struct PicturesCommand {
         "                                        show the fixed world\n"
         "  imu.csv, imu.yaml                     with --imu: in EuRoC's format, by the clock of times.txt\n"
         "  sim.json                              the options, and the pose of the first left camera in the world\n"
+        "\n"
         "Pictures are named by the numbers of their frames. A dropped pair has no picture, no time and no pose.\n"
         "For a fleet, give all robots the same --seed, and each its own --drive-seed, --start and --light.\n"
         "Faults: dropped, black, long_black, swivel, blur, one_eye, mover, doubled, time_back, time_ahead.");
-    c->add_option("--out", out, "Folder to write")->required();
+    c->add_option("--out", out, "Folder to write")->type_name("FOLDER")->required();
     c->add_option("--seed", world.seed, "Seed of the world, and of the drive unless --drive-seed is given")
         ->capture_default_str();
     c->add_option("--drive-seed", world.drive_seed, "Seed of the drive: sway, speed, traffic, exposure, noise, faults");
@@ -131,7 +132,8 @@ struct PicturesCommand {
     c->add_option("--exposure-jumps", world.exposure_jumps, "Sudden changes of the gain per 100 pairs")
         ->capture_default_str();
     c->add_option("--exposure", world.exposure_s, "Exposure time in seconds, for motion blur")->capture_default_str();
-    c->add_option("--faults", faults, "none, all (which also drops 5 % of the pairs), or kind:frame,kind:frame...")
+    c->add_option("--faults", faults,
+                  "What goes wrong: none, all (which also drops 5 % of the pairs), or kind:frame,kind:frame...")
         ->capture_default_str();
     c->add_option("--drop-share", world.drop_share, "Share of the pairs that are dropped")->capture_default_str();
     c->add_flag("--imu", imu, "Write also the measurements of an inertial unit");
@@ -148,9 +150,8 @@ struct PicturesCommand {
     c->add_option("--format", picture_format, "png or jpg (quality 95)")
         ->check(CLI::IsMember({"png", "jpg"}))
         ->capture_default_str();
-    c->add_option("--threads", threads, "Number of pictures rendered at a time")
-        ->check(CLI::Range(1, 64))
-        ->capture_default_str();
+    c->add_option("--threads", threads, "Number of pictures rendered at a time (default: one a processor)")
+        ->check(CLI::Range(1, 64));
     c->add_flag("--overwrite", overwrite, "Replace the simulated drive in the folder");
     c->final_callback([this, c] {
       world.light = *relmap::sim::daylight_of(light);
@@ -368,7 +369,7 @@ struct PointsCommand {
         "  keyframes.bin   for each keyframe: u32 length, little-endian, then its canonical bytes\n"
         "  poses.txt       truth: the frame in the first one's coordinates, 3x4 by rows\n"
         "  sim.json        the options");
-    c->add_option("--out", out, "Folder to write")->required();
+    c->add_option("--out", out, "Folder to write")->type_name("FOLDER")->required();
     c->add_option("--seed", world.world_seed, "Seed of the world")->capture_default_str();
     c->add_option("--noise-seed", world.noise_seed, "Seed of the noise of pixels, odometry and descriptors")
         ->capture_default_str();
@@ -438,8 +439,12 @@ int main(int argc, char** argv) {
       "  relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
       "  relmap-sim pictures --out training --seed 11 --pairs 120 --laps 1 --step 0.8\n"
       "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3\n"
-      "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
-  relmap::terminal::add_version(app);
+      "\n"
+      "Exit codes:\n"
+      "  0  done\n"
+      "  1  failed; the reason is printed\n"
+      "  2  wrong usage");
+  relmap::terminal::add_standard_options(app);
   PicturesCommand pictures;
   PointsCommand points;
   pictures.add_to(app);

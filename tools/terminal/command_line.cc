@@ -4,6 +4,11 @@
 #include <algorithm>
 #include <ostream>
 #include <string_view>
+#include <utility>
+
+#include "proto/base/version.h"
+#include "tools/terminal/completion.h"
+#include "tools/terminal/manual_page.h"
 
 namespace relmap::terminal {
 
@@ -11,6 +16,13 @@ namespace {
 
 constexpr std::size_t kMaxMeant = 3;
 constexpr std::size_t kMinBeginning = 3;  // letters
+
+// Thrown, like CLI11's own answers to --help and --version, before anything is required.
+constexpr const char* kPrintText = "PrintText";
+class PrintText : public CLI::Success {
+ public:
+  explicit PrintText(std::string text) : Success(kPrintText, std::move(text), CLI::ExitCodes::Success) {}
+};
 
 // Damerau-Levenshtein distance: letters left out, added or changed, and neighbours swapped.
 std::size_t slips(const std::string& a, const std::string& b) {
@@ -108,9 +120,24 @@ std::vector<std::string> likely_meant(const std::string& typed, const std::vecto
   return names;
 }
 
-void add_version(CLI::App& app) { app.set_version_flag("--version", RELMAP_VERSION, "Print the version and exit"); }
+void add_standard_options(CLI::App& app) {
+  app.set_version_flag("--version", version_line(), "Print the version and exit");
+  app.add_flag_callback(
+         "--manual", [&app] { throw PrintText(manual_page(app)); }, "Print the manual page and exit")
+      ->group("");
+  app.add_option_function<std::string>(
+         "--completion", [&app](const std::string& shell) { throw PrintText(completion(app, *shell_of(shell))); },
+         "Print the completion for a shell and exit")
+      ->type_name("SHELL")
+      ->check(CLI::IsMember(shell_names()))
+      ->group("");
+}
 
 int end_with(const CLI::App& app, const CLI::ParseError& error, std::ostream& out, std::ostream& err, int usage) {
+  if (error.get_name() == kPrintText) {
+    out << error.what();
+    return 0;
+  }
   if (error.get_exit_code() == 0) return app.exit(error, out, err);
   // A mistyped word also makes the intended one missing; what was meant is the more useful message.
   const bool unexpected = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||

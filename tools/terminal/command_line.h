@@ -12,8 +12,9 @@ class ParseError;
 
 namespace relmap::terminal {
 
-// Adds --version.
-void add_version(CLI::App& app);
+// Adds --version; and, hidden from --help, --manual, which prints the manual page, and --completion SHELL, which prints
+// the completion for bash, zsh or fish. They are for whoever builds packages, and work whatever else is required.
+void add_standard_options(CLI::App& app);
 
 // Prints the outcome of a command line that did not parse, and returns the exit code: --help and --version go to `out`
 // with 0; errors go to `err`, with the command or option that may have been meant, and return `usage`.

@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <sstream>
 
+#include "proto/base/version.h"
+
 namespace relmap::terminal {
 namespace {
 
@@ -32,7 +34,7 @@ struct Ended {
 
 Ended end(std::vector<const char*> arguments) {
   CLI::App app("for a test", "prog");
-  add_version(app);
+  add_standard_options(app);
   app.fallthrough();
   app.require_subcommand(1);
   std::string server, id;
@@ -87,7 +89,22 @@ TEST(CommandLine, HelpIsOfTheGivenCommandAndTheVersionIsPrinted) {
   EXPECT_EQ(help.err, "");
   const Ended version = end({"--version"});
   EXPECT_EQ(version.code, 0);
-  EXPECT_EQ(version.out, RELMAP_VERSION "\n");
+  EXPECT_EQ(version.out, version_line() + "\n");
+}
+
+TEST(CommandLine, ManualAndCompletionAreWrittenWhateverElseIsRequired) {
+  const Ended manual = end({"--manual"});
+  EXPECT_EQ(manual.code, 0);
+  EXPECT_THAT(manual.out, StartsWith(".TH PROG 1 "));
+  EXPECT_THAT(manual.out, HasSubstr("\n.SS edge remove\n"));
+  const Ended below = end({"edge", "remove", "--completion", "fish"});
+  EXPECT_EQ(below.code, 0);
+  EXPECT_THAT(below.out, StartsWith("# fish completion of prog"));
+  const Ended unknown = end({"--completion", "csh"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("csh not in {bash,zsh,fish}"));
+  const Ended help = end({"--help"});
+  EXPECT_EQ(help.out.find("--manual"), std::string::npos);
 }
 
 }  // namespace

@@ -58,15 +58,6 @@ std::string bytes_text(std::uint64_t bytes) {
   return printf_text("%.1f kB", value / 1e3);
 }
 
-std::string time_text(std::int64_t time_us) {
-  const std::time_t seconds = time_us / 1000000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
-  return text + printf_text(".%03dZ", static_cast<int>(time_us / 1000 % 1000));
-}
-
 std::string duration_text(double seconds) {
   if (seconds < 120) return printf_text("%.1f s", seconds);
   const auto minutes = static_cast<long>(seconds / 60);

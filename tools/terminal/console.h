@@ -9,6 +9,7 @@
 
 #include "proto/base/number_text.h"
 #include "proto/base/status.h"
+#include "proto/base/time_text.h"
 #include "proto/geometry/geometry.h"
 
 namespace relmap::terminal {
@@ -60,10 +61,9 @@ bool can_ask();
 Status ask(Console& console, const std::string& question);
 
 using relmap::fixed;
+using relmap::time_text;
 // "1.2 GB", "340 kB"
 std::string bytes_text(std::uint64_t bytes);
-// "2026-03-04T05:06:07.089Z"
-std::string time_text(std::int64_t time_us);
 // "4.5 s", "3 min 05 s", "3 h 12 min", "12 d 5 h"
 std::string duration_text(double seconds);
 // "(x, y, z)" in metres

@@ -202,19 +202,25 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
 
 int main(int argc, char** argv) {
   CLI::App app("Visual vocabularies of relmap: words, their Chow-Liu tree, and sample places.", "relmap-vocab");
-  relmap::terminal::add_version(app);
+  relmap::terminal::add_standard_options(app);
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
       "  relmap-vocab train --out my.vocab --source 'our yard, 2026; internal' --every 5 /recordings/yard/left\n"
       "  relmap-vocab info my.vocab\n"
       "  relmap-vocab evaluate --vocabulary my.vocab --set drive drive --json\n"
-      "Exit codes: 0 done; 1 failed, the reason on stderr; 2 wrong usage.");
+      "\n"
+      "Exit codes:\n"
+      "  0  done\n"
+      "  1  failed; the reason is on stderr\n"
+      "  2  wrong usage");
 
   relmap::vocab::TrainArguments arguments;
   CLI::App* train = app.add_subcommand("train", "Train a vocabulary on pictures");
-  train->add_option("--out", arguments.out, "File to write")->required();
-  train->add_option("pictures", arguments.pictures, "JPEG, PNG or WebP files, or folders of them")->required();
+  train->add_option("--out", arguments.out, "File to write")->type_name("FILE")->required();
+  train->add_option("pictures", arguments.pictures, "JPEG, PNG or WebP files, or folders of them")
+      ->type_name("FILE|FOLDER")
+      ->required();
   train->add_option("--words", arguments.options.words, "Number of words, at most")->capture_default_str();
   train
       ->add_option("--sample-places", arguments.options.sample_places,
@@ -239,30 +245,36 @@ int main(int argc, char** argv) {
 
   std::string file = relmap::place::default_vocabulary_path();
   CLI::App* info = app.add_subcommand("info", "Describe a vocabulary (default: the one shipped)");
-  info->add_option("file", file, "Vocabulary");
+  info->add_option("file", file, "Vocabulary")->type_name("FILE");
   info->footer("Example:\n  relmap-vocab info my.vocab");
 
   relmap::vocab::EvaluateArguments evaluation;
   CLI::App* evaluate =
       app.add_subcommand("evaluate", "Measure how well places are recognised, in comparison with tf-idf");
   const auto add_vocabulary = [&](CLI::App* command) {
-    command->add_option("--vocabulary", evaluation.vocabulary, "Vocabulary file (default: the one shipped)");
+    command->add_option("--vocabulary", evaluation.vocabulary, "Vocabulary file (default: the one shipped)")
+        ->type_name("FILE");
   };
   constexpr const char* kSets =
       "rtabmap (or corridor: two laps of a corridor), euroc, drive (of relmap-sim), tower (find the floor), tower-area "
       "(find the area of the floor), walk (photographs along a street find those next to them), front (photographs of "
       "one building find each other)";
-  evaluate->add_option("--set", evaluation.set, std::string("Kind of the set in the first PATH: ") + kSets)->required();
+  evaluate->add_option("--set", evaluation.set, std::string("Kind of the set in the first PATH: ") + kSets)
+      ->required()
+      ->check(CLI::IsMember({"rtabmap", "corridor", "euroc", "drive", "tower", "tower-area", "walk", "front"}));
   evaluate
       ->add_option(
           "path", evaluation.folders,
           "Folder of the set; then, for tower, folders of more floors; for walk and front, of pictures of other places")
+      ->type_name("FOLDER")
       ->required();
   add_vocabulary(evaluate);
   evaluate->add_flag("--no-geometry", evaluation.no_geometry, "Measure recognition only, several times as fast");
   evaluate->add_flag("--json", evaluation.json, "Print one JSON object");
   evaluate->footer(
-      "Pictures are shown one by one: each asks for its place, and then becomes a place itself. Figures:\n"
+      "Pictures are shown one by one: each asks for its place, and then becomes a place itself.\n"
+      "\n"
+      "Figures:\n"
       "  among_first_K            queries with the right place among the first K candidates, of those seen before\n"
       "  right_at_full_precision  queries whose first candidate is right, and more probable than any wrong first one\n"
       "  verified_...             the same after geometry has tried the first five candidates\n"
@@ -271,6 +283,7 @@ int main(int argc, char** argv) {
       "  new_place_right_share    share of queries of new places with p(new) > 0.5\n"
       "  log_probability          mean logarithm of the probability given to the truth\n"
       "  calibration_error        mean difference between a probability and the share of such answers that are right\n"
+      "\n"
       "Examples:\n"
       "  relmap-vocab evaluate --vocabulary my.vocab --set drive drive --json\n"
       "  relmap-vocab evaluate --set tower floor-1 floor-2 floor-3");
@@ -278,7 +291,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> sets;
   CLI::App* reliability = app.add_subcommand(
       "reliability", "Draw a reliability diagram: do probabilities agree with how often they come true?");
-  reliability->add_option("--out", evaluation.diagram, "SVG file to write")->required();
+  reliability->add_option("--out", evaluation.diagram, "SVG file to write")->type_name("FILE")->required();
   reliability->add_option("sets", sets, std::string("SET=FOLDER[,FOLDER...]; SET is ") + kSets)->required();
   add_vocabulary(reliability);
   reliability->footer("Example:\n  relmap-vocab reliability --out reliability.svg drive=drive rtabmap=corridor");

@@ -428,9 +428,9 @@ Run declare_fleet(CLI::App& app) {
   const auto share = CLI::Range(0.0, 1.0);
   app.footer(
       "Examples:\n"
-      "  relmap-bench fleet --json                                        20 robots, 5 minutes of a bad network\n"
+      "  relmap-bench fleet --json   # 20 robots, 5 minutes of a bad network\n"
       "  relmap-bench fleet --seconds 30 --kill-daemon 3 --kill-robots 5 --kills-each 2\n"
-      "  relmap-bench fleet --seconds 30 --flood 100 --garbage 200        two who make trouble for the others\n\n"
+      "  relmap-bench fleet --seconds 30 --flood 100 --garbage 200   # two who make trouble for the others\n\n"
       "A keyframe is sent when push() has returned: then it is in its robot's spool. Everything happens in a network\n"
       "namespace that is gone afterwards; where none may be made, in random multicast groups of this machine.");
   app.add_option("--robots", options->robots, "number of robots, each with its own spool")->capture_default_str();

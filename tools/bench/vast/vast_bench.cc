@@ -141,7 +141,7 @@ Run declare_vast(CLI::App& app) {
       "Examples:\n"
       "  relmap-bench vast --keyframes 20000 --json\n"
       "  relmap-bench vast --keyframes 300000 --robots 12 --folder vast --page vast.html --picture vast.svg\n"
-      "  relmap-bench vast --folder /data/vast          150 km; run it again to go on where it was interrupted");
+      "  relmap-bench vast --folder /data/vast   # 150 km; run it again to go on where it was interrupted");
   return [options](Report& report) { run(*options, report); };
 }
 

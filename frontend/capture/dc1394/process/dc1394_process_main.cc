@@ -15,6 +15,7 @@
 #include "frontend/capture/dc1394/process/library_log.h"
 #include "frontend/capture/dc1394/process/served_camera.h"
 #include "frontend/capture/dc1394/protocol.h"
+#include "proto/base/version.h"
 
 namespace relmap::iidc::dc1394 {
 
@@ -122,7 +123,7 @@ int run(bool usb_too) {
 int main(int count, char** arguments) {
   using namespace relmap::iidc::dc1394;
   const auto asked_for = [&](const char* option) { return count == 2 && std::strcmp(arguments[1], option) == 0; };
-  if (asked_for("--version")) return std::puts(RELMAP_VERSION) < 0;
+  if (asked_for("--version")) return std::puts(relmap::version_line().c_str()) < 0;
   if (asked_for("--help"))
     return std::puts(
                "relmap-camera-1394 serves a camera on IEEE 1394 to the program of relmap that starts it; by itself "

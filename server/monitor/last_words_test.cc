@@ -1,4 +1,4 @@
-#include "server/ops/last_words.h"
+#include "server/monitor/last_words.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace relmap::ops {
+namespace relmap::monitor {
 namespace {
 
 using ::testing::ExitedWithCode;
@@ -56,6 +56,18 @@ TEST_F(LastWordsDeathTest, NameWhatElseNobodyHandles) {
               "critical. INTERNAL: terminated");
 }
 
+TEST_F(LastWordsDeathTest, HaveTheFormOfTheLog) {
+  const auto end_as = [](LastWords words) {
+    say_last_words_as(words);
+    in_a_thread([] { throw std::runtime_error("odd \"one\"\nand more"); });
+  };
+  EXPECT_EXIT(end_as(LastWords::kText), KilledBySignal(SIGABRT),
+              "^\\[relmapd\\] \\[critical\\] INTERNAL: odd 'one''and more\n$");
+  EXPECT_EXIT(end_as(LastWords::kJournal), KilledBySignal(SIGABRT), "^<2>INTERNAL: odd 'one''and more\n$");
+  EXPECT_EXIT(end_as(LastWords::kJson), KilledBySignal(SIGABRT),
+              "^.\"level\":\"critical\",\"message\":\"INTERNAL: odd 'one''and more\".\n$");
+}
+
 TEST_F(LastWordsDeathTest, BlameNoMemoryThatRanOutBefore) {
   EXPECT_EXIT(
       {
@@ -71,4 +83,4 @@ TEST_F(LastWordsDeathTest, BlameNoMemoryThatRanOutBefore) {
 }
 
 }  // namespace
-}  // namespace relmap::ops
+}  // namespace relmap::monitor

@@ -1,0 +1,12 @@
+# Runs when PROGRAM has been linked, as cmake -P: writes its manual page to MANUAL, and its completions to BASH, ZSH, FISH.
+function(write file)
+  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE text RESULT_VARIABLE failed)
+  if(failed)
+    message(FATAL_ERROR "${PROGRAM} ${ARGN}: ${failed}")
+  endif()
+  file(WRITE ${file} "${text}")
+endfunction()
+write(${MANUAL} --manual)
+write(${BASH} --completion bash)
+write(${ZSH} --completion zsh)
+write(${FISH} --completion fish)

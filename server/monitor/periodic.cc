@@ -1,0 +1,36 @@
+#include "server/monitor/periodic.h"
+
+#include <utility>
+
+namespace relmap::monitor {
+
+Periodic::Periodic(std::chrono::milliseconds interval, std::function<void()> work)
+    : interval_(interval), work_(std::move(work)), thread_([this] { run(); }) {}
+
+Periodic::~Periodic() {
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  thread_.join();
+}
+
+void Periodic::hurry() {
+  const MutexLock lock(mutex_);
+  hurried_ = true;
+  changed_.notify_all();
+}
+
+void Periodic::run() {
+  MutexLock lock(mutex_);
+  while (!stopping_) {
+    hurried_ = false;
+    lock.unlock();
+    work_();
+    lock.lock();
+    changed_.wait_for(mutex_, interval_, [this]() RELMAP_REQUIRES(mutex_) { return stopping_ || hurried_; });
+  }
+}
+
+}  // namespace relmap::monitor
