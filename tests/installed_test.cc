@@ -10,6 +10,7 @@
 #include <fstream>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -107,6 +108,14 @@ TEST_F(Installed, ThePackagesHaveTheVersionOfThePrograms) {
   const std::string changelog = read_text(RELMAP_SOURCE_DIR "/debian/changelog");
   const std::string version = changelog.substr(changelog.find('(') + 1, changelog.find(')') - changelog.find('(') - 1);
   EXPECT_THAT(run_program({built_program("relmapd"), "--version"}).standard_output, HasSubstr(version));
+}
+
+TEST_F(Installed, ThePackagesAreBuiltWithWhatTheTreeIsBuiltWith) {
+  const std::string control = read_text(RELMAP_SOURCE_DIR "/debian/control");
+  std::istringstream packages(read_text(RELMAP_SOURCE_DIR "/tools/packages.txt"));
+  for (std::string package; std::getline(packages, package);)
+    if (package.ends_with("-dev") && !package.starts_with("libclang"))  // for fuzzers
+      EXPECT_THAT(control, HasSubstr("\n               " + package));
 }
 
 TEST_F(Installed, TheSampleOfTheConfigurationIsSound) {
