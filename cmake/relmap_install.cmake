@@ -32,7 +32,10 @@ install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmapd.sysusers DESTINATION lib/sy
 install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmapd.tmpfiles DESTINATION lib/tmpfiles.d RENAME relmapd.conf
         COMPONENT server)
 install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/30-relmap.conf DESTINATION lib/sysctl.d COMPONENT server)
-relmap_install_documents(server docs/operations.md docs/metrics.md docs/security.md docs/storage-format.md server/README.md
+foreach(file alerts.yml dashboard.json prometheus.yml)
+  install(FILES ${CMAKE_SOURCE_DIR}/tools/ops/${file} DESTINATION share/relmap/ops COMPONENT server)
+endforeach()
+relmap_install_documents(server docs/operations.md docs/runbook.md docs/metrics.md docs/security.md docs/storage-format.md server/README.md
                          server/place/data/LICENSES.md)
 
 install(TARGETS relmap-frontend relmap-camera RUNTIME DESTINATION bin COMPONENT frontend)

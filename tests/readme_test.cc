@@ -292,8 +292,9 @@ TEST_F(ReadmeFigures, AnotherPictureIsSeen) {
 
 // Commands in the documents, in blocks and within lines: "relmap edge remove 3:120/1 --dry-run".
 std::vector<std::string> commands_in(const std::string& text) {
-  static const std::regex within("`(relmap[a-z0-9-]* [^`\\n]*)`");
-  static const std::regex alone("^(relmap[a-z0-9-]* .*)$");
+  // Some are run as the user of the daemon.
+  static const std::regex within("`(?:runuser -u relmap -- )?(relmap[a-z0-9-]* [^`\\n]*)`");
+  static const std::regex alone("^(?:runuser -u relmap -- )?(relmap[a-z0-9-]* .*)$");
   std::vector<std::string> found;
   bool block = false;
   for (const std::string& line : lines_of(text)) {

@@ -2,6 +2,7 @@
 
 #include <ostream>
 
+#include "tools/terminal/advice.h"
 #include "tools/terminal/command_line.h"
 #include "tools/terminal/interrupt.h"
 
@@ -36,6 +37,7 @@ Examples:
   relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab
   relmap-admin credentials ca /etc/relmap/credentials --host map.example
   relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot --out cart-1.pem
+  relmap-admin explain DISK_FULL         # what it means, and what to do; alerts, too
   relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')";
 
 void declare(CLI::App& app, Context& context, Action& action) {
@@ -54,7 +56,7 @@ void declare(CLI::App& app, Context& context, Action& action) {
       ->capture_default_str();
   terminal::add_standard_options(app);
   for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex,
-                         add_stats, add_log_level, add_credentials})
+                         add_stats, add_log_level, add_credentials, add_explain})
     add(app, action);
 }
 
@@ -86,8 +88,8 @@ ExitCode exit_code(const Answer& answer) {
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal) {
   CLI::App app(
-      "Looks after relmap data folders (verify, repair, back up, restore, compact, migrate, reindex), and makes "
-      "the credentials of a fleet.",
+      "Looks after relmap data folders (verify, repair, back up, restore, compact, migrate, reindex), makes the "
+      "credentials of a fleet, and explains reasons and alerts.",
       "relmap-admin");
   terminal::Console console(out, err);
   terminal::ProgressBar bar(err, terminal);
@@ -114,6 +116,8 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err,
   console.reply(answer.json.text());
   out.flush();
   if (!answer.status.ok()) err << answer.status.to_string() << '\n';
+  if (const std::string advice = terminal::advice_on({answer.status.reason()}); !advice.empty() && !console.json)
+    err << advice << '\n';
   return exit_code(answer);
 }
 

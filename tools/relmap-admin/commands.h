@@ -45,5 +45,6 @@ void add_reindex(CLI::App& app, Action& action);
 void add_stats(CLI::App& app, Action& action);
 void add_log_level(CLI::App& app, Action& action);
 void add_credentials(CLI::App& app, Action& action);
+void add_explain(CLI::App& app, Action& action);
 
 }  // namespace relmap::admin

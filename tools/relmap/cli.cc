@@ -7,6 +7,7 @@
 
 #include "client/server_address.h"
 #include "tools/relmap/commands.h"
+#include "tools/terminal/advice.h"
 #include "tools/terminal/command_line.h"
 
 namespace relmap::cli {
@@ -117,6 +118,8 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   const auto client = client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();
   if (!status.ok()) err << status.to_string() << '\n';
+  if (!console.json && app.got_subcommand("status"))
+    if (const std::string advice = terminal::advice_on({status.reason()}); !advice.empty()) err << advice << '\n';
   if (!out.flush()) {
     err << Status(Reason::IO_ERROR, "the answer cannot be written (is the disk full?)").to_string() << '\n';
     if (status.ok()) return kNegativeAnswer;

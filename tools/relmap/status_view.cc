@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "tools/relmap/robot_trouble.h"
+#include "tools/terminal/advice.h"
 
 namespace relmap::cli {
 
@@ -84,6 +85,15 @@ std::string doubt_text(const client::DoubtfulCamera& camera) {
          ". Calibrate the camera, and take the drive in again";
 }
 
+// Where to read what to do about what needs attention.
+std::string advice_text(const client::DaemonStatus& status, const Facts& trouble) {
+  std::vector<Reason> reasons;
+  for (const auto& [where, what] : trouble)
+    for (const Reason reason : terminal::operational_in(what)) reasons.push_back(reason);
+  if (!status.doubtful_cameras.empty()) reasons.push_back(Reason::WRONG_CALIBRATION);
+  return terminal::advice_on(reasons);
+}
+
 }  // namespace
 
 std::string waiting_text(const client::DaemonStatus& s) {
@@ -131,6 +141,7 @@ void print_status(const StatusMoment& now, bool all, terminal::Console& console)
     Facts indented;
     for (const auto& [where, what] : trouble) indented.emplace_back("  " + where, what);
     console.facts(indented);
+    if (const std::string advice = advice_text(now.status, trouble); !advice.empty()) console.out() << advice << '\n';
     console.out() << '\n';
   }
   Facts facts{

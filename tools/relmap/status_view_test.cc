@@ -63,6 +63,7 @@ TEST(StatusView, IsOneScreenWithoutLicences) {
   EXPECT_THAT(text, HasSubstr(", 1 label, 0 places\n"));
   EXPECT_THAT(text, ContainsRegex("storage +OK"));
   EXPECT_THAT(text, Not(HasSubstr("place_index")));
+  EXPECT_THAT(text, Not(HasSubstr("explain")));
   const std::string all = shown(now, true);
   EXPECT_THAT(all, HasSubstr("CC-BY-SA-4.0"));
   EXPECT_THAT(all, HasSubstr("place_index"));
@@ -93,7 +94,11 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
     EXPECT_GT(at, last) << line;
     last = at;
   }
-  EXPECT_LT(last, text.find("daemon "));
+  const std::size_t advice = text.find(
+      "\nrelmap-admin explain DISK_FULL NO_MULTICAST_ROUTE TOO_MANY_FILES BAD_CONFIG WRONG_CALIBRATION tells what to "
+      "do\n");
+  EXPECT_LT(last, advice) << text;
+  EXPECT_LT(advice, text.find("daemon "));
   EXPECT_THAT(text, HasSubstr("DISK_FULL: 12 MiB of 100000 MiB free"));
   EXPECT_THAT(text, HasSubstr("SAME_NAME: another robot sends under the same name, for session 99999999-"));
   EXPECT_THAT(
