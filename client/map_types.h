@@ -21,6 +21,11 @@
 
 namespace relmap::client {
 
+// How matrices are laid out depends on this, and it must be the same as in the library.
+static_assert(
+    EIGEN_MAX_STATIC_ALIGN_BYTES == 16,
+    "relmap's client is not compiled for AVX: with -mavx or -march=native say -DEIGEN_MAX_STATIC_ALIGN_BYTES=16");
+
 enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };
 enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
 enum class Verification : std::uint8_t {

@@ -27,7 +27,10 @@ std::string program_of(const Dc1394Options& options) {
   if (!options.program.empty()) return options.program;
   if (const char* const given = std::getenv("RELMAP_CAMERA_1394"); given && *given) return given;
   std::error_code error;
-  return fs::read_symlink("/proc/self/exe", error).replace_filename("relmap-camera-1394");
+  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  const fs::path beside = folder / "relmap-camera-1394";  // in a build
+  const fs::path installed = folder.parent_path() / "lib/relmap/relmap-camera-1394";
+  return fs::exists(installed, error) && !fs::exists(beside, error) ? installed : beside;
 }
 
 // A process that only lists the cameras.

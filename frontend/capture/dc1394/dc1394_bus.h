@@ -11,7 +11,8 @@
 namespace relmap::iidc {
 
 struct Dc1394Options {
-  std::string program;   // if empty, $RELMAP_CAMERA_1394, or else relmap-camera-1394 beside the running program
+  // If empty, $RELMAP_CAMERA_1394, or else relmap-camera-1394 beside the running program, or in ../lib/relmap.
+  std::string program;
   bool usb_too = false;  // also the cameras that libdc1394 reaches over USB; for tests
   std::string nodes;     // if empty, /sys/bus/firewire/devices
 };

@@ -1,0 +1,27 @@
+# Part of `cmake --install`: the public headers, and exactly those that they include, below include/relmap. Our sources
+# name headers from the top of the tree ("client/map_types.h"); installed ones say "relmap/client/map_types.h", so that
+# users need no further folder in their search path, and <client/...> stays theirs.
+cmake_policy(VERSION 3.25)
+include(${CMAKE_CURRENT_LIST_DIR}/install_text.cmake)
+
+function(relmap_install_headers source_dir)
+  set(headers ${ARGN})
+  set(installed "")
+  while(headers)
+    list(POP_FRONT headers header)
+    if(header IN_LIST installed)
+      continue()
+    endif()
+    if(NOT EXISTS "${source_dir}/${header}")
+      message(FATAL_ERROR "a public header includes ${header}, which is generated: users do not have it")
+    endif()
+    list(APPEND installed ${header})
+    file(READ "${source_dir}/${header}" text)
+    string(REGEX MATCHALL "#include \"[^\"]+" included "${text}")
+    list(TRANSFORM included REPLACE "#include \"" "")
+    list(APPEND headers ${included})
+    string(REPLACE "#include \"" "#include \"relmap/" text "${text}")
+    relmap_write_installed("include/relmap/${header}" "${text}")
+  endwhile()
+  return(PROPAGATE CMAKE_INSTALL_MANIFEST_FILES)
+endfunction()
