@@ -26,7 +26,9 @@ install(TARGETS relmapd RUNTIME DESTINATION bin COMPONENT server)
 install(FILES ${CMAKE_SOURCE_DIR}/server/place/data/places.vocab DESTINATION share/relmap RENAME default.vocab
         COMPONENT server)
 install(FILES ${CMAKE_SOURCE_DIR}/tools/ops/relmapd.yaml DESTINATION share/relmap COMPONENT server)
-relmap_install_text(server ${systemd}/relmapd.service lib/systemd/system)
+foreach(unit relmapd.service relmap-backup.service relmap-backup.timer)
+  relmap_install_text(server ${systemd}/${unit} lib/systemd/system)
+endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmapd.sysusers DESTINATION lib/sysusers.d RENAME relmapd.conf
         COMPONENT server)
 install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmapd.tmpfiles DESTINATION lib/tmpfiles.d RENAME relmapd.conf
