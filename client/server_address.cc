@@ -47,9 +47,11 @@ Result<ServerAddress> resolve_server(const std::string& server) {
   std::error_code error;
   const bool folder = std::filesystem::is_directory(server, error);
   const auto refused = [&](const std::string& what) -> Status {
-    return {Reason::NOT_ALLOWED,
-            "you may not read " + what +
-                ": run this as the user of the daemon, or let a group use its socket (socket_group)"};
+    return {
+        Reason::NOT_ALLOWED,
+        "you may not read " + what +
+            ": run this as the user of the daemon, or as a member of the group that may use its socket (socket_group; "
+            "relmap in the package: adduser USER relmap)"};
   };
   if (!folder) {
     if (is_host_port(server) || server.starts_with("unix:/")) return ServerAddress{server, 0, ""};

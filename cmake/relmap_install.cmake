@@ -33,7 +33,7 @@ install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmapd.sysusers DESTINATION lib/sy
         COMPONENT server)
 install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmapd.tmpfiles DESTINATION lib/tmpfiles.d RENAME relmapd.conf
         COMPONENT server)
-install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/30-relmap.conf DESTINATION lib/sysctl.d COMPONENT server)
+install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/10-relmap.conf DESTINATION lib/sysctl.d COMPONENT server)
 foreach(file alerts.yml dashboard.json prometheus.yml)
   install(FILES ${CMAKE_SOURCE_DIR}/tools/ops/${file} DESTINATION share/relmap/ops COMPONENT server)
 endforeach()

@@ -35,7 +35,7 @@ using Who = relmap::ingest::LcmAuthentication::Who;
 constexpr const char* kFooter = R"(Examples:
   relmapd --data /srv/map
   relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0' --credentials /etc/relmap/credentials
-  relmapd --config /etc/relmapd.yaml --check-config
+  relmapd --config /etc/relmap/relmapd.yaml --check-config
   relmap-admin credentials ca /etc/relmap/credentials --host map.lab
   relmapd --data /srv/map --listen 0.0.0.0:50070 --credentials /etc/relmap/credentials
   relmapd --data /srv/map --http 50071                     # curl 127.0.0.1:50071/readyz, /livez, /metrics
@@ -46,7 +46,7 @@ uses it. --listen serves over TCP, too, and docs/security.md tells who may do wh
 
 All settings can be given in the configuration file; some have no option: ingest.* (which robots may send, and how
 much), tls.*, access, lcm.*, socket, rpc.*, routes.mixes, rba.* and others. --sample-config prints a file with all of
-them, explained, and --print-config what is in force.
+them, explained, and --print-config what would be in force.
 
 SIGHUP reads the configuration file and the access list again, and puts in force what can change while the daemon runs
 (log_level, ingest.*, hung_after_s); of the rest the log says NEEDS_RESTART. Certificates are read within ten seconds

@@ -71,9 +71,9 @@ TEST_F(Installed, EachComponentHasItsPrograms) {
 
 TEST_F(Installed, UnitsNameTheProgramsOfTheirPrefix) {
   for (const char* component : {"server", "frontend"}) install(component);
-  for (const std::string unit : {"relmapd", "relmap-frontend@"}) {
+  for (const auto& [unit, program] : {std::pair("relmapd", "relmapd"), std::pair("relmap-frontend@", "relmap-frontend"),
+                                      std::pair("relmap-backup", "relmap-admin")}) {
     const std::string text = read_text(prefix_ + "/lib/systemd/system/" + unit + ".service");
-    const std::string program = unit == "relmapd" ? "relmapd" : "relmap-frontend";
     EXPECT_THAT(text, HasSubstr("\nExecStart=" + prefix_ + "/bin/" + program + " "));
     EXPECT_THAT(text, Not(HasSubstr("@prefix@")));
     EXPECT_THAT(text, HasSubstr("Documentation=file:" + prefix_ + "/share/doc/relmap/"));
@@ -83,7 +83,8 @@ TEST_F(Installed, UnitsNameTheProgramsOfTheirPrefix) {
 TEST_F(Installed, UnitsAreSoundAndClosed) {
   for (const char* component : {"server", "frontend"}) install(component);
   const std::string units = prefix_ + "/lib/systemd/system/";
-  for (const std::string& unit : {units + "relmapd.service", units + "relmap-frontend@.service"}) {
+  for (const std::string& unit :
+       {units + "relmapd.service", units + "relmap-frontend@.service", units + "relmap-backup.service"}) {
     const Finished closed =
         run_program({"systemd-analyze", "security", "--offline=true", "--threshold=30", "--no-pager", unit});
     EXPECT_EQ(closed.exit_code, 0) << closed.standard_output << closed.standard_error;
@@ -93,6 +94,19 @@ TEST_F(Installed, UnitsAreSoundAndClosed) {
   const Finished users = run_program({"systemd-sysusers", "--dry-run", prefix_ + "/lib/sysusers.d/relmapd.conf",
                                       prefix_ + "/lib/sysusers.d/relmap-frontend.conf"});
   EXPECT_EQ(users.exit_code, 0) << users.standard_error;
+}
+
+// A daemon that hangs is started again within 30 s: it counts as hung, is silent, is given time for its last words.
+TEST_F(Installed, ADaemonThatHangsIsStartedAgainWithinHalfAMinute) {
+  const std::string unit = read_text(RELMAP_SOURCE_DIR "/tools/ops/systemd/relmapd.service");
+  const auto seconds_of = [&](const std::string& setting) {
+    const std::size_t at = unit.find("\n" + setting + "=");
+    EXPECT_NE(at, std::string::npos) << setting;
+    return std::stod(unit.substr(at + setting.size() + 2));
+  };
+  const std::string sample = read_text(RELMAP_SOURCE_DIR "/server/ops/relmapd.yaml");
+  const double hung_s = std::stod(sample.substr(sample.find("#hung_after_s: ") + 15)), tick_s = 1;
+  EXPECT_LE(hung_s + tick_s + seconds_of("WatchdogSec") + seconds_of("TimeoutAbortSec") + seconds_of("RestartSec"), 30);
 }
 
 TEST_F(Installed, WhatNoRestartMendsIsNotTriedAgain) {

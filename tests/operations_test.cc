@@ -37,6 +37,8 @@ using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
+constexpr std::chrono::hours kForever{1};  // until the disk is mended
+
 bool wait_until(const std::function<bool()>& condition) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (!condition()) {
@@ -137,7 +139,7 @@ TEST_F(Operations, ADiskThatHangsShowsAndPasses) {
   RunningDaemon daemon(options());
   const auto first = robot(daemon, "cart");
   ASSERT_EQ(first->wait(kPatience), 0);
-  faults_.fail_from_now_on(FaultKind::kSync, 0, seconds(20));
+  faults_.fail_from_now_on(FaultKind::kSync, 0, kForever);
   const auto second = robot(daemon, "dolly");
   EXPECT_TRUE(wait_until([&] { return page(daemon, "/readyz").find("storage: STALLED: ") != std::string::npos; }))
       << page(daemon, "/readyz");
@@ -184,6 +186,7 @@ TEST_F(Operations, AClockThatIsSetShows) {
   faults_.set_clock(-3600);
   EXPECT_TRUE(wait_until([&] { return sample(daemon, "relmap_clock_steps_total") == 1; }));
   EXPECT_NEAR(sample(daemon, "relmap_clock_step_seconds"), -3600, 1);
+  EXPECT_THAT(page(daemon, "/readyz"), HasSubstr("clock: set back by 3600.0 s"));
   EXPECT_THAT(daemon.log(), HasSubstr("the system's clock was set back by 3600.0 s"));
   const Finished status = run_program({built_program("relmap"), "--server", folder_ / "disk/map", "status"});
   EXPECT_THAT(status.standard_output, HasSubstr("clock"));
@@ -236,7 +239,7 @@ TEST_F(Operations, SystemdHearsHowTheDaemonIs) {
   EXPECT_TRUE(manager.hears("RELOADING=1"));
   EXPECT_TRUE(manager.hears("READY=1"));
   // The journal hangs: the watchdog is not fed any more, so systemd would start the daemon again.
-  faults_.fail_from_now_on(FaultKind::kSync, 0, seconds(20));
+  faults_.fail_from_now_on(FaultKind::kSync, 0, kForever);
   const auto sent = robot(daemon, "cart");
   EXPECT_TRUE(manager.hears("storage: STALLED"));
   EXPECT_TRUE(wait_until([&] { return http_get(daemon.http(), "/livez").status == 503; }));
@@ -337,7 +340,7 @@ TEST_F(Operations, TheSocketMayLieOutsideOfTheMap) {
 // What a load balancer sees of a stop: not ready before anybody is turned away.
 TEST_F(Operations, ADaemonThatStopsSaysSoFirst) {
   RunningDaemon daemon(options());
-  faults_.fail_from_now_on(FaultKind::kSync, 0, seconds(3));
+  faults_.fail_from_now_on(FaultKind::kSync, 0, kForever);
   const auto sent = robot(daemon, "cart");
   EXPECT_TRUE(wait_until([&] { return faults_.hanging(); }));
   const std::string http = daemon.http();

@@ -158,6 +158,7 @@ class OldClient : public ::testing::TestWithParam<std::string> {
         {"Admin/GetStats", {""}},
         {"Admin/WaitIdle", {""}},
         {"Admin/Commit", {""}},
+        {"Admin/SetLogLevel", {"level: 'debug'"}},
         {"Admin/FreezeSession", {"session: 1 frozen: true"}},
         {"Admin/DeleteSession", {"session: 1 uuid: '" + uuid + "'"}},
     };
@@ -327,6 +328,8 @@ TEST_P(OldDaemon, AnswersEveryCallOfTheClient) {
     choice_ = 1;  // of the outcomes of work, that of a compaction
     expect_ok("compact", client->compact(any).status());
     expect_ok("stats", client->stats().status());
+    if (old_.method("/relmap.v1.Admin/SetLogLevel"))
+      expect_ok("set_log_level", client->set_log_level("debug").status());
     expect_ok("freeze_session", client->freeze_session(1));
     expect_ok("delete_session", client->delete_session(1, "x", any));
     expect_ok("commit", client->commit().status());

@@ -670,6 +670,18 @@ TEST_F(IntakeTest, OnlyRobotsOnTheListAreTaken) {
   EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 1u);
 }
 
+TEST_F(IntakeTest, LimitsChangeWhileItRuns) {
+  send(0);
+  EXPECT_TRUE(settle().refused.empty());
+  intake_->limit({0, 0, {"somebody else"}});
+  send(1);
+  EXPECT_EQ(settle().refused.back().reason, Reason::NOT_ALLOWED);
+  intake_->limit({});
+  send(2);
+  EXPECT_EQ(settle().next_sequence, 3u);
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 2u);
+}
+
 TEST_F(IntakeTest, FrozenAndDeletedSessionsRefuseKeyframes) {
   send(0);
   settle();

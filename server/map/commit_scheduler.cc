@@ -48,7 +48,13 @@ void CommitScheduler::run() {
 }
 
 void CommitScheduler::begin_if_due() {
-  if (Clock::now() >= next_due() || (!failing_ && map_->commit_is_due())) begin();
+  const bool full = !failing_ && map_->commit_is_due();
+  if (full || (Clock::now() >= next_due() && !is_writing())) begin();
+}
+
+bool CommitScheduler::is_writing() const {
+  const MutexLock lock(mutex_);
+  return under_way_ && written_ != begun_;
 }
 
 void CommitScheduler::commit() {
@@ -70,7 +76,7 @@ void CommitScheduler::commit() {
 void CommitScheduler::begin() {
   last_ = Clock::now();
   if (closed_) return;
-  if (failing_) finish();
+  finish();
   if (std::set<FrameId> open = hooks_.open_lookups(); map_->state().lookups != open)
     map_->state().lookups = std::move(open);
   std::uint64_t number = 0;
@@ -82,8 +88,8 @@ void CommitScheduler::begin() {
   Status begun;
   busy_.begin();
   try {
-    begun = map_->begin_commit([this, number] {
-      commits_.add(busy_.seconds());
+    begun = map_->begin_commit([this, number, began = last_] {
+      commits_.add(Clock::now() - began);
       busy_.end();
       {
         const MutexLock lock(mutex_);
@@ -107,7 +113,9 @@ void CommitScheduler::begin() {
 
 void CommitScheduler::finish() {
   if (closed_) return;
+  hooks_.on_wait(true);
   const std::optional<Status> outcome = map_->finish_commit();
+  hooks_.on_wait(false);
   if (!outcome) return;
   budget_->set(storage::Share::kEngine, engine_->memory_bytes());
   {

@@ -1,7 +1,7 @@
 // Decides when the map is committed: after an interval, when much is dirty, when somebody asks for it, and at the end.
 //
-// The worker encodes what is dirty and goes on while the disk writes it. It waits only if the previous commit is still
-// being written.
+// The worker encodes what is dirty and goes on while the disk writes it. A commit that is due waits until the previous
+// one is written, unless too much is dirty: then the worker waits.
 #pragma once
 
 #include <atomic>
@@ -30,6 +30,8 @@ class CommitScheduler {
     std::function<std::set<FrameId>()> open_lookups;
     // Called by the worker with the outcome of each commit, without a lock held.
     std::function<void(const Status&)> on_outcome;
+    // Called by the worker before and after it waits for a commit that is being written.
+    std::function<void(bool waiting)> on_wait;
     // Called by any thread after wants_worker() or done() may have changed, without a lock held.
     std::function<void()> on_change;
   };
@@ -70,6 +72,7 @@ class CommitScheduler {
   bool failing() const { return failing_; }  // the last commit could not be written
 
  private:
+  bool is_writing() const;
   void begin();
   void finish();
   void note(const Status& outcome);

@@ -33,10 +33,12 @@ class CommitSchedulerTest : public ::testing::Test {
                            budget_,
                            {.open_lookups = [this] { return open_; },
                             .on_outcome = [this](const Status& outcome) { outcomes_.push_back(outcome); },
+                            .on_wait = [this](bool waiting) { waits_ += waiting ? 1 : -1; },
                             .on_change = [this] {  // would not return if it were called with the lock held
                               commits_.wants_worker();
                               ++changes_;
                             }}};
+  int waits_ = 0;
   std::unique_ptr<storage::Map> map_;
 };
 

@@ -168,6 +168,13 @@ CommitScheduler::Hooks Mapper::Impl::commit_hooks() {
                 if (!failed) storage = outcome;
                 changed.notify_all();
               },
+          .on_wait =
+              [this](bool waiting) {  // for the disk, which is told by the commit's own time
+                if (waiting)
+                  worker_busy.end();
+                else
+                  worker_busy.begin();
+              },
           .on_change = [this] { tell_waiting(); }};
 }
 

@@ -71,7 +71,7 @@ struct MapperStats {
 // For how many seconds each of the mapper's threads has been at its present piece of work; 0: it waits for one.
 struct MapperProgress {
   double journal_s = 0;  // an append, which waits for the disk
-  double worker_s = 0;   // applying a record, or waiting for the previous commit
+  double worker_s = 0;   // applying a record
   double commit_s = 0;   // writing a commit
   double queued_s = 0;   // for how long the first durable record has waited for the worker
   Status storage;        // as MapperStats::storage

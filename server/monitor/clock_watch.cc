@@ -25,15 +25,18 @@ ClockWatch::Times ClockWatch::system_clocks() { return {seconds_of(CLOCK_REALTIM
 ClockWatch::ClockWatch(Clocks clocks) : clocks_(std::move(clocks)), ahead_s_(ahead(clocks_())) {}
 
 bool ClockWatch::look() {
-  const double now = ahead(clocks_());
-  const double step = now - ahead_s_;
-  ahead_s_ = now;
+  const Times times = clocks_();
+  const double step = ahead(times) - ahead_s_;
+  ahead_s_ = ahead(times);
   if (std::abs(step) <= kStep_s) return false;
   last_step_s_ = step;
+  last_step_at_s_ = times.steady_s;
   ++steps_;
   spdlog::warn("the system's clock was set {} by {:.1f} s; times of keyframes and in logs jump as much",
                step > 0 ? "forward" : "back", std::abs(step));
   return true;
 }
+
+double ClockWatch::last_step_age_s() const { return steps_ == 0 ? 0 : clocks_().steady_s - last_step_at_s_; }
 
 }  // namespace relmap::monitor

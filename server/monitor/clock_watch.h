@@ -27,12 +27,14 @@ class ClockWatch {
   // Thread-safe.
   std::uint64_t steps() const { return steps_; }
   double last_step_s() const { return last_step_s_; }  // forward is positive; 0: there was none
+  double last_step_age_s() const;                      // seconds since it was noticed; 0: there was none
 
  private:
   const Clocks clocks_;
   double ahead_s_;  // of the time of day, at the last look
   std::atomic<std::uint64_t> steps_ = 0;
   std::atomic<double> last_step_s_ = 0;
+  std::atomic<double> last_step_at_s_ = 0;  // of the steady clock
 };
 
 }  // namespace relmap::monitor

@@ -23,6 +23,9 @@ TEST(ClockWatch, NoticesStepsAndNoSlewing) {
   EXPECT_TRUE(pass(0.5, -3600));
   EXPECT_NEAR(watch.last_step_s(), -3600, 1e-6);
   EXPECT_EQ(watch.steps(), 2u);
+  EXPECT_EQ(watch.last_step_age_s(), 0);
+  pass(120, 0);
+  EXPECT_NEAR(watch.last_step_age_s(), 120, 1e-6);
 }
 
 TEST(ClockWatch, ReadsTheSystemsClocks) {

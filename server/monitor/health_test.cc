@@ -62,6 +62,15 @@ TEST(Health, NamesTheReasonOfADiskThatTakesNothing) {
   EXPECT_TRUE(judge(signs).live) << "a new start would not help";
 }
 
+TEST(Health, TellsOfAFullDiskBeforeSomebodyWrites) {
+  Signs signs;
+  signs.free_bytes = 100 << 20;
+  signs.low_water = 256 << 20;
+  EXPECT_EQ(in_short(judge(signs)), "storage: DISK_FULL: 100 MiB free; nothing is taken in below 256 MiB");
+  signs.free_bytes = 256 << 20;
+  EXPECT_TRUE(judge(signs).ready());
+}
+
 TEST(Health, IsDeadOnlyWhereANewStartMayHelp) {
   for (double Signs::*const busy : {&Signs::intake_s}) {
     Signs signs;
@@ -81,6 +90,19 @@ TEST(Health, IsDeadOnlyWhereANewStartMayHelp) {
   Signs slow;
   slow.map.commit_s = 100;
   EXPECT_TRUE(judge(slow).live) << "a large commit takes as long as the disk needs, while keyframes are taken in";
+  slow.map.commit_s = 601;
+  EXPECT_FALSE(judge(slow).live);
+}
+
+TEST(Health, TellsOfAClockThatWasSet) {
+  rpc::HealthFacts health = judge({});
+  health.clock_steps = 1;
+  health.clock_step_s = -3600;
+  health.clock_step_age_s = 12;
+  EXPECT_EQ(health_page(health, true),
+            "ok\nstorage: ok\nworker: ok\nintake: ok\nclock: set back by 3600.0 s, 12 s ago\n");
+  health.clock_step_age_s = 3601;
+  EXPECT_EQ(health_page(health, true), health_page(judge({}), true)) << "that is over";
 }
 
 TEST(Health, IsNotReadyWhileTheDaemonStops) {

@@ -25,15 +25,10 @@ namespace {
 using tcp = asio::ip::tcp;
 using Error = beast::error_code;
 
-constexpr std::size_t kMaxConnections = 64;
+constexpr std::size_t kMaxConnections = 32;       // from this machine, and again from elsewhere
 constexpr std::chrono::milliseconds kPause{100};  // where nothing can be accepted
-constexpr int kThreads = 2;                       // so that one page that takes long does not keep the others waiting
-
-bool is_of_this_machine(const asio::ip::address& address) {
-  if (address.is_v6() && address.to_v6().is_v4_mapped())
-    return asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6()).is_loopback();
-  return address.is_loopback();
-}
+constexpr int kThreads = 3;                       // so that neither a page that takes long nor handshakes of strangers
+                                                  // keep others waiting
 
 }  // namespace
 
@@ -50,35 +45,47 @@ struct HttpServer::Impl {
   }
 
   void serve(tcp::socket socket) try {
-    Error error;
-    const auto peer = socket.remote_endpoint(error);
-    if (error) return;
-    const bool local = is_of_this_machine(peer.address());
-    if (tls) {
-      auto context = tls->now();
-      begin(std::make_shared<Session<beast::ssl_stream<beast::tcp_stream>>>(served, local, context, std::move(socket),
-                                                                            *context));
-    } else {
-      begin(std::make_shared<Session<beast::tcp_stream>>(served, local, nullptr, std::move(socket)));
-    }
+    const bool local = rpc::is_of_this_machine(socket.native_handle());
+    if (!tls || !local) return begin(tls != nullptr, std::move(socket), local, {});
+    const auto either =
+        std::make_shared<Either>(std::move(socket), [this](bool speaks_tls, tcp::socket chosen, auto begun) {
+          begin(speaks_tls, std::move(chosen), /*local=*/true, std::move(begun));
+        });
+    admit(either, local);
+    either->run();
   } catch (const std::exception&) {
     spdlog::error("HTTP: a connection is not served: {}", caught_status().to_string());
   }
 
-  template <typename One>
-  void begin(std::shared_ptr<One> session) {
+  // `begun`: what has been read of it already.
+  void begin(bool by_tls, tcp::socket socket, bool local, beast::flat_buffer begun) {
+    if (by_tls) {
+      auto context = tls->now();
+      const auto session = std::make_shared<Session<asio::ssl::stream<beast::tcp_stream>>>(served, local, context,
+                                                                                           std::move(socket), *context);
+      admit(session, local);
+      session->run(std::move(begun));
+    } else {
+      const auto session = std::make_shared<Session<beast::tcp_stream>>(served, local, nullptr, std::move(socket));
+      admit(session, local);
+      session->run(std::move(begun));
+    }
+  }
+
+  // Makes room for it.
+  void admit(const std::shared_ptr<Connection>& connection, bool local) {
     std::shared_ptr<Connection> oldest;
     {
       const MutexLock lock(mutex);
+      std::deque<std::weak_ptr<Connection>>& open = local ? from_here : from_elsewhere;
       std::erase_if(open, [](const auto& one) { return one.expired(); });
       if (open.size() >= kMaxConnections) {
         oldest = open.front().lock();
         open.pop_front();
       }
-      open.push_back(session);
+      open.push_back(connection);
     }
     if (oldest) oldest->close();
-    session->run();
   }
 
   void run() {
@@ -98,7 +105,8 @@ struct HttpServer::Impl {
   asio::io_context io{kThreads};
   std::vector<std::unique_ptr<tcp::acceptor>> acceptors;
   Mutex mutex;
-  std::deque<std::weak_ptr<Connection>> open RELMAP_GUARDED_BY(mutex);  // the oldest first
+  std::deque<std::weak_ptr<Connection>> from_here RELMAP_GUARDED_BY(mutex);  // the oldest first
+  std::deque<std::weak_ptr<Connection>> from_elsewhere RELMAP_GUARDED_BY(mutex);
   std::array<std::thread, kThreads> threads;
 };
 

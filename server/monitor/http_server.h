@@ -27,9 +27,9 @@ struct HttpOptions {
   rpc::TlsFiles tls = {};
 };
 
-// Callers from this machine need no credentials. Others show a token ("Authorization: Bearer TOKEN") or a certificate,
-// of any role, or get 401. At most 64 connections are open; for one more the oldest is closed. A request has 10 s, and
-// a header at most 8 KiB.
+// Callers from this machine need neither credentials nor TLS. Others show a token ("Authorization: Bearer TOKEN") or a
+// certificate, of any role, or get 401. At most 32 connections from this machine are open, and as many from elsewhere;
+// for one more the oldest of these is closed. A request has 10 s, and a header at most 8 KiB.
 class HttpServer {
  public:
   // Returns the page at a path, and for a path without one `status` 404. Called from several threads at a time.

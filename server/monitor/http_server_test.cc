@@ -194,6 +194,7 @@ TEST_F(HttpServerTest, BeyondThisMachineCallersNeedCredentials) {
   EXPECT_THAT(refused.body(), HasSubstr("UNAUTHENTICATED"));
   EXPECT_EQ(get_by_tls(outer, wrong).result_int(), 401u);
   EXPECT_EQ(get_by_tls("127.0.0.1", nothing).result_int(), 200u) << "this machine itself";
+  EXPECT_EQ(get("/livez").result_int(), 200u) << "this machine itself, without TLS";
   fleet_.revoke("prometheus");
   ASSERT_TRUE(gatekeeper_.reload().ok());
   EXPECT_EQ(get_by_tls(outer, reader).result_int(), 401u) << "revoked";

@@ -1,11 +1,13 @@
 // One connection of the HTTP server. Internal to server/monitor.
 #pragma once
 
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
-#include <boost/beast/ssl.hpp>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,11 +48,14 @@ class Session final : public Connection, public std::enable_shared_from_this<Ses
   Session(const Served& served, bool local, std::shared_ptr<asio::ssl::context> context, Arguments&&... arguments)
       : served_(served), local_(local), context_(std::move(context)), stream_(std::forward<Arguments>(arguments)...) {}
 
-  void run() {
+  // `begun`: what has been read of the connection already.
+  void run(beast::flat_buffer begun = beast::flat_buffer(2 * kMaxHeader)) {
+    buffer_ = std::move(begun);
     if constexpr (kTls) {
       lowest().expires_after(kPatience);
-      stream_.async_handshake(asio::ssl::stream_base::server,
-                              [self = this->shared_from_this()](beast::error_code error) {
+      stream_.async_handshake(asio::ssl::stream_base::server, buffer_.cdata(),
+                              [self = this->shared_from_this()](beast::error_code error, std::size_t taken) {
+                                self->buffer_.consume(taken);
                                 if (!error) self->read(kPatience);
                               });
     } else {
@@ -148,6 +153,28 @@ class Session final : public Connection, public std::enable_shared_from_this<Ses
   std::optional<http::request_parser<http::string_body>> parser_;
   http::response<http::string_body> response_;
   std::optional<http::response_serializer<http::string_body>> serializer_;
+};
+
+// A connection from this machine to a port of TLS: it may speak TLS or not.
+class Either final : public Connection, public std::enable_shared_from_this<Either> {
+ public:
+  using Chosen = std::function<void(bool tls, asio::ip::tcp::socket, beast::flat_buffer begun)>;
+  Either(asio::ip::tcp::socket socket, Chosen chosen) : stream_(std::move(socket)), chosen_(std::move(chosen)) {}
+
+  void run() {
+    stream_.expires_after(kPatience);
+    beast::async_detect_ssl(stream_, buffer_, [self = this->shared_from_this()](beast::error_code error, bool tls) {
+      if (!error) self->chosen_(tls, self->stream_.release_socket(), std::move(self->buffer_));
+    });
+  }
+  void close() override {
+    asio::post(stream_.get_executor(), [self = this->shared_from_this()] { self->stream_.close(); });
+  }
+
+ private:
+  beast::tcp_stream stream_;
+  const Chosen chosen_;
+  beast::flat_buffer buffer_{2 * kMaxHeader};
 };
 
 }  // namespace relmap::monitor

@@ -76,17 +76,17 @@ std::string on_one_line(std::string_view message) {
   return line;
 }
 
-// What people read in passing is not cluttered by the request's id; what they look into has it.
 std::string with_request(const spdlog::details::log_msg& message) {
-  const rpc::RequestContext* request = message.level == Level::info ? nullptr : rpc::current_request();
+  const rpc::RequestContext* request = rpc::current_request();
   return (request ? "[" + request->request_id + "] " : std::string()) + on_one_line(view(message.payload));
 }
 
-// The message in the text format.
+// The message in the text format. What people read in passing is not cluttered by the request's id; what they look into
+// has it.
 class MessageFlag final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
-    const std::string line = with_request(message);
+    const std::string line = message.level == Level::info ? on_one_line(view(message.payload)) : with_request(message);
     out.append(line.data(), line.data() + line.size());
   }
   std::unique_ptr<spdlog::custom_flag_formatter> clone() const override { return std::make_unique<MessageFlag>(); }

@@ -14,7 +14,7 @@ namespace relmap::monitor {
 //   a call.
 // journal: "<PRIORITY>MESSAGE", which the journal takes apart (sd-daemon(3)); it knows the time.
 // Control characters in a message are escaped in all of them. In text and journal the request's id precedes the message
-// in brackets, except at level info.
+// in brackets, in text not at level info.
 const std::vector<std::string>& log_formats();
 
 // Sets up the log of this process. `format` is one of log_formats(). The last words of a process that ends suddenly

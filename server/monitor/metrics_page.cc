@@ -109,11 +109,13 @@ void collect_health(const rpc::HealthFacts& health, Collector& page) {
   page.set("relmap_clock_step_seconds", health.clock_step_s);
 }
 
-void collect_work(const map::Mapper& mapper, const map::MapperStats& stats, Collector& page) {
+void collect_work(const map::Mapper& mapper, const intake::IngestServer* intake, const map::MapperStats& stats,
+                  Collector& page) {
   const map::MapperProgress progress = mapper.progress();
   page.set("relmap_busy_seconds", progress.journal_s, {{"thread", "journal"}});
   page.set("relmap_busy_seconds", progress.worker_s, {{"thread", "worker"}});
   page.set("relmap_busy_seconds", progress.commit_s, {{"thread", "commit"}});
+  if (intake) page.set("relmap_busy_seconds", intake->busy_s(), {{"thread", "intake"}});
   page.set("relmap_journal_durable_sequence", stats.durable_sequence);
   page.set("relmap_journal_applied_sequence", stats.applied_sequence);
   page.set("relmap_queue_records", stats.waiting, {{"queue", "journal"}});
@@ -156,12 +158,15 @@ void collect_intake(const rpc::Core& core, Collector& page) {
   page.set("relmap_keyframes_incomplete", stats.incomplete);
   page.set("relmap_acknowledgements_total", stats.acknowledgements);
   page.set("relmap_robots", stats.heard);
-  for (std::size_t number = 0; number < stats.parts_refused.size(); ++number) {
+  for (std::size_t number = 1; number < stats.parts_refused.size(); ++number) {
+    if (!is_reason(static_cast<std::uint16_t>(number))) continue;
+    // Those of what robots send are there from the start, since Prometheus sees no increase to a first value.
+    const bool always = number <= intake::index_of(Reason::MAP_RESTORED);
     const std::string_view reason = reason_name(static_cast<Reason>(number));
-    if (stats.keyframes_refused[number] > 0)
+    if (always || stats.keyframes_refused[number] > 0)
       page.set("relmap_keyframes_refused_total", stats.keyframes_refused[number], {{"reason", reason}});
     const std::uint64_t messages = stats.parts_refused[number] + stats.messages_refused[number];
-    if (messages > 0) page.set("relmap_messages_not_taken_total", messages, {{"reason", reason}});
+    if (always || messages > 0) page.set("relmap_messages_not_taken_total", messages, {{"reason", reason}});
   }
   const std::vector<intake::RobotStats> robots = core.intake.server->robots();
   page.set("relmap_robots_silent",
@@ -235,7 +240,7 @@ const std::vector<MetricFamily>& metric_families() {
       {"relmap_component_problem", kGauge, "component, reason",
        "1 while a component has this problem; absent otherwise"},
       {"relmap_busy_seconds", kGauge, "thread",
-       "For how long journal, worker or commit has been at its present piece of work; 0: it waits for one"},
+       "For how long journal, worker, commit or intake has been at its present piece of work; 0: it waits for one"},
       {"relmap_clock_steps_total", kCounter, "", "Steps of the system's clock by more than a second"},
       {"relmap_clock_step_seconds", kGauge, "", "The last of these steps; forward is positive"},
       {"relmap_log_lines_total", kCounter, "level", "Lines of the log at warning, error and critical"},
@@ -330,7 +335,7 @@ std::optional<std::string> MetricsPage::text() {
   collect_process(core_, page);
   if (core_.health) collect_health(core_.health(), page);
   const map::MapperStats stats = core_.mapper.stats();
-  collect_work(core_.mapper, stats, page);
+  collect_work(core_.mapper, core_.intake.server, stats, page);
   collect_map(core_.mapper, stats, page);
   collect_intake(core_, page);
   collect_rpc(core_, page);

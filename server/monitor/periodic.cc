@@ -1,6 +1,10 @@
 #include "server/monitor/periodic.h"
 
+#include <spdlog/spdlog.h>
+
 #include <utility>
+
+#include "proto/base/status.h"
 
 namespace relmap::monitor {
 
@@ -27,7 +31,11 @@ void Periodic::run() {
   while (!stopping_) {
     hurried_ = false;
     lock.unlock();
-    work_();
+    try {
+      work_();
+    } catch (const std::exception&) {
+      spdlog::error("{}", caught_status().to_string());
+    }
     lock.lock();
     changed_.wait_for(mutex_, interval_, [this]() RELMAP_REQUIRES(mutex_) { return stopping_ || hurried_; });
   }

@@ -11,7 +11,7 @@ namespace relmap::monitor {
 
 class Periodic {
  public:
-  // Calls `work` at once and then after each interval, until it is destroyed. `work` must not throw.
+  // Calls `work` at once and then after each interval, until it is destroyed. An exception of `work` is logged.
   Periodic(std::chrono::milliseconds interval, std::function<void()> work);
   // Waits for the call that runs.
   ~Periodic();

@@ -63,8 +63,8 @@ void ServiceManager::serves(std::function<State()> state) {
     const MutexLock lock(mutex_);
     phase_ = Phase::kServing;
     state_ = std::move(state);
+    send("READY=1\n");  // before the thread tells anything of this phase
   }
-  send("READY=1\n");
   if (thread_) thread_->hurry();
 }
 
@@ -80,6 +80,7 @@ void ServiceManager::stops() {
     if (phase_ == Phase::kStopping) return;
     phase_ = Phase::kStopping;
     state_ = {};
+    told_.clear();
   }
   send("STOPPING=1\nSTATUS=stopping: what is durable is applied and committed\n");
   if (thread_) thread_->hurry();

@@ -119,11 +119,13 @@ struct Daemon::Impl {
   void report() const;
   void reload_access();
   void look_at_certificate();
+  void look_at_disk();
   Status stop();
 
   Config config;  // of the main thread; live settings change
   std::atomic<double> hung_after_s;
   std::atomic<bool> leaving = false;
+  std::atomic<std::uint64_t> free_bytes = UINT64_MAX;  // of the data folder's disk, at the last look
   monitor::ClockWatch clock;
   const BootId boot = SessionUuid::random().bytes;
   const std::int64_t started_us = now_us();
@@ -214,8 +216,9 @@ Status Daemon::Impl::serve() {
   facts.started_us = started_us;
   core = std::make_unique<rpc::Core>(*mapper, facts, config.rpc);
   core->intake.facts = [this] {
+    const intake::IngestStats stats = ingest->stats();  // first: it may wait, and health must not wait for the mutex
     const MutexLock lock(lcm_mutex);
-    return facts_of(ingest->stats(), lcm_refusal);
+    return facts_of(stats, lcm_refusal);
   };
   core->intake.server = ingest.get();
   core->process = [] {
@@ -255,8 +258,8 @@ Status Daemon::Impl::serve() {
   lcm_secret = *secret;
   if (config.insecure && !config.listen.empty())
     spdlog::warn("--insecure: everyone who can reach {} may edit the map", config.listen);
-  if (!options.host.empty() && !config.tls.certificate.empty()) {
-    rpc::log_failed_handshakes();
+  if (!config.tls.certificate.empty() && (!options.host.empty() || !config.http.empty())) {
+    if (!options.host.empty()) rpc::log_failed_handshakes();
     tls_watch = std::make_unique<rpc::TlsWatch>(config.tls);
     options.tls_watch = tls_watch.get();
     look_at_certificate();
@@ -312,6 +315,8 @@ monitor::Signs Daemon::Impl::signs() const {
   monitor::Signs signs;
   signs.map = mapper->progress();
   signs.intake_s = ingest->busy_s();
+  signs.free_bytes = free_bytes;
+  signs.low_water = low_water;
   signs.stopping = leaving;
   signs.hung_after_s = hung_after_s;
   const MutexLock lock(lcm_mutex);
@@ -323,6 +328,7 @@ rpc::HealthFacts Daemon::Impl::health() const {
   rpc::HealthFacts health = monitor::judge(signs());
   health.clock_steps = clock.steps();
   health.clock_step_s = clock.last_step_s();
+  health.clock_step_age_s = clock.last_step_age_s();
   return health;
 }
 
@@ -407,6 +413,10 @@ void Daemon::Impl::look_at_certificate() {
   certificate_problem = state.message();
 }
 
+void Daemon::Impl::look_at_disk() {
+  if (const auto room = storage::posix_file_system()->room(config.data); room.ok()) free_bytes = room->free;
+}
+
 void Daemon::Impl::reload_access() {
   const Status read = gatekeeper->reload_if_changed();
   if (!read.ok() && read.message() != access_problem)
@@ -482,6 +492,7 @@ void Daemon::tick() {
   impl_->core->views.expire();
   impl_->core->routes.found.expire();
   impl_->reload_access();
+  impl_->look_at_disk();
   if (now - impl_->certificate_looked >= kCertificateInterval) impl_->look_at_certificate();
   give_back_free_memory();
   storage::Budget& budget = impl_->mapper->budget();
@@ -506,11 +517,12 @@ std::string Daemon::status_line() const {
 bool Daemon::reload(const Config& fresh) {
   Config& config = impl_->config;
   bool all = true;
+  const std::string former_level = config.log_level;
   for (const Status& refused : adopt_live(fresh, config)) {
     spdlog::error("SIGHUP: {}", refused.to_string());
     all = false;
   }
-  rpc::set_log_level(config.log_level);
+  if (config.log_level != former_level) rpc::set_log_level(config.log_level);  // or as relmap-admin log-level says
   impl_->hung_after_s = config.hung_after_s;
   impl_->ingest->limit(
       {config.max_keyframes_per_s, config.max_new_sessions_per_min, {config.robots.begin(), config.robots.end()}});

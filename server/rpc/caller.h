@@ -13,8 +13,8 @@ namespace relmap::rpc {
 // The texts live as long as the call's context.
 Evidence evidence_of(const grpc::CallbackServerContext& context, const grpc::AuthContext& connection);
 
-// Answers UNAUTHENTICATED to all callers that the gatekeeper does not know. `health`: for all calls but a check of
-// health, where only this machine can call. `gatekeeper` must outlive it.
+// Answers UNAUTHENTICATED to all callers that the gatekeeper does not know. `health`: but for calls of gRPC's health
+// service, for callers of this machine. `gatekeeper` must outlive it.
 std::shared_ptr<grpc::AuthMetadataProcessor> turn_strangers_away(const Gatekeeper& gatekeeper, bool health);
 
 }  // namespace relmap::rpc

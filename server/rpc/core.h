@@ -72,9 +72,9 @@ struct HealthFacts {
   std::vector<ComponentHealth> components;
   // Whether journal, worker and intake make progress. If not, only a new start helps.
   bool live = true;
-  // Steps of the system's clock since the start, and the last of them, in seconds.
+  // Steps of the system's clock since the start, and the last of them: by how many seconds, and how long ago.
   std::uint64_t clock_steps = 0;
-  double clock_step_s = 0;
+  double clock_step_s = 0, clock_step_age_s = 0;
 
   // Whether keyframes are taken in and questions answered.
   bool ready() const {

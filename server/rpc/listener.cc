@@ -120,17 +120,26 @@ sockaddr_storage address_of(int socket) {
   return address;
 }
 
+bool is_loopback(const sockaddr_storage& address) {
+  constexpr std::uint8_t kLoopbackNet = 127;
+  if (address.ss_family == AF_INET6) {
+    const in6_addr& six = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
+    return IN6_IS_ADDR_LOOPBACK(&six) || (IN6_IS_ADDR_V4MAPPED(&six) && six.s6_addr[12] == kLoopbackNet);
+  }
+  return address.ss_family == AF_INET &&
+         ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr) >> 24 == kLoopbackNet;
+}
+
 }  // namespace
 
 bool ListeningSocket::is_v6() const { return address_of(fd_).ss_family == AF_INET6; }
 
-bool ListeningSocket::is_local() const {
-  const sockaddr_storage address = address_of(fd_);
-  if (address.ss_family == AF_INET6)
-    return IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<const sockaddr_in6&>(address).sin6_addr);
-  constexpr std::uint32_t kLoopbackNet = 127;
-  return address.ss_family == AF_INET &&
-         ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr) >> 24 == kLoopbackNet;
+bool ListeningSocket::is_local() const { return is_loopback(address_of(fd_)); }
+
+bool is_of_this_machine(int connection) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  return getpeername(connection, reinterpret_cast<sockaddr*>(&address), &size) == 0 && is_loopback(address);
 }
 
 std::uint16_t ListeningSocket::port() const {

@@ -21,6 +21,9 @@ namespace relmap::rpc {
 // The number of a group of users. BAD_CONFIG: there is none of this name.
 Result<gid_t> group_of(const std::string& name);
 
+// Whether the other end of a TCP connection is on this machine, which it is not if that cannot be told.
+bool is_of_this_machine(int connection);
+
 // A socket that listens. Closed when destroyed, and its file removed.
 class ListeningSocket {
  public:

@@ -8,10 +8,9 @@
 #include <grpcpp/security/tls_credentials_options.h>
 #include <sys/stat.h>
 
-#include <algorithm>
-#include <atomic>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "frontend/vision/picture.h"
@@ -65,16 +64,13 @@ std::shared_ptr<grpc::ServerCredentials> tls_credentials(const TlsFiles& files) 
   return grpc::experimental::TlsServerCredentials(options);
 }
 
-using Acceptor = std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>;
+using Acceptor = std::shared_ptr<grpc::experimental::ExternalConnectionAcceptor>;
 
-Listener::Take hand_over_to(Acceptor acceptor) {
-  return [acceptor = std::shared_ptr<grpc::experimental::ExternalConnectionAcceptor>(std::move(acceptor))](
-             int listening, int connection) {
-    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
-    parameters.listener_fd = listening;
-    parameters.fd = connection;
-    acceptor->HandleNewConnection(&parameters);
-  };
+void hand_over(const Acceptor& acceptor, int listening, int connection) {
+  grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+  parameters.listener_fd = listening;
+  parameters.fd = connection;
+  acceptor->HandleNewConnection(&parameters);
 }
 
 }  // namespace
@@ -96,7 +92,8 @@ struct RpcServer::Impl {
   std::unique_ptr<grpc::Server> server;  // destroyed before the services
   std::unique_ptr<Listener> listener;    // destroyed before the server
   std::uint16_t port = 0;
-  std::atomic<bool> leaving = false;  // nothing is SERVING any more
+  Mutex health_mutex;
+  bool leaving RELMAP_GUARDED_BY(health_mutex) = false;  // nothing is SERVING any more
   bool stopped = true;
 };
 
@@ -124,30 +121,35 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
   builder.SetResourceQuota(
       grpc::ResourceQuota("relmapd").Resize(kTransportBytes + options.connections.total * kConnectionBytes));
   std::vector<Listener::Source> sources;
-  const auto listen_at = [&](std::vector<ListeningSocket> sockets, std::shared_ptr<grpc::ServerCredentials> by) {
-    const Listener::Take take = hand_over_to(builder.experimental().AddExternalConnectionAcceptor(
-        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, std::move(by)));
-    for (ListeningSocket& socket : sockets) sources.push_back({std::move(socket), take});
+  const auto accepted_by = [&](std::shared_ptr<grpc::ServerCredentials> credentials) -> Acceptor {
+    return builder.experimental().AddExternalConnectionAcceptor(
+        grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, std::move(credentials));
   };
   if (!options.socket.empty()) {
     auto socket = ListeningSocket::at_path(options.socket, options.socket_group);
     if (!socket.ok()) return socket.status();
-    std::vector<ListeningSocket> one;
-    one.push_back(std::move(*socket));
-    listen_at(std::move(one), grpc::experimental::LocalServerCredentials(UDS));
+    sources.push_back(
+        {std::move(*socket), [acceptor = accepted_by(grpc::experimental::LocalServerCredentials(UDS))](
+                                 int listening, int connection) { hand_over(acceptor, listening, connection); }});
   }
   if (!options.host.empty()) {
     auto sockets = ListeningSocket::at_host(options.host, options.port);
     if (!sockets.ok()) return sockets.status();
     impl->port = sockets->front().port();
-    std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();
-    if (!options.tls.certificate.empty()) {
-      if (Status sound = check_files(options.tls); !sound.ok()) return sound;
-      credentials = tls_credentials(options.tls);
-      const bool local = std::all_of(sockets->begin(), sockets->end(), [](const auto& one) { return one.is_local(); });
-      credentials->SetAuthMetadataProcessor(turn_strangers_away(gatekeeper, local));
-    }
-    listen_at(std::move(*sockets), std::move(credentials));
+    const bool tls = !options.tls.certificate.empty();
+    if (Status sound = check_files(options.tls); !sound.ok()) return sound;
+    // Callers of this machine, who may ask for health without credentials, and others.
+    const auto acceptor_for = [&](bool here) {
+      std::shared_ptr<grpc::ServerCredentials> credentials =
+          tls ? tls_credentials(options.tls) : grpc::InsecureServerCredentials();
+      if (tls) credentials->SetAuthMetadataProcessor(turn_strangers_away(gatekeeper, here));
+      return accepted_by(std::move(credentials));
+    };
+    const Acceptor here = acceptor_for(true), elsewhere = acceptor_for(false);
+    const Listener::Take take = [here, elsewhere](int listening, int connection) {
+      hand_over(is_of_this_machine(connection) ? here : elsewhere, listening, connection);
+    };
+    for (ListeningSocket& socket : *sockets) sources.push_back({std::move(socket), take});
   }
   for (const auto& service : impl->services) builder.RegisterService(service.get());
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
@@ -163,12 +165,14 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
 std::uint16_t RpcServer::port() const { return impl_->port; }
 
 void RpcServer::set_serving(const std::string& service, bool serving) {
+  const MutexLock lock(impl_->health_mutex);
   if (auto* health = impl_->server->GetHealthCheckService(); health && !impl_->leaving)
     health->SetServingStatus(service, serving);
 }
 
 void RpcServer::announce_stop() {
-  if (impl_->leaving.exchange(true)) return;
+  const MutexLock lock(impl_->health_mutex);
+  if (std::exchange(impl_->leaving, true)) return;
   if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
 }
 

@@ -235,6 +235,25 @@ TEST_F(Server, AnswersHealthAndReflection) {
     EXPECT_THAT(*services, testing::HasSubstr(name));
 }
 
+TEST_F(Server, HealthIsToldOfEachServiceAndGoesFirstInAStop) {
+  const auto health_of = [&](const std::string& service) {
+    return call_raw("/grpc.health.v1.Health/Check",
+                    "\x0a" + std::string(1, static_cast<char>(service.size())) + service)
+        .or_throw();
+  };
+  const std::string serving = "\x08\x01", not_serving = "\x08\x02";
+  EXPECT_EQ(health_of("relmap.v1.Ingest"), serving);
+  server_->set_serving("relmap.v1.Ingest", false);
+  EXPECT_EQ(health_of("relmap.v1.Ingest"), not_serving);
+  EXPECT_EQ(health_of("relmap.v1.Map"), serving);
+  server_->announce_stop();
+  server_->set_serving("relmap.v1.Map", true);
+  EXPECT_EQ(health_of("relmap.v1.Map"), not_serving) << "nothing takes that back";
+  EXPECT_EQ(call_raw("/grpc.health.v1.Health/Check", "").or_throw(), not_serving);
+  v1::GetFrameReply frame;
+  EXPECT_TRUE(get_frame({1, 1}, &frame).ok()) << "nobody is turned away yet";
+}
+
 TEST_F(Server, CallsBeyondTheLimitsAreRefusedAtOnce) {
   Core crowded(*map_.mapper, map_.core->facts, {.max_pictures = 0});
   const auto server = RpcServer::start(crowded, everyone_, {.host = "127.0.0.1"}).or_throw();

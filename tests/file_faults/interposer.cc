@@ -385,7 +385,7 @@ ssize_t faulty_write(int fd, std::size_t size, const Write& write) {
     return -1;
   }
   if (!faulty(FaultKind::kWrite)) return write(size);
-  if (errno != ENOSPC || size < 2) return -1;
+  if (errno != ENOSPC || size < 2 || control->lasting != 0) return -1;  // there is no room at all
   const ssize_t n = write(size / 2);
   if (n > 0) full = fd;
   return n;

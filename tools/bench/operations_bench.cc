@@ -142,8 +142,11 @@ void faults(const std::string& folder, Report& report) {
   {
     WatchedDaemon watched(folder + "/clock", 1);
     watched.faults().set_clock(3600);
+    report.add("clock_health_s",
+               until("clock", [&] { return watched.page("/readyz").body.find("clock: set") != std::string::npos; }),
+               "a clock that is set: until /readyz says so");
     report.add("clock_metrics_s", until("clock", [&] { return watched.sample("relmap_clock_steps_total") == 1; }),
-               "a clock that is set: until the metrics say so");
+               "then until the metrics do");
   }
   WatchedDaemon watched(folder + "/kill", 1);
   watched.daemon().process().signal(SIGKILL);

@@ -141,8 +141,8 @@ good. If one cannot be removed, the command fails, with the new backup made. The
 kept, BACKUP must belong to this user alone, and a daemon must be one of this machine and user.
 
 Examples:
-  relmap-admin backup /var/lib/relmap /backup/map-monday
-  relmap-admin backup /var/lib/relmap /backup --keep 7
+  relmap-admin backup /var/lib/relmap/map /backup/map-monday
+  relmap-admin backup /var/lib/relmap/map /backup --keep 7
   relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday)");
   command->callback([&action, asked] { action = [asked](Context& context) { return back_up_map(*asked, context); }; });
 }

@@ -28,20 +28,20 @@ Exit codes:
   130  interrupted
 
 Examples:
-  relmap-admin stats /var/lib/relmap
-  relmap-admin verify /var/lib/relmap
-  relmap-admin backup /var/lib/relmap /backup/map-monday
+  relmap-admin stats /var/lib/relmap/map
+  relmap-admin verify /var/lib/relmap/map
+  relmap-admin backup /var/lib/relmap/map /backup/map-monday
   relmap-admin --server map.example:50070 --credentials anna.pem backup /backup/map-monday
-  relmap-admin backup /var/lib/relmap /backup --keep 7
+  relmap-admin backup /var/lib/relmap/map /backup --keep 7
   relmap-admin drill /backup
-  relmap-admin restore /backup/map-monday /var/lib/relmap
-  relmap-admin migrate /var/lib/relmap --check
-  relmap-admin repair /var/lib/relmap
-  relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab
+  relmap-admin restore /backup/map-monday /var/lib/relmap/map
+  relmap-admin migrate /var/lib/relmap/map --check
+  relmap-admin repair /var/lib/relmap/map
+  relmap-admin reindex /var/lib/relmap/map --vocabulary campus.vocab
   relmap-admin credentials ca /etc/relmap/credentials --host map.example
   relmap-admin credentials new /etc/relmap/credentials cart-1 --role robot --out cart-1.pem
   relmap-admin explain DISK_FULL         # what it means, and what to do; alerts, too
-  relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')";
+  relmap-admin --json verify /var/lib/relmap/map | jq -r 'select(.finding).finding.message')";
 
 void declare(CLI::App& app, Context& context, Action& action) {
   app.footer(kFooter);

@@ -39,7 +39,7 @@ void add_compact(CLI::App& app, Action& action) {
 RocksDB gives space back by itself, but late. This command does it at once; a daemon may keep running.
 
 Examples:
-  relmap-admin compact /var/lib/relmap)");
+  relmap-admin compact /var/lib/relmap/map)");
   command->callback(
       [&action, directory] { action = [directory](Context& context) { return compact_map(*directory, context); }; });
 }

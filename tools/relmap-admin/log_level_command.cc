@@ -37,7 +37,7 @@ void add_log_level(CLI::App& app, Action& action) {
 The level holds until it is changed again, the daemon reads its settings again (SIGHUP) or is started again.
 
 Examples:
-  relmap-admin log-level /var/lib/relmap debug
+  relmap-admin log-level /var/lib/relmap/map debug
   relmap-admin --server map.example:50070 --credentials anna.pem log-level info)");
   command->callback([&action, asked] { action = [asked](Context& context) { return change_level(*asked, context); }; });
 }

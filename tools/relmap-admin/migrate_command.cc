@@ -34,8 +34,8 @@ Answer damage_or(const Status& status) { return {status, status.reason() == Reas
 Answer check_migration(const std::string& directory, Context& context) {
   if (Status there = check_map(directory); !there.ok()) return {there, false, {}};
   namespace fs = std::filesystem;
-  const fs::path folder = fs::weakly_canonical(fs::absolute(directory) / "");
-  const auto scratch = ScratchFolder::make(folder.parent_path().parent_path().string());
+  const fs::path folder = fs::canonical(directory);
+  const auto scratch = ScratchFolder::make(folder.parent_path().string());
   if (!scratch.ok()) return {scratch.status(), false, {}};
   const auto tried = storage::rehearse_migration(
       directory, (*scratch)->path(), [&](const char* step, std::uint64_t done, std::uint64_t total) {
@@ -105,8 +105,8 @@ removes it: it tells whether the migration succeeds, how long it takes and how m
 would not be sound, or not the same.
 
 Examples:
-  relmap-admin migrate /var/lib/relmap --check
-  relmap-admin migrate /var/lib/relmap)");
+  relmap-admin migrate /var/lib/relmap/map --check
+  relmap-admin migrate /var/lib/relmap/map)");
   command->callback([&action, asked] {
     action = [asked](Context& context) {
       if (!context.server.empty()) throw CLI::ValidationError("migrate works on a folder, not on a daemon");

@@ -89,8 +89,8 @@ Exit codes:
   130  interrupted
 
 Examples:
-  relmap-admin reindex /var/lib/relmap
-  relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab)");
+  relmap-admin reindex /var/lib/relmap/map
+  relmap-admin reindex /var/lib/relmap/map --vocabulary campus.vocab)");
   command->callback([&action, directory, vocabulary] {
     action = [directory, vocabulary](Context& context) { return reindex_map(*directory, *vocabulary, context); };
   });

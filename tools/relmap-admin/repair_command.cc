@@ -113,7 +113,7 @@ Exit codes:
   3  some data are lost; the summary lists them
 
 Examples:
-  relmap-admin repair /var/lib/relmap)");
+  relmap-admin repair /var/lib/relmap/map)");
   command->callback(
       [&action, directory] { action = [directory](Context& context) { return repair_map(*directory, context); }; });
 }

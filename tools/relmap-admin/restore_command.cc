@@ -71,7 +71,7 @@ daemon that the map was restored. They send again what they still have of the ke
 the others as gaps. A folder that was copied by hand is taken for the map itself, and robots do neither.
 
 Examples:
-  relmap-admin restore /backup/map-monday /var/lib/relmap)");
+  relmap-admin restore /backup/map-monday /var/lib/relmap/map)");
   command->callback([&action, asked] { action = [asked](Context& context) { return restore(*asked, context); }; });
 }
 

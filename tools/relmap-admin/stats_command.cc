@@ -93,8 +93,8 @@ void add_stats(CLI::App& app, Action& action) {
   command->add_option("DIR", *directory, "data folder")->type_name("FOLDER");
   command->footer(R"(
 Examples:
-  relmap-admin stats /var/lib/relmap
-  relmap-admin --json stats /var/lib/relmap | jq .garbage_bytes)");
+  relmap-admin stats /var/lib/relmap/map
+  relmap-admin --json stats /var/lib/relmap/map | jq .garbage_bytes)");
   command->callback(
       [&action, directory] { action = [directory](Context& context) { return show_stats(*directory, context); }; });
 }

@@ -58,7 +58,9 @@ Result<Target> open_target(const Context& context, const std::string& directory,
     target.engine = std::move(*engine);
     return target;
   }
-  if (engine.reason() != Reason::FOLDER_LOCKED) return engine.status();
+  // A folder that is another user's may have a daemon that this user may ask.
+  const bool others = engine.reason() == Reason::IO_ERROR && client::resolve_server(directory).ok();
+  if (engine.reason() != Reason::FOLDER_LOCKED && !others) return engine.status();
   auto daemon = connect_daemon(context, directory);
   if (!daemon.ok())
     return Status(Reason::FOLDER_LOCKED,

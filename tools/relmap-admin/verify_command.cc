@@ -76,8 +76,8 @@ Exit codes:
   3  something was found
 
 Examples:
-  relmap-admin verify /var/lib/relmap
-  relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')");
+  relmap-admin verify /var/lib/relmap/map
+  relmap-admin --json verify /var/lib/relmap/map | jq -r 'select(.finding).finding.message')");
   command->callback([&action, asked] { action = [asked](Context& context) { return verify_map(*asked, context); }; });
 }
 

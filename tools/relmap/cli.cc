@@ -29,7 +29,7 @@ Exit codes:
   5  ingest: everything is in the map, but some of it cannot be trusted
 
 Examples:
-  relmap --server /var/lib/relmap status
+  relmap --server /var/lib/relmap/map status
   relmap --server map.example:50070 --credentials anna.pem sessions
   relmap top                             # robots, sessions, worker, memory, once a second
   relmap session freeze survey-2026      # takes no more keyframes, and is not adjusted any more
@@ -50,7 +50,8 @@ Examples:
   relmap export --format tum --out map.tum     # relaxed, a file for each connected part
   relmap map --out map.png --from 1:0 --to kitchen)";
 
-constexpr char kServiceFolder[] = "/run/relmap";  // where the service of the package has its socket
+// Of the package: its service, and where that has its socket while it runs.
+constexpr char kServiceUnit[] = "/lib/systemd/system/relmapd.service", kServiceFolder[] = "/run/relmap";
 
 struct GlobalOptions {
   std::string server, credentials;
@@ -68,7 +69,7 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
                                 "runs as a service: /run/relmap)")
                      ->type_name("FOLDER|HOST:PORT")
                      ->envname("RELMAP_SERVER");
-  if (std::error_code error; std::filesystem::is_directory(kServiceFolder, error))
+  if (std::error_code error; std::filesystem::exists(kServiceUnit, error))
     options.server = kServiceFolder;
   else
     server->required();
@@ -115,7 +116,10 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   if (const auto where = client::resolve_server(options.server);
       where.ok() && where->is_socket() && !options.credentials.empty() && (!usual || options.credentials != usual))
     err << "the credentials are not used: whoever can open the socket of " << options.server << " is an operator\n";
-  const auto client = client::Client::connect(options.server, client_options);
+  std::error_code error;
+  const bool stopped = options.server == kServiceFolder && !std::filesystem::is_directory(kServiceFolder, error);
+  const auto client = stopped ? Status(Reason::UNREACHABLE, "relmapd does not run (systemctl status relmapd)")
+                              : client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();
   if (!status.ok()) err << status.to_string() << '\n';
   if (!console.json && app.got_subcommand("status"))
