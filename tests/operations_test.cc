@@ -96,13 +96,21 @@ class Operations : public ::testing::Test {
     return found == samples.end() ? -1 : found->second;
   }
   // Sends a drive of a few keyframes in the background; waits for it at the end.
-  std::unique_ptr<Process> robot(const RunningDaemon& daemon, const std::string& name) {
+  std::unique_ptr<Process> robot(const RunningDaemon& daemon, const std::string& name,
+                                 const std::string& rate = "max") {
     if (!fs::exists(folder_ / "drive"))
       record_simulation(folder_ / "drive", {"--seed", "1", "--pairs", "20", "--laps", "0.1"});
     return std::make_unique<Process>(
         std::vector<std::string>{built_program("relmap-frontend"), folder_ / "drive", "--robot", name, "--session",
-                                 name, "--server", daemon.address(), "--spool", "none", "--quiet"},
+                                 name, "--server", daemon.address(), "--spool", "none", "--quiet", "--rate", rate},
         ProcessOptions{});
+  }
+  // The same, a keyframe or two a second, once the first of them are in the map.
+  std::unique_ptr<Process> slow_robot(const RunningDaemon& daemon, const std::string& name) {
+    const double before = sample(daemon, "relmap_frames");
+    auto sending = robot(daemon, name, "2");
+    EXPECT_TRUE(wait_until([&] { return sample(daemon, "relmap_frames") > before + 1; })) << daemon.log();
+    return sending;
   }
   static std::string made(const std::string& path) {
     fs::create_directories(path);
@@ -139,8 +147,8 @@ TEST_F(Operations, ADiskThatHangsShowsAndPasses) {
   RunningDaemon daemon(options());
   const auto first = robot(daemon, "cart");
   ASSERT_EQ(first->wait(kPatience), 0);
+  const auto second = slow_robot(daemon, "dolly");
   faults_.fail_from_now_on(FaultKind::kSync, 0, kForever);
-  const auto second = robot(daemon, "dolly");
   EXPECT_TRUE(wait_until([&] { return page(daemon, "/readyz").find("storage: STALLED: ") != std::string::npos; }))
       << page(daemon, "/readyz");
   EXPECT_EQ(http_get(daemon.http(), "/readyz").status, 503);
@@ -239,8 +247,8 @@ TEST_F(Operations, SystemdHearsHowTheDaemonIs) {
   EXPECT_TRUE(manager.hears("RELOADING=1"));
   EXPECT_TRUE(manager.hears("READY=1"));
   // The journal hangs: the watchdog is not fed any more, so systemd would start the daemon again.
+  const auto sent = slow_robot(daemon, "cart");
   faults_.fail_from_now_on(FaultKind::kSync, 0, kForever);
-  const auto sent = robot(daemon, "cart");
   EXPECT_TRUE(manager.hears("storage: STALLED"));
   EXPECT_TRUE(wait_until([&] { return http_get(daemon.http(), "/livez").status == 503; }));
   manager.forget();
@@ -262,8 +270,9 @@ TEST_F(Operations, SettingsChangeWhileTheDaemonRunsOrAreRefusedByName) {
   EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP: NEEDS_RESTART: rpc.threads stays 4 until the daemon is started again; "
                                       "3 was read"));
   EXPECT_THAT(daemon.log(), HasSubstr("NEEDS_RESTART: rba.window stays 8"));
-  const auto sent = robot(daemon, "cart");
+  EXPECT_TRUE(daemon.client()->status().ok());
   EXPECT_TRUE(wait_until([&] { return daemon.log().find("[debug]") != std::string::npos; }));
+  const auto sent = robot(daemon, "cart");
   EXPECT_TRUE(wait_until([&] { return sample(daemon, "relmap_keyframes_refused_total{reason=\"NOT_ALLOWED\"}") > 0; }))
       << "only the robot nobody may send now";
   sent->kill();
@@ -340,8 +349,8 @@ TEST_F(Operations, TheSocketMayLieOutsideOfTheMap) {
 // What a load balancer sees of a stop: not ready before anybody is turned away.
 TEST_F(Operations, ADaemonThatStopsSaysSoFirst) {
   RunningDaemon daemon(options());
+  const auto sent = slow_robot(daemon, "cart");
   faults_.fail_from_now_on(FaultKind::kSync, 0, kForever);
-  const auto sent = robot(daemon, "cart");
   EXPECT_TRUE(wait_until([&] { return faults_.hanging(); }));
   const std::string http = daemon.http();
   daemon.process().signal(SIGTERM);

@@ -394,7 +394,8 @@ std::string sample_config() {
   std::string text =
       "# The settings of relmapd, with their defaults. Remove the # before those that you change. `relmapd --config "
       "FILE\n"
-      "# --check-config` tells whether the daemon could start with the file, and --print-config what would be in force.\n";
+      "# --check-config` tells whether the daemon could start with the file, and --print-config what would be in "
+      "force.\n";
   for (const Setting& one : settings()) {
     std::string meaning = one.key == "data" ? "DIR: " + one.meaning : one.meaning;
     if (meaning.front() >= 'a' && meaning.front() <= 'z') meaning.front() = static_cast<char>(meaning.front() - 32);

@@ -157,6 +157,8 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const Gatekeeper
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   impl->server = builder.BuildAndStart();
   if (!impl->server) return Status(Reason::INTERNAL, "gRPC cannot start a server");
+  for (const char* service : {"", "relmap.v1.Map", "relmap.v1.Ingest", "relmap.v1.Admin"})
+    if (auto* health = impl->server->GetHealthCheckService()) health->SetServingStatus(service, true);
   impl->stopped = false;
   impl->listener = std::make_unique<Listener>(std::move(sources), impl->connections);
   return std::unique_ptr<RpcServer>(new RpcServer(std::move(impl)));
