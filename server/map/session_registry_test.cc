@@ -49,8 +49,10 @@ class SessionRegistryTest : public ::testing::Test {
     if (!journal_takes_.ok()) return journal_takes_;
     journalled_.push_back(std::move(record));
     const std::uint64_t sequence = journalled_.size();
-    if (!journal_waits_) done(sequence);
-    if (journal_waits_) {
+    const bool waits = journal_waits_;  // once: it is set by another thread
+    if (!waits) {
+      done(sequence);
+    } else {
       const std::lock_guard lock(waiting_mutex_);
       waiting_.emplace_back(sequence, std::move(done));
     }
