@@ -18,6 +18,7 @@ constexpr std::uint32_t kRouteFrames = 200;  // of the robot's motion, to the fr
 constexpr std::size_t kEnoughFeatures = 40;  // for a frame to be recognised by them
 constexpr std::size_t kComparedSessions = 1000;
 constexpr std::int64_t kBeside = 5;  // frames from one to another of the same place
+constexpr double kNear_m = 10;       // what is seen from a place is seen from so far, too
 constexpr double kSamePose = 1e-6;   // metres and radians: answers are rounded to doubles of another form
 
 client::Session session_of(const storage::Session& stored) {
@@ -241,10 +242,13 @@ Status ask_place(client::Client& daemon, const KnownFrame& known, QuestionCounts
   const auto matches = daemon.match_image(view);
   if (!matches.ok()) return matches.status();
   ++counts.places;
-  // A place is named by one of its frames: that of the question, or one beside it.
+  // A place is named by one of its frames: that of the question, one beside it, or one of another time that the map's
+  // closures join to it.
   const bool recognised = std::any_of(matches->places.begin(), matches->places.end(), [&](const auto& place) {
     const auto apart = std::int64_t{place.frame.index} - std::int64_t{known.id.index};
-    return place.frame.session == known.id.session && std::abs(apart) <= kBeside;
+    if (place.frame.session == known.id.session && std::abs(apart) <= kBeside) return true;
+    const auto between = daemon.transform_between(known.id, place.frame);
+    return between.ok() && between->T_ab.t.norm() <= kNear_m;
   });
   if (recognised) return {};
   return differs("place of what frame " + known.id.to_string() + " saw",
