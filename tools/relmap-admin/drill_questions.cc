@@ -242,11 +242,11 @@ Status ask_place(client::Client& daemon, const KnownFrame& known, QuestionCounts
   const auto matches = daemon.match_image(view);
   if (!matches.ok()) return matches.status();
   ++counts.places;
-  // A place is named by one of its frames: that of the question, one beside it, or one of another time that the map's
-  // closures join to it.
+  // A place is named by one of its frames: that of the question, one beside it, or one of another session that the
+  // map's closures join to it.
   const bool recognised = std::any_of(matches->places.begin(), matches->places.end(), [&](const auto& place) {
     const auto apart = std::int64_t{place.frame.index} - std::int64_t{known.id.index};
-    if (place.frame.session == known.id.session && std::abs(apart) <= kBeside) return true;
+    if (place.frame.session == known.id.session) return std::abs(apart) <= kBeside;
     const auto between = daemon.transform_between(known.id, place.frame);
     return between.ok() && between->T_ab.t.norm() <= kNear_m;
   });
