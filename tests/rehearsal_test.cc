@@ -292,6 +292,10 @@ TEST_F(DrillTest, AGoodBackupPassesAndIsNotTouched) {
   EXPECT_EQ(newest.document.at("backup"), backups_ + "/" + names(backups_).back());
   EXPECT_THAT(names(backups_), SizeIs(1));
 
+  const Run beside = run_admin({"drill", backup_, "--questions", "5", "--keep-scratch"});
+  EXPECT_EQ(beside.exit_code, kFine) << beside.said;
+  EXPECT_EQ(fs::path(std::string(beside.document.at("scratch"))).parent_path(), fs::canonical(backup_).parent_path());
+
   const Run kept = drill(backup_, {"--keep-scratch"});
   EXPECT_EQ(kept.exit_code, kFine) << kept.said;
   EXPECT_EQ(run_admin({"verify", std::string(kept.document.at("scratch")) + "/map"}).exit_code, kFine);

@@ -242,7 +242,7 @@ class Drill {
 
 std::string scratch_parent(const DrillAsked& asked) {
   if (!asked.scratch.empty()) return asked.scratch;
-  const std::string beside = fs::weakly_canonical(fs::absolute(asked.backup) / "").parent_path().parent_path().string();
+  const std::string beside = parent_of(asked.backup);
   return ::access(beside.c_str(), W_OK | X_OK) == 0 ? beside : fs::temp_directory_path().string();
 }
 

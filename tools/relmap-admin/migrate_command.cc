@@ -1,4 +1,3 @@
-#include <filesystem>
 #include <memory>
 
 #include "storage/migrate/migrate.h"
@@ -33,9 +32,7 @@ Answer damage_or(const Status& status) { return {status, status.reason() == Reas
 // Beside the map, where the migration itself would work.
 Answer check_migration(const std::string& directory, Context& context) {
   if (Status there = check_map(directory); !there.ok()) return {there, false, {}};
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::canonical(directory);
-  const auto scratch = ScratchFolder::make(folder.parent_path().string());
+  const auto scratch = ScratchFolder::make(parent_of(directory));
   if (!scratch.ok()) return {scratch.status(), false, {}};
   const auto tried = storage::rehearse_migration(
       directory, (*scratch)->path(), [&](const char* step, std::uint64_t done, std::uint64_t total) {

@@ -55,6 +55,8 @@ void remove_leftovers(const std::string& parent) {
 
 }  // namespace
 
+std::string parent_of(const std::string& folder) { return fs::canonical(folder).parent_path().string(); }
+
 Result<std::unique_ptr<ScratchFolder>> ScratchFolder::make(const std::string& parent) {
   remove_leftovers(parent);
   std::string path = fs::absolute(parent).lexically_normal().string();

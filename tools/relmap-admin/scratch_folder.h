@@ -9,6 +9,9 @@
 
 namespace relmap::admin {
 
+// The folder in which `folder`, which must exist, stands: what is copied beside it may share its files.
+std::string parent_of(const std::string& folder);
+
 class ScratchFolder {
  public:
   // Makes the folder `parent`/relmap-scratch-XXXXXX, and removes those that killed rehearsals of this user left there.
