@@ -24,6 +24,9 @@ constexpr std::array kTable{
     Entry{"Map.GetFrame", Role::kReader},
     Entry{"Map.ListSessions", Role::kReader},
     Entry{"Map.ListEdges", Role::kReader},
+    Entry{"Map.ExplainEdge", Role::kReader},
+    Entry{"Map.GetClosureMatrix", Role::kReader},
+    Entry{"Map.GetSkeleton", Role::kReader},
     Entry{"Map.SetEdgeState", Role::kOperator},
     Entry{"Map.ProposeEdge", Role::kOperator},
     Entry{"Map.SetLabel", Role::kOperator},
@@ -45,6 +48,7 @@ constexpr std::array kTable{
     Entry{"Admin.SetLogLevel", Role::kOperator},
     Entry{"Admin.FreezeSession", Role::kOperator},
     Entry{"Admin.DeleteSession", Role::kOperator},
+    Entry{"Admin.ListAudit", Role::kOperator},
 };
 
 }  // namespace

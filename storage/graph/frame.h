@@ -50,6 +50,10 @@ struct EdgeEvent {
   Reason reason = Reason::LONE;
   EdgeId cause;      // the closure whose proposal or edit caused it: itself, or one that agrees or conflicts with it
   std::string note;  // the operator's
+  // When the record was submitted, UTC, and by whom; 0 and empty: not known. They say how the map came about and not
+  // what it is, so they are no part of its hash.
+  std::int64_t time_us = 0;
+  std::string author = {};
 
   bool operator==(const EdgeEvent&) const = default;
 };

@@ -17,11 +17,22 @@
 
 namespace relmap::storage {
 
+// When a record was submitted, and by whom. It says how the map came about and not what it is: no hash and no comparison
+// of maps depends on it.
+struct Submission {
+  std::int64_t time_us = 0;  // UTC; 0: not known
+  std::string author;        // the name in the caller's credentials; empty: a robot's own stream, or the daemon itself
+
+  bool operator==(const Submission&) const = default;
+};
+inline constexpr std::size_t kMaxAuthorBytes = 128;
+
 // From here on the session `header.uuid` has the number `number`.
 struct SessionRecord {
   SessionNumber number = 0;
   std::string display_name;
   SessionHeader header;
+  Submission submitted = {};
 };
 
 struct KeyframeRecord {
@@ -70,6 +81,7 @@ struct ClosureProposalRecord {
   ClosureId unseen = {};                    // valid: the query has seen nothing of this one's place, as in UnseenRecord
   Extensions unknown = {};                  // from a later version, kept unchanged
   EditKey edit = {};                        // of an operator's proposal
+  Submission submitted = {};
 };
 
 // Landmarks that were seen again by projection along an accepted closure, without a new place (docs/method.md, 2).
@@ -102,6 +114,7 @@ struct SetEdgeStateRecord {
   std::uint64_t shown = 0;
   Extensions unknown = {};  // from a later version, kept unchanged
   EditKey edit = {};
+  Submission submitted = {};
 };
 struct SetLabelRecord {
   FrameId frame;
@@ -109,6 +122,7 @@ struct SetLabelRecord {
   bool present = true;      // false: the label is removed
   Extensions unknown = {};  // from a later version, kept unchanged
   EditKey edit = {};
+  Submission submitted = {};
 };
 
 // The robot ended its session, or an operator changed its state.
@@ -117,6 +131,7 @@ struct SetSessionStateRecord {
   SessionState state = SessionState::kOpen;  // kOpen thaws a frozen session to what it was before (before_frozen)
   Extensions unknown = {};                   // from a later version, kept unchanged
   EditKey edit = {};                         // of an operator's change
+  Submission submitted = {};
 };
 
 // Removes `chunk`, the last one of a session that is being deleted, from the map (server/map/deletion.h).
