@@ -19,7 +19,7 @@ struct ClosureDigest {
   Reason reason = Reason::LONE;
   Verification verification = Verification::kNone;
   bool carries = false;
-  SE3 T_ab;                        // the estimate, as floats
+  SE3 T_ab = {};                   // the estimate, as floats
   float translation_variance = 0;  // traces of the two blocks of its covariance: m^2, rad^2
   float rotation_variance = 0;
 
@@ -33,7 +33,7 @@ struct ClosureDigest {
   bool was_contradicted = false;  // it was outvoted, or contradicted the robot's motion, at some time
   bool decided = false;           // an operator accepted it
   bool carried = false;           // it says that the robot was carried
-  Uniqueness uniqueness;
+  Uniqueness uniqueness = {};
 };
 
 // A frame and its motion.
@@ -41,7 +41,7 @@ struct FrameDigest {
   std::uint32_t slot = 0;
   std::int64_t time_us = 0;
   bool joined = false;             // an odometry or prior edge joins it to the frame before
-  SE3 T_previous_frame;            // along that edge, as floats
+  SE3 T_previous_frame = {};       // along that edge, as floats
   float translation_variance = 0;  // of it: m^2, rad^2
   float rotation_variance = 0;
   float driven_s = 0;
@@ -49,7 +49,7 @@ struct FrameDigest {
   bool carried = false;     // closures in force say that the robot was carried along it
   MotionSource source = MotionSource::kStart;
   bool labelled = false;
-  std::vector<ClosureDigest> closures;  // stored with the frame, ascending by ordinal
+  std::vector<ClosureDigest> closures = {};  // stored with the frame, ascending by ordinal
 };
 
 struct ChunkDigest {

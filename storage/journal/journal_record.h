@@ -17,8 +17,8 @@
 
 namespace relmap::storage {
 
-// When a record was submitted, and by whom. It says how the map came about and not what it is: no hash and no comparison
-// of maps depends on it.
+// When a record was submitted, and by whom. It says how the map came about and not what it is: no hash and no
+// comparison of maps depends on it.
 struct Submission {
   std::int64_t time_us = 0;  // UTC; 0: not known
   std::string author;        // the name in the caller's credentials; empty: a robot's own stream, or the daemon itself
