@@ -28,6 +28,7 @@
 #include "server/rpc/metrics.h"
 #include "server/rpc/tls_files.h"
 #include "server/rpc/token_keeper.h"
+#include "server/rpc/watch_feed.h"
 
 namespace relmap::rpc {
 
@@ -142,11 +143,12 @@ struct Core {
         limits(l),
         routes(facts.boot_id),
         views(facts.boot_id),
-        edits(m.remembered_edits()) {}
+        edits(m.remembered_edits()),
+        feed(WatchFeed::sources_of(mapper, intake)) {}
 
   auto parts() {
     return std::tie(mapper, facts, limits, intake, process, transport, health, routes, metrics, views, edits, imports,
-                    pictures, maintenance);
+                    pictures, maintenance, feed);
   }
 
   map::Mapper& mapper;
@@ -163,6 +165,7 @@ struct Core {
   ImportTurn imports;
   PictureTurn pictures;
   MaintenanceTurn maintenance;
+  WatchFeed feed;
 };
 
 // Calls `handler` with the parts of `core` whose types it names.

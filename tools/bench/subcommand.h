@@ -34,5 +34,6 @@ Run declare_security(CLI::App& app);
 Run declare_storage(CLI::App& app);
 Run declare_unpack(CLI::App& app);
 Run declare_vast(CLI::App& app);
+Run declare_watch(CLI::App& app);
 
 }  // namespace relmap::bench
