@@ -29,7 +29,7 @@ std::string unusual() {
          "lcm.key: \"k\\\"ey\"\nbackup.roots: [/backup, '/other one']\nmemory_budget_mb: 64\ndisk_low_water_mb: 0\n"
          "vocabulary: '123'\nlog_level: debug\nlog_format: json\nhung_after_s: 2.5\ndeterministic: true\nclosures: "
          "false\n"
-         "lookup_threads: 3\ncommit_interval_ms: 10\nrpc.threads: 2\nrpc.max_concurrent: 5\n"
+         "lookup_threads: 3\ncommit_interval_ms: 10\nevents.max_mb: 5\nrpc.threads: 2\nrpc.max_concurrent: 5\n"
          "rpc.max_concurrent_per_caller: 4\nrpc.max_waiting: 3\nrpc.stalled_s: 1.5\nrpc.max_connections: 9\n"
          "rpc.quiet_s: 7\nrpc.max_connections_per_peer: 8\nrpc.max_ingest_streams: 11\n"
          "rpc.max_ingest_streams_per_caller: 12\nrpc.max_watchers: 13\nrpc.max_watchers_per_caller: 6\n"

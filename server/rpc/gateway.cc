@@ -304,6 +304,7 @@ Status Call::admit_caller(std::size_t bytes) {
   auto caller = gateway_.gatekeeper_.identify(evidence_of(*context_, *context_->auth_context()));
   if (!caller.ok()) return caller.status();
   caller_ = std::move(*caller);
+  request_.caller = caller_.name;
   known_peer_ = context_->peer();
   gateway_.connections_.call_begins(known_peer_);
   if (Status may = check_role(caller_); !may.ok()) return may;

@@ -181,7 +181,7 @@ class Call {
   const char* const method_;
   const Lane lane_;
   const std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-  const RequestContext request_;
+  RequestContext request_;
   Identity caller_;
   std::atomic<bool> cancelled_{false};
   Deadline deadline_;

@@ -104,6 +104,7 @@ Result<Next<v1::MapEvent>> MapWatch::next(const Wake& wake, Clock::time_point no
     told();
     if (message) return Next<v1::MapEvent>(std::move(*message));
   }
+  at_ = std::max(at_, through_);
   if (more_ || read_commit_ != committed_.number) return Next<v1::MapEvent>(Waiting{now});
   if (moved_ || now >= heartbeat_) return Next<v1::MapEvent>(caught_up(now));
   return Next<v1::MapEvent>(Waiting{heartbeat_});
@@ -126,6 +127,7 @@ Status MapWatch::read() {
     return go_on_from_now(Reason::VIEW_EXPIRED,
                           "events were lost: they are too old, or this watcher is too slow; list again", at_.sequence);
   }
+  through_ = read->through;
   events_.assign(std::make_move_iterator(read->events.begin()), std::make_move_iterator(read->events.end()));
   return {};
 }

@@ -65,6 +65,7 @@ class MapWatch {
   storage::EventPosition at_;          // everything up to here was told
   std::deque<v1::MapEvent> first_;     // before events of the log, without a token
   std::deque<storage::Event> events_;  // read, and not told yet
+  storage::EventPosition through_;     // where to read on behind these
   std::size_t ranges_told_ = 0;        // of the first of these, if it is frames moved
   bool more_ = true;                   // the log may have more than these
   Committed committed_;                // at the last look

@@ -92,12 +92,14 @@ class ScriptedLog {
               const MutexLock lock(mutex_);
               ++reads_;
               storage::EventsRead read;
+              read.through = after;
               read.gap = after != storage::EventPosition{} && after < forgotten_;
               for (const storage::Event& event : events_) {
                 if (event.at <= after) continue;
                 read.more = read.events.size() == per_read_;
                 if (read.more) break;
                 read.events.push_back(event);
+                read.through = event.at;
               }
               return read;
             },
