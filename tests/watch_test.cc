@@ -209,7 +209,7 @@ class WatchTest : public ::testing::Test {
   }
 
   const storage::TemporaryFolder folder_;
-  const DaemonOptions options_{.data = folder_ / "map", .lcm = ""};
+  const DaemonOptions options_{.data = folder_ / "map", .lcm = "", .more = {}};
   std::unique_ptr<RunningDaemon> daemon_;
 };
 
