@@ -73,7 +73,7 @@ class Follower {
       options.stopped = [this] { return stop_.load(); };
       ended_ = client_->watch(options, [this](const client::WatchEvent& event) {
         const MutexLock lock(mutex_);
-        std::visit([&](const auto& what) { take(what, event); }, event.what);
+        std::visit([&](const auto& what) RELMAP_REQUIRES(mutex_) { take(what, event); }, event.what);
         changed_.notify_all();
         return Status();
       });
