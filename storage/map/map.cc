@@ -53,7 +53,7 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
     impl->state = std::move(*decoded);
   }
   impl->events = EventWriter(events);
-  if (Status told = impl->events.open(snapshot); !told.ok()) return told;
+  if (Status told = impl->events.open(snapshot, impl->state.applied_sequence); !told.ok()) return told;
   Status failed;
   // An edit that cannot be read is forgotten: it is an answer to a question that will hardly be asked.
   throw_if(snapshot.scan(keys::all_edits(), [&](std::string_view key, ByteSpan value) {
