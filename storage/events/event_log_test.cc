@@ -273,6 +273,14 @@ TEST_F(EventLog, AFailedCommitLosesNothing) {
   EXPECT_EQ(read({3, kMovedOrdinal}).events.size(), 2u) << "now it did";
 }
 
+TEST_F(EventLog, ACommitThatIsGivenUpLosesNothing) {
+  record(1);
+  begin();
+  record(2);
+  commit();
+  EXPECT_EQ(sequences(), (std::vector<std::uint64_t>{1, 2}));
+}
+
 TEST_F(EventLog, DamageIsAGapOnce) {
   for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
     record(sequence);

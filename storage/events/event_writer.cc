@@ -108,6 +108,7 @@ std::vector<FrameRange> EventWriter::moved_ranges(const Kept& kept) {
 
 void EventWriter::begin_commit(const EngineSnapshot& snapshot, std::uint64_t applied_sequence, std::int64_t now_us,
                                std::vector<Put>& puts, std::vector<std::string>& deletes) try {
+  failed();  // a commit that was given up before it began
   begun_ = Begun{std::exchange(kept_, {}), has_head_, head_, oldest_};
   // Given back as it was if the commit fails, so the last block is not the one to which this is added.
   std::optional<EventBlock> last;
