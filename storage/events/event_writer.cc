@@ -59,7 +59,8 @@ Result<std::optional<EventWriter::Oldest>> EventWriter::first_behind(const Engin
   const Status scanned = snapshot.scan_from(keys::all_events(), key, [&](std::string_view at, ByteSpan value) {
     const auto last = keys::events_of(at);
     if (!last) return true;
-    found.emplace().last = {last->sequence, last->ordinal};
+    found = Oldest();
+    found->last = {last->sequence, last->ordinal};
     if (const auto header = decode_event_block_header(value); header.ok()) {
       found->time_us = header->time_us;
       found->bytes_before = header->bytes_through - std::min<std::uint64_t>(header->bytes_through, value.size());

@@ -38,8 +38,8 @@ class EventWriter {
   // commit. What is kept from now on goes to the commit after this.
   void begin_commit(const EngineSnapshot& snapshot, std::uint64_t applied_sequence, std::int64_t now_us,
                     std::vector<Put>& puts, std::vector<std::string>& deletes);
-  // The outcome of the commit that was begun. If it failed, what it told is told by the next one; without an outcome, it
-  // failed.
+  // The outcome of the commit that was begun. If it failed, what it told is told by the next one; without an outcome,
+  // it failed.
   void committed();
   void failed();
 
