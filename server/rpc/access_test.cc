@@ -23,6 +23,7 @@
 #include "server/rpc/server.h"
 #include "server/rpc/testing/fleet_credentials.h"
 #include "server/rpc/testing/served_map.h"
+#include "storage/testing/event_follower.h"
 
 namespace relmap::rpc {
 namespace {
@@ -165,6 +166,29 @@ TEST_F(AccessTest, EachRoleMayCallWhatIsForItAndNothingElse) {
       }
     }
   }
+}
+
+TEST_F(AccessTest, AnEditIsOfTheCallerWhomTheCredentialsName) {
+  const auto boss = fleet_.certificate(Role::kOperator, "boss");
+  const auto ann = fleet_.token(Role::kOperator, "ann");
+  start();
+  const auto label = [&](const std::shared_ptr<grpc::Channel>& by) {
+    v1::SetLabelRequest request;
+    *request.mutable_frame() = to_wire(FrameId{1, 7});
+    request.set_label("by " + std::to_string(map_.mapper->stats().durable_sequence));
+    const grpc::Status status = call(by, "/relmap.v1.Map/SetLabel", request.SerializeAsString());
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    (void)map_.mapper->commit(Deadline().at).or_throw();
+    const auto snapshot = map_.mapper->view()->committed();
+    storage::EventFollower follower;
+    follower.follow(*snapshot, std::size_t{1} << 20);
+    for (auto event = follower.events().rbegin(); event != follower.events().rend(); ++event)
+      if (std::holds_alternative<storage::LabelsEvent>(event->content)) return event->submitted.author;
+    return std::string("nobody");
+  };
+  EXPECT_EQ(label(channel(boss)), "boss");
+  EXPECT_EQ(label(channel(ann)), "ann");
+  EXPECT_NE(label(open(socket(), grpc::InsecureChannelCredentials())), "") << "whoever can open it has a name too";
 }
 
 TEST_F(AccessTest, WithoutCredentialsThereIsNothingButHealth) {
