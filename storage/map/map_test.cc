@@ -48,6 +48,34 @@ struct MapTest : ::testing::Test {
   }
 };
 
+TEST_F(MapTest, EventsAreChargedUntilTheyAreCommittedAndSurviveAFailedCommit) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(3), faults).value();
+  epoch = engine->acquire().value();
+  const auto map = open();
+  const std::size_t before = budget->used(Share::kDirty);
+  const auto record = [&](std::uint64_t sequence) {
+    map->record({{sequence, 0}, {}, std::string(1000, 'n'), ClosureRemovedEvent{{{1, 2}, 3}}});
+    map->note_moved({1, 7});
+    map->state().applied_sequence = sequence;
+  };
+  record(1);
+  EXPECT_GT(budget->used(Share::kDirty), before + 1000);
+  EXPECT_EQ(map->dirty_bytes(), budget->used(Share::kDirty) - before);
+  faults->commits = 1;
+  EXPECT_FALSE(map->commit().ok());
+  record(2);
+  EXPECT_GT(budget->used(Share::kDirty), before + 2000);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(budget->used(Share::kDirty), before);
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+  const EventsRead read = read_events(*map->view()->committed(), {}, 1u << 20).value();
+  ASSERT_EQ(read.events.size(), 3u);
+  EXPECT_EQ(read.events[0].at, (EventPosition{1, 0}));
+  EXPECT_EQ(read.events[1].at, (EventPosition{2, 0}));
+  EXPECT_EQ(read.events[2].at, (EventPosition{2, kMovedOrdinal}));
+}
+
 TEST_F(MapTest, SkippedSequencesAreFoundBySequence) {
   auto map = open();
   for (const SessionNumber number : {1u, 2u}) begin(*map, number);
