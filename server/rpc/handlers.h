@@ -61,6 +61,10 @@ class GetStatsRequest;
 class GetStatsReply;
 class CommitRequest;
 class CommitReply;
+class ListAuditRequest;
+class ListAuditReply;
+class GetClosureMatrixRequest;
+class GetClosureMatrixReply;
 }  // namespace relmap::v1
 
 namespace relmap::rpc {
@@ -130,6 +134,8 @@ Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest& request, const De
                                     const ProcessProbe& process, const Transport& transport, const HealthProbe& health,
                                     const Metrics& metrics);
 Result<v1::SetLogLevelReply> change_log_level(const v1::SetLogLevelRequest& request, const Deadline& deadline);
+Result<v1::ListAuditReply> list_audit(const v1::ListAuditRequest& request, const Deadline& deadline,
+                                      map::Mapper& mapper, const Audit& audit);
 Result<v1::CommitReply> commit(const v1::CommitRequest& request, const Deadline& deadline, map::Mapper& mapper);
 
 }  // namespace relmap::rpc
