@@ -300,20 +300,17 @@ FrameDigest as_stored(FrameId id, const FrameDigest& digest) {
   return stored;
 }
 
-void DigestWriter::begin(std::uint32_t slot, std::size_t bytes) {
-  assert(slot < kFramesPerChunk && slots_ >> slot == 0 && bytes > 0);
-  slots_ |= std::uint64_t{1} << slot;
-  put_unsigned(entries_, bytes);
-}
-
 void DigestWriter::add(const FrameDigest& digest) {
   ByteWriter entry;
   put_entry(entry, frame_in(id_, digest.slot), time_us_, digest);
-  copy(digest.slot, entry.bytes());
+  copy(digest.slot, entry.bytes(), !digest.closures.empty());
 }
 
-void DigestWriter::copy(std::uint32_t slot, ByteSpan entry) {
-  begin(slot, entry.size());
+void DigestWriter::copy(std::uint32_t slot, ByteSpan entry, bool closures) {
+  assert(slot < kFramesPerChunk && slots_ >> slot == 0 && !entry.empty());
+  slots_ |= std::uint64_t{1} << slot;
+  closures_ |= std::uint64_t{closures} << slot;
+  put_unsigned(entries_, entry.size());
   entries_.put_bytes(entry);
 }
 
@@ -324,6 +321,7 @@ Bytes DigestWriter::finish() const {
   w.put(id_.chunk);
   w.put(time_us_);
   w.put(slots_);
+  w.put(closures_);
   w.put_bytes(entries_.bytes());
   return seal(kDigestsKind, kDigestsVersion, w.bytes());
 }
@@ -336,6 +334,7 @@ Result<PackedDigests> unpack_digests(ByteSpan record, ChunkId id) {
   PackedDigests packed;
   packed.time_us = r.get<std::int64_t>();
   const auto slots = r.get<std::uint64_t>();
+  packed.closures = r.get<std::uint64_t>();
   if (sealed->kind != kDigestsKind || !r.ok()) return Status(Reason::CORRUPT, "malformed digests");
   if (stored != id)
     return Status(Reason::CORRUPT,
@@ -345,19 +344,21 @@ Result<PackedDigests> unpack_digests(ByteSpan record, ChunkId id) {
     packed.entries[slot] = r.get_bytes(get_count(r));
     if (packed.entries[slot].empty()) return Status(Reason::CORRUPT, "malformed digests");
   }
-  if (!r.at_end()) return Status(Reason::CORRUPT, "malformed digests");
+  if (!r.at_end() || (packed.closures & ~slots) != 0) return Status(Reason::CORRUPT, "malformed digests");
   return packed;
 }
 
-Status decode_digests(ByteSpan record, ChunkId id, ChunkDigest& digests) {
+Status decode_digests(ByteSpan record, ChunkId id, ChunkDigest& digests, DigestsOf which) {
   const auto packed = unpack_digests(record, id);
   if (!packed.ok()) return packed.status();
   digests.id = id;
   std::size_t count = 0;
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
-    if (packed->entries[slot].empty()) continue;
+    if (packed->entries[slot].empty() || (which == DigestsOf::kClosures && !packed->has_closures(slot))) continue;
     if (count == digests.frames.size()) digests.frames.emplace_back();
-    if (!get_entry(packed->entries[slot], frame_in(id, slot), packed->time_us, digests.frames[count++]))
+    FrameDigest& frame = digests.frames[count++];
+    if (!get_entry(packed->entries[slot], frame_in(id, slot), packed->time_us, frame) ||
+        frame.closures.empty() == packed->has_closures(slot))
       return Status(Reason::CORRUPT, "digest of frame " + frame_in(id, slot).to_string());
   }
   digests.frames.resize(count);

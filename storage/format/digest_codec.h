@@ -35,16 +35,14 @@ class DigestWriter {
   DigestWriter(ChunkId id, std::int64_t time_us) : id_(id), time_us_(time_us) {}
   // Slots must ascend.
   void add(const FrameDigest& digest);
-  void copy(std::uint32_t slot, ByteSpan entry);
+  void copy(std::uint32_t slot, ByteSpan entry, bool closures);
   bool empty() const { return slots_ == 0; }
   Bytes finish() const;
 
  private:
-  void begin(std::uint32_t slot, std::size_t bytes);
-
   ChunkId id_;
   std::int64_t time_us_;
-  std::uint64_t slots_ = 0;
+  std::uint64_t slots_ = 0, closures_ = 0;
   ByteWriter entries_;
 };
 
@@ -52,11 +50,14 @@ class DigestWriter {
 struct PackedDigests {
   std::int64_t time_us = 0;                         // of DigestWriter
   std::array<ByteSpan, kFramesPerChunk> entries{};  // by slot; empty: no such frame
+  std::uint64_t closures = 0;                       // bit by slot: whether the entry has closures
+
+  bool has_closures(std::uint32_t slot) const { return (closures >> slot) & 1; }
 };
 // TRUNCATED, CORRUPT (also if it is of another chunk than asked for), UNKNOWN_FORMAT_VERSION.
 Result<PackedDigests> unpack_digests(ByteSpan record, ChunkId id);
 
-// Decodes a record into `digests`, whose memory is used again. Reasons as above.
-Status decode_digests(ByteSpan record, ChunkId id, ChunkDigest& digests);
+// Decodes a record into `digests`, whose memory is used again: all frames, or those with closures. Reasons as above.
+Status decode_digests(ByteSpan record, ChunkId id, ChunkDigest& digests, DigestsOf which = DigestsOf::kAll);
 
 }  // namespace relmap::storage

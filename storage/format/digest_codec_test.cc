@@ -116,7 +116,7 @@ TEST(DigestCodec, EntriesAreCopiedAsTheyAre) {
   ASSERT_TRUE(packed.ok());
   DigestWriter writer(kChunk, packed->time_us);
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-    if (!packed->entries[slot].empty()) writer.copy(slot, packed->entries[slot]);
+    if (!packed->entries[slot].empty()) writer.copy(slot, packed->entries[slot], packed->has_closures(slot));
   EXPECT_EQ(writer.finish(), record);
   EXPECT_TRUE(DigestWriter(kChunk, 5).empty());
 }

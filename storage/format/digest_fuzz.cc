@@ -29,7 +29,7 @@ void read_record(ByteSpan record) {
     must(frame.slot >= next && !packed->entries[frame.slot].empty());
     next = frame.slot + 1;
     again.add(frame);
-    copied.copy(frame.slot, packed->entries[frame.slot]);
+    copied.copy(frame.slot, packed->entries[frame.slot], packed->has_closures(frame.slot));
   }
   ChunkDigest twice, copies;
   must(decode_digests(again.finish(), kChunk, twice).ok() && decode_digests(copied.finish(), kChunk, copies).ok());
@@ -48,7 +48,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   read_record(seal(7, 1, bytes));
   if (size == 0) return 0;
   DigestWriter writer(kChunk, 1'700'000'000'000'000);
-  writer.copy(data[0] % kFramesPerChunk, bytes);
+  writer.copy(data[0] % kFramesPerChunk, bytes, size % 2 == 0);
   read_record(writer.finish());
   return 0;
 }

@@ -21,8 +21,9 @@ bool any_entry(const PackedDigests& digests) {
 // The committed digests of a chunk, with what is dirty of it, to be visited.
 class Merge {
  public:
-  Merge(const DirtyTable& dirty, ChunkId from, const std::function<bool(const ChunkDigest&)>& visit)
-      : next_(std::lower_bound(dirty.begin(), dirty.end(), from,
+  Merge(const DirtyTable& dirty, ChunkId from, DigestsOf which, const std::function<bool(const ChunkDigest&)>& visit)
+      : which_(which),
+        next_(std::lower_bound(dirty.begin(), dirty.end(), from,
                                [](const auto& entry, const ChunkId& key) { return entry.first < key; })),
         end_(dirty.end()),
         visit_(visit) {}
@@ -45,12 +46,13 @@ class Merge {
     }
     return true;
   }
-  static void overlay(ChunkDigest& digests, const DirtyChunk& dirty) {
+  void overlay(ChunkDigest& digests, const DirtyChunk& dirty) const {
     if (dirty.removed) digests.frames.clear();
-    replace_digests(digests, dirty.hot);
+    replace_digests(digests, dirty.hot, which_);
   }
   bool give(const ChunkDigest& digests) { return going_ = going_ && (digests.frames.empty() || visit_(digests)); }
 
+  const DigestsOf which_;
   DirtyTable::const_iterator next_, end_;
   const std::function<bool(const ChunkDigest&)>& visit_;
   bool going_ = true;
@@ -65,7 +67,7 @@ std::optional<Bytes> digest_record(ChunkId id, const PackedDigests& before, cons
     if (edited[slot]) {
       if (edited[slot]->present) writer.add(digest_of(frame_in(id, slot), *edited[slot]));
     } else if (!before.entries[slot].empty()) {
-      writer.copy(slot, before.entries[slot]);
+      writer.copy(slot, before.entries[slot], before.has_closures(slot));
     }
   }
   if (writer.empty()) return std::nullopt;
@@ -82,18 +84,19 @@ HotFrames readable_frames(const PackedPart<FrameHot>& part) {
   return frames;
 }
 
-void replace_digests(ChunkDigest& digests, const HotFrames& edited) {
+void replace_digests(ChunkDigest& digests, const HotFrames& edited, DigestsOf which) {
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (!edited[slot]) continue;
     const auto at = std::lower_bound(digests.frames.begin(), digests.frames.end(), slot,
                                      [](const FrameDigest& frame, std::uint32_t s) { return frame.slot < s; });
     const bool there = at != digests.frames.end() && at->slot == slot;
-    if (!edited[slot]->present) {
+    const FrameId id = frame_in(digests.id, slot);
+    FrameDigest digest = digest_of(id, *edited[slot]);
+    if (!edited[slot]->present || (which == DigestsOf::kClosures && digest.closures.empty())) {
       if (there) digests.frames.erase(at);
       continue;
     }
-    const FrameId id = frame_in(digests.id, slot);
-    FrameDigest digest = as_stored(id, digest_of(id, *edited[slot]));
+    digest = as_stored(id, digest);
     if (there)
       *at = std::move(digest);
     else
@@ -102,14 +105,15 @@ void replace_digests(ChunkDigest& digests, const HotFrames& edited) {
 }
 
 void visit_digests(const EngineSnapshot& snapshot, bool recorded, const std::shared_ptr<Budget>& budget,
-                   const DirtyTable& dirty, ChunkId from, const std::function<bool(const ChunkDigest&)>& visit) {
-  Merge merge(dirty, from, visit);
+                   const DirtyTable& dirty, ChunkId from, DigestsOf which,
+                   const std::function<bool(const ChunkDigest&)>& visit) {
+  Merge merge(dirty, from, which, visit);
   ChunkDigest digests;
   if (recorded) {
     throw_if(snapshot.scan_from(keys::all_digests(), keys::digests(from), [&](std::string_view key, ByteSpan record) {
       const auto id = keys::digests_of(key);
       if (!id) return true;
-      if (const Status decoded = decode_digests(record, *id, digests); !decoded.ok())
+      if (const Status decoded = decode_digests(record, *id, digests, which); !decoded.ok())
         throw StatusError(Status(Reason::DATA_LOSS, "digests of chunk " + id->to_string() + ": " + decoded.to_string() +
                                                         "; relmap-admin repair makes them anew"));
       return merge.take(digests);
@@ -118,7 +122,7 @@ void visit_digests(const EngineSnapshot& snapshot, bool recorded, const std::sha
     scan_hot_parts(snapshot, from, budget, [&](const PackedPart<FrameHot>& part) {
       digests.id = part.id();
       digests.frames.clear();
-      replace_digests(digests, readable_frames(part));
+      replace_digests(digests, readable_frames(part), which);
       return merge.take(digests);
     });
   }

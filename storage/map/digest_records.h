@@ -21,13 +21,14 @@ std::optional<Bytes> digest_record(ChunkId id, const PackedDigests& before, cons
 // The frames of a part that can be read: digests say nothing of the others, which `verify` names.
 HotFrames readable_frames(const PackedPart<FrameHot>& part);
 
-// Replaces the digests of the frames that are set in `edited`.
-void replace_digests(ChunkDigest& digests, const HotFrames& edited);
+// Replaces the digests of the frames that are set in `edited`. Of `kClosures`, frames without any are left out.
+void replace_digests(ChunkDigest& digests, const HotFrames& edited, DigestsOf which);
 
-// Visits the digests of all chunks with frames from `from` on, ascending, until `visit` returns false: those of the
-// snapshot with what is dirty on top of it. `recorded`: the snapshot's records are right; otherwise its frames are
+// Visits the digests of all chunks with such frames from `from` on, ascending, until `visit` returns false: those of
+// the snapshot with what is dirty on top of it. `recorded`: the snapshot's records are right; otherwise its frames are
 // read. Throws StatusError (IO_ERROR; DATA_LOSS naming the chunk whose record is damaged).
 void visit_digests(const EngineSnapshot& snapshot, bool recorded, const std::shared_ptr<Budget>& budget,
-                   const DirtyTable& dirty, ChunkId from, const std::function<bool(const ChunkDigest&)>& visit);
+                   const DirtyTable& dirty, ChunkId from, DigestsOf which,
+                   const std::function<bool(const ChunkDigest&)>& visit);
 
 }  // namespace relmap::storage

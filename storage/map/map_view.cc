@@ -85,11 +85,12 @@ std::vector<std::string> MapView::labels(const std::string& prefix) const {
   return labels_beginning(*impl_->snapshot, *impl_->labels, prefix);
 }
 
-Status MapView::visit_digests(ChunkId from, const std::function<bool(const ChunkDigest&)>& visit) const {
+Status MapView::visit_digests(ChunkId from, const std::function<bool(const ChunkDigest&)>& visit,
+                              DigestsOf which) const {
   try {
     impl_->check_alive();
     relmap::storage::visit_digests(*impl_->snapshot, impl_->digests_hold, impl_->cache->budget(), *impl_->dirty, from,
-                                   [&](const ChunkDigest& digests) {
+                                   which, [&](const ChunkDigest& digests) {
                                      impl_->check_alive();
                                      return visit(digests);
                                    });

@@ -36,15 +36,30 @@ inline DigestsByChunk digests_of_frames(const Graph& graph) {
   return all;
 }
 
+// Also compares them with what is visited if only closures are asked for.
 inline DigestsByChunk digests_visited(const MapView& view, ChunkId from = {}) {
-  DigestsByChunk all;
+  DigestsByChunk all, closures;
   ChunkId last;
   throw_if(view.visit_digests(from, [&](const ChunkDigest& digests) {
     if (!(last < digests.id) || digests.frames.empty()) throw std::logic_error("digests out of order, or none");
     last = digests.id;
     all[digests.id] = digest_bytes(digests);
+    ChunkDigest with_closures = digests;
+    std::erase_if(with_closures.frames, [](const FrameDigest& frame) { return frame.closures.empty(); });
+    if (!with_closures.frames.empty()) closures[digests.id] = digest_bytes(with_closures);
     return true;
   }));
+  throw_if(view.visit_digests(
+      from,
+      [&](const ChunkDigest& digests) {
+        const auto expected = closures.find(digests.id);
+        if (expected == closures.end() || expected->second != digest_bytes(digests))
+          throw std::logic_error("other closures than in all digests");
+        closures.erase(expected);
+        return true;
+      },
+      DigestsOf::kClosures));
+  if (!closures.empty()) throw std::logic_error("closures missing");
   return all;
 }
 
