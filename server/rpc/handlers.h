@@ -92,6 +92,8 @@ Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& reque
                                             map::Mapper& mapper, ViewKeeper& views);
 Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const Deadline& deadline,
                                       map::Mapper& mapper, ViewKeeper& views, const RpcLimits& limits);
+Result<v1::GetClosureMatrixReply> get_closure_matrix(const v1::GetClosureMatrixRequest& request,
+                                                     const Deadline& deadline, map::Mapper& mapper, ViewKeeper& views);
 // Verifies at most two pairs of frames, from the features that are kept: no picture is decoded.
 Result<v1::ExplainEdgeReply> explain_edge(const v1::ExplainEdgeRequest& request, const Deadline& deadline,
                                           map::Mapper& mapper, const RpcLimits& limits);

@@ -18,7 +18,7 @@ using varint::put_signed;
 using varint::put_unsigned;
 
 // A field added to one of these must be added here, to agree() and to the tests.
-static_assert(sizeof(ClosureDigest) == 200 && sizeof(FrameDigest) == 160);
+static_assert(sizeof(ClosureDigest) == 208 && sizeof(FrameDigest) == 160);
 
 constexpr std::uint8_t kDigestsKind = 7;
 constexpr std::uint16_t kDigestsVersion = 1;
@@ -156,9 +156,23 @@ void get_uniqueness(ByteReader& r, Uniqueness& u, FrameId near) {
   u.changed = get_as<std::uint16_t>(r);
 }
 
+void put_tests(ByteWriter& w, const ClosureTests& tests) {
+  put_unsigned(w, tests.opposing);
+  w.put(static_cast<std::uint8_t>(tests.motion));
+  put_real<3>(w, tests.motion_sigma);
+}
+
+void get_tests(ByteReader& r, ClosureTests& tests) {
+  tests.opposing = get_as<std::uint16_t>(r);
+  tests.motion = static_cast<MotionSays>(r.get<std::uint8_t>());
+  tests.motion_sigma = get_real<3>(r);
+}
+
 void put_closure(ByteWriter& w, FrameId id, const ClosureDigest& c) {
-  w.put(static_cast<std::uint8_t>(flags_of(c.carries, c.was_contradicted, c.decided, c.carried, c.uniqueness.known) |
-                                  static_cast<std::uint8_t>(c.kind) << 6));
+  const bool tested = c.tests != ClosureTests();
+  w.put(static_cast<std::uint8_t>(
+      flags_of(c.carries, c.was_contradicted, c.decided, c.carried, c.uniqueness.known, tested) |
+      static_cast<std::uint8_t>(c.kind) << 6));
   w.put(static_cast<std::uint8_t>(static_cast<std::uint8_t>(c.state) | static_cast<std::uint8_t>(c.verification) << 4));
   put_unsigned(w, c.id.ordinal);
   put_unsigned(w, static_cast<std::uint64_t>(c.reason));
@@ -175,6 +189,7 @@ void put_closure(ByteWriter& w, FrameId id, const ClosureDigest& c) {
   put_unsigned(w, c.unseen);
   put_real<3>(w, c.tension);
   if (c.uniqueness.known) put_uniqueness(w, c.uniqueness, id);
+  if (tested) put_tests(w, c.tests);
 }
 
 bool get_closure(ByteReader& r, FrameId id, ClosureDigest& c) {
@@ -203,9 +218,11 @@ bool get_closure(ByteReader& r, FrameId id, ClosureDigest& c) {
   c.tension = get_real<3>(r);
   c.uniqueness = {};
   if (flags & 16) get_uniqueness(r, c.uniqueness, id);
+  c.tests = {};
+  if (flags & 32) get_tests(r, c.tests);
   return r.ok() && c.kind >= EdgeKind::kOdometry && c.kind <= EdgeKind::kPrior && c.state >= EdgeState::kCandidate &&
          c.state <= EdgeState::kRemoved && c.verification <= Verification::kCompounded && reason <= 0xffff &&
-         is_reason(static_cast<std::uint16_t>(reason)) && (flags & 32) == 0;
+         is_reason(static_cast<std::uint16_t>(reason)) && c.tests.motion <= MotionSays::kContradicts;
 }
 
 void put_entry(ByteWriter& w, FrameId id, std::int64_t time_us, const FrameDigest& d) {
@@ -275,7 +292,8 @@ bool agree(const ClosureDigest& a, const ClosureDigest& b) {
          near(a.spread, b.spread, kEvidence) && a.agreeing == b.agreeing && a.unseen == b.unseen &&
          (near(a.tension, b.tension, kTension) || std::max(a.tension, b.tension) < kNoTension) &&
          a.was_contradicted == b.was_contradicted && a.decided == b.decided && a.carried == b.carried &&
-         agree(a.uniqueness, b.uniqueness);
+         agree(a.uniqueness, b.uniqueness) && a.tests.opposing == b.tests.opposing &&
+         a.tests.motion == b.tests.motion && near(a.tests.motion_sigma, b.tests.motion_sigma, kEvidence);
 }
 
 }  // namespace
