@@ -145,6 +145,7 @@ class OldClient : public ::testing::TestWithParam<std::string> {
          {"session_uuid: '0123456789abcdef' robot: 'graph' name: 'imported' "
           "frames { odom_from_frame { rotation { w: 1 } translation { } } time_us: 1000000 } "
           "frames { odom_from_frame { rotation { w: 1 } translation { z: 1 } } time_us: 2000000 driven_us: 1000000 }"}},
+        {"Map/GetClosureMatrix", {"sessions: 1"}},
         {"Map/FindLabels", {""}},
         {"Map/WatchMap", {""}},
         {"Map/ListRobots", {""}},
@@ -156,6 +157,7 @@ class OldClient : public ::testing::TestWithParam<std::string> {
         {"Admin/Compact", {""}},
         {"Admin/Reindex", {""}},
         {"Admin/GetStats", {""}},
+        {"Admin/ListAudit", {"page_size: 3"}},
         {"Admin/WaitIdle", {""}},
         {"Admin/Commit", {""}},
         {"Admin/SetLogLevel", {"level: 'debug'"}},
@@ -226,11 +228,13 @@ TEST_P(OldClient, ReadsTheReasonOfEveryFailure) {
       {"Map/ProposeEdge", {"a { session: 1 index: 5 } b { session: 1 index: 5 }"}},
       {"Map/SetLabel", {"frame { session: 1 index: 7 } label: ' '"}},
       {"Map/ImportGraph", {"session_uuid: 'short'"}},
+      {"Map/GetClosureMatrix", {"sessions: 9"}},
       {"Map/FindLabels", {"page_token: 'not one'"}},
       {"Map/Export", {"format: EXPORT_FORMAT_TUM sessions: 9"}},
       {"Admin/Repair", {""}},
       {"Admin/Backup", {"folder: 'relative'"}},
       {"Admin/Reindex", {""}},
+      {"Admin/ListAudit", {"page_token: 'not one'"}},
       {"Admin/FreezeSession", {"session: 9 frozen: true"}},
       {"Admin/DeleteSession", {"session: 1 uuid: 'of another'"}},
   };
