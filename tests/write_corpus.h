@@ -38,6 +38,7 @@ inline Bytes cut(Bytes bytes, std::size_t off) {
 void write_journal_segments(const std::string& root);
 void write_journal_records(const std::string& root);
 void write_chunks(const std::string& root);
+void write_event_blocks(const std::string& root);
 void write_raw_logs(const std::string& root);
 void write_keyframe_logs(const std::string& root);
 void write_keyframe_files(const std::string& root);

@@ -317,12 +317,26 @@ int main(int argc, char** argv) try {
     std::fprintf(stderr, "usage: write_corpus FOLDER\n");
     return 2;
   }
-  for (const auto write :
-       {write_spool, write_places, write_routes, write_manifest, write_salvage, write_format1, write_requests,
-        testing::write_journal_segments, testing::write_journal_records, testing::write_chunks, testing::write_raw_logs,
-        testing::write_keyframe_logs, testing::write_keyframe_files, testing::write_keyframes,
-        testing::write_ingest_parts, testing::write_lcm_messages, testing::write_questions, testing::write_edits,
-        testing::write_replies})
+  for (const auto write : {write_spool,
+                           write_places,
+                           write_routes,
+                           write_manifest,
+                           write_salvage,
+                           write_format1,
+                           write_requests,
+                           testing::write_journal_segments,
+                           testing::write_journal_records,
+                           testing::write_chunks,
+                           testing::write_event_blocks,
+                           testing::write_raw_logs,
+                           testing::write_keyframe_logs,
+                           testing::write_keyframe_files,
+                           testing::write_keyframes,
+                           testing::write_ingest_parts,
+                           testing::write_lcm_messages,
+                           testing::write_questions,
+                           testing::write_edits,
+                           testing::write_replies})
     write(argv[1]);
   return 0;
 } catch (const std::exception& error) {

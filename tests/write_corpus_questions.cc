@@ -290,6 +290,21 @@ void add_lists(const Corpus& corpus) {
                  .call("FindLabels", labels([](v1::FindLabelsRequest& r) { r.set_prefix("hall"); }))
                  .call("FindLabels", labels([](v1::FindLabelsRequest& r) { r.set_words("north"); }))
                  .bytes());
+  corpus.add("watch", {},
+             Calls()
+                 .call("SetLabel", label(3, "Hall north", false))
+                 .call("WatchMap", with<v1::WatchMapRequest>([](v1::WatchMapRequest& r) {
+                         r.set_from(v1::WATCH_FROM_OLDEST);
+                         r.add_sessions(1);
+                       }))
+                 .call("WatchMap", with<v1::WatchMapRequest>([](v1::WatchMapRequest& r) {
+                         r.set_resume_token(kHeard);
+                         r.set_no_frames(true);
+                       }))
+                 .call("WatchMap", with<v1::WatchMapRequest>([](v1::WatchMapRequest& r) {
+                         r.set_resume_token("1.00112233-4455-6677-8899-aabbccddeeff.1.0.2.3.00000000");
+                       }))
+                 .bytes());
   corpus.add("labels_in_pages", {},
              Calls()
                  .call("SetLabel", with<v1::SetLabelRequest>([](v1::SetLabelRequest& r) {

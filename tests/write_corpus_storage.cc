@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "proto/keyframe/extension_codec.h"
+#include "storage/events/event_block.h"
 #include "storage/format/chunk_codec.h"
 #include "storage/format/digest_codec.h"
 #include "storage/format/extension_tags.h"
 #include "storage/format/frame_codec.h"
+#include "storage/format/sealed.h"
 #include "storage/format/state_codec.h"
 #include "storage/journal/journal_record.h"
 #include "storage/testing/random_frames.h"
@@ -112,6 +114,7 @@ void write_journal_records(const std::string& root) {
   tags::add_before_frozen(all, SessionState::kEnded);
   tags::add_shown(all, 17);
   tags::add_edit_key(all, {"an edit", 1});
+  tags::add_submission(all, 1'700'000'000'000'000, "ann");
   std::sort(all.begin(), all.end(), [](const Extension& a, const Extension& b) { return a.tag < b.tag; });
   const auto extensions = [](const Extensions& list) {
     ByteWriter w;
@@ -213,6 +216,36 @@ void write_chunks(const std::string& root) {
   picture.picture.resize(20);
   encode_cold(cold, picture);
   corpus.add("body_cold", {}, cold.bytes());
+}
+
+// Bodies of blocks, which the fuzzer seals, and whole blocks.
+void write_event_blocks(const std::string& root) {
+  const Corpus corpus(root, "event_block_fuzz");
+  RandomFrames random(1);
+  EventBlock all;
+  std::vector<std::size_t> of_kind(std::variant_size_v<EventContent>);
+  EventPosition at;
+  const auto add = [&](const std::string& name, const EventBlock& block) {
+    EventBlockHeader header{1'700'000'000'000'000, {}, {}, 0};
+    const Bytes bytes = encode_event_block(header, block);
+    corpus.add(name, {}, bytes);
+    corpus.add(name + "_body", {}, unseal(bytes, 1, 1).or_throw().body);
+  };
+  for (int i = 0; i < 100; ++i) {
+    at = i % 3 == 0 ? EventPosition{at.sequence + 1, 0} : EventPosition{at.sequence, at.ordinal + 1};
+    const Event event = random.event(at);
+    const std::size_t number = of_kind[event.content.index()]++;
+    if (number > 1) continue;
+    all.add(event);
+    EventBlock one;
+    one.add(event);
+    add("kind_" + std::to_string(event.content.index()) + "_" + std::to_string(number), one);
+  }
+  add("all_kinds", all);
+  const Bytes head = encode_event_head({{3, 0}, {90, kMovedOrdinal}, 4711});
+  corpus.add("head", {}, head);
+  corpus.add("head_body", {}, unseal(head, 1, 1).or_throw().body);
+  corpus.add("head_cut", {}, cut(head, 3));
 }
 
 }  // namespace relmap::testing

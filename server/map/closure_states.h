@@ -9,6 +9,7 @@
 
 #include "server/map/closures.h"
 #include "storage/graph/frame_range.h"
+#include "storage/journal/journal_record.h"
 
 namespace relmap::map {
 
@@ -22,9 +23,10 @@ struct StateChange {
 
 // What causes changes of state.
 struct Cause {
-  std::uint64_t sequence;  // of the journal record
-  EdgeId closure;          // the closure that was proposed or edited
-  std::string note = {};   // an operator's
+  std::uint64_t sequence;              // of the journal record
+  EdgeId closure;                      // the closure that was proposed or edited
+  std::string note = {};               // an operator's
+  storage::Submission submitted = {};  // of the record
 };
 
 // Adds an event to the edge's history, which keeps at most kMaxEvents. The note goes only to the closure that the

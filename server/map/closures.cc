@@ -160,13 +160,16 @@ void ClosureChange::append(const ClosureChange& next) {
   add(out_of_force, next.out_of_force);
   add(lone, next.lone);
   add(gone, next.gone);
+  add(deleted, next.deleted);
+  add(stand_in, next.stand_in);
   sort_unique(seeds);
 }
 
 void add_event(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
   if (edge.history.size() >= storage::kMaxEvents) edge.history.erase(edge.history.begin() + 1);
-  edge.history.push_back(
-      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+  edge.history.push_back({cause.sequence, state, reason, cause.closure,
+                          edge.id == cause.closure ? cause.note : std::string(), cause.submitted.time_us,
+                          cause.submitted.author});
 }
 
 ClosureChange change_states(storage::EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
@@ -466,7 +469,11 @@ class Judgement {
  public:
   Judgement(storage::EditableGraph& map, std::uint64_t sequence, const storage::ClosureProposalRecord& proposal,
             std::uint32_t spacing, const ConsistencyRules& rules)
-      : map_(map), id_(store_candidate(map, proposal)), cause_{sequence, id_}, spacing_(spacing), rules_(rules) {}
+      : map_(map),
+        id_(store_candidate(map, proposal)),
+        cause_{sequence, id_, {}, proposal.submitted},
+        spacing_(spacing),
+        rules_(rules) {}
 
   ClosureChange run() {
     if (const storage::Edge closure = edge(); place::is_ambiguous(closure.uniqueness, closure.inliers))
@@ -487,7 +494,8 @@ class Judgement {
   storage::Edge edge() const { return *storage::find_edge(map_, id_); }
 
   ClosureChange stays_candidate(Reason reason, EdgeId by) {
-    set_state(*map_.edit_hot(id_.frame).edge(id_), storage::EdgeState::kCandidate, reason, {cause_.sequence, by});
+    set_state(*map_.edit_hot(id_.frame).edge(id_), storage::EdgeState::kCandidate, reason,
+              {cause_.sequence, by, {}, cause_.submitted});
     return {};
   }
 
@@ -666,7 +674,7 @@ ClosureChange apply_proposal(storage::EditableGraph& map, std::uint64_t sequence
 }
 
 ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, const storage::UnseenRecord& record,
-                           std::uint32_t loop_edge_spacing) {
+                           std::uint32_t loop_edge_spacing, const storage::Submission& submitted) {
   const auto closure = storage::find_edge(map, record.closure);
   if (!closure || closure->kind != storage::EdgeKind::kLoop || closure->state != storage::EdgeState::kAccepted ||
       record.frame.session != closure->b.session || record.frame.index <= closure->b.index || !map.hot(record.frame) ||
@@ -684,8 +692,8 @@ ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, 
     unseen.insert(edge->unseen.begin(), edge->unseen.end());
   }
   if (unseen.size() < kMinUnseen || unseen.size() <= set.size() || decided_among(map, set)) return {};
-  return change_states(map, quarantined(map, {}, {}, set, Reason::NOT_SEEN_BEYOND), {sequence, closure->id},
-                       loop_edge_spacing);
+  return change_states(map, quarantined(map, {}, {}, set, Reason::NOT_SEEN_BEYOND),
+                       {sequence, closure->id, {}, submitted}, loop_edge_spacing);
 }
 
 ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record) {

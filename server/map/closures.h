@@ -25,6 +25,8 @@ struct ClosureChange {
   std::vector<EdgeId> out_of_force;  // those of `withdrawn` that were in force
   std::vector<EdgeId> lone;          // stored now, and await confirmation by another closure
   std::vector<storage::Edge> gone;   // were in force, and were deleted with a session (state: removed)
+  std::vector<EdgeId> deleted;       // all that were deleted with a session, whatever their state, ascending
+  std::vector<EdgeId> stand_in;      // bridges over these, and closures that became edges of the graph in their place
 
   // Adds what another change of the same record did after this one.
   void append(const ClosureChange& next);
@@ -44,8 +46,10 @@ ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingR
 // Notes that the frame saw nothing of where the closure leads (unseen.h). When more frames have seen nothing than
 // closures agree, the closure and those that agree with it go out of force (NOT_SEEN_BEYOND), and are no witnesses any
 // more. Changes nothing if the closure is not accepted, or if an operator put one of them into force.
+// `submitted`: of the record.
 ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, const storage::UnseenRecord& record,
-                           std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
+                           std::uint32_t loop_edge_spacing = kLoopEdgeSpacing,
+                           const storage::Submission& submitted = {});
 
 // Adds to `frames` every frame with an observation whose landmark or validity changes through bindings of `closure`, if
 // exactly the closures for which `holds` returns true are in force. `known` holds the landmarks that have been

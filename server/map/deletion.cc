@@ -55,8 +55,11 @@ class Deletion {
       unlink();
       map_.remove_last_chunk(session_.number);
       carry_where_needed(map_, stand_ins_, spacing_, &change_.seeds);
+      for (const EdgeId id : stand_ins_)
+        if (storage::find_edge(map_, id)->carries) change_.stand_in.push_back(id);
       bridge();
     });
+    for (const storage::Edge& edge : closures_) change_.deleted.push_back(edge.id);
     forget_steps(map_, unused);
     sort_unique(change_.seeds);
     return std::move(change_);
@@ -559,10 +562,11 @@ storage::Edge Deletion::add_compounded(storage::Edge edge) {
   edge.verification = storage::Verification::kCompounded;
   storage::FrameHot& hot = map_.edit_hot(edge.b);
   edge.id = {edge.b, hot.next_loop_ordinal++};
-  edge.history.push_back({sequence_, storage::EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
+  edge.history.push_back({sequence_, storage::EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}, 0, {}});
   hot.edges.push_back(edge);
   insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
   ++map_.state().closures_accepted;
+  change_.stand_in.push_back(edge.id);
   return edge;
 }
 

@@ -17,6 +17,7 @@
 #include "storage/graph/binding.h"
 #include "storage/graph/observers.h"
 #include "storage/maintenance/verify.h"
+#include "storage/testing/event_follower.h"
 
 namespace relmap::map {
 namespace {
@@ -127,6 +128,8 @@ class Robots : public ::testing::Test {
     SCOPED_TRACE(when);
     EXPECT_THAT(derived_differences(map()), testing::IsEmpty());
     ASSERT_TRUE(map().commit().ok());
+    follower_.follow(*engine_->snapshot());
+    EXPECT_EQ(follower_.map(), storage::ToldMap::of(map())) << "what the log of events tells";
     std::vector<std::string> findings;
     const auto found = [&](const storage::Finding& finding) {
       findings.push_back(finding.frame.to_string() + " " + finding.what);
@@ -174,6 +177,7 @@ class Robots : public ::testing::Test {
   const sim::PointsWorld world_;
   std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
   std::unique_ptr<PointsDrive> drive_ = std::make_unique<PointsDrive>(engine_);
+  storage::EventFollower follower_;
 };
 
 // Three robots, each with closures to the one before it alone.

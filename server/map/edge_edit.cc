@@ -355,7 +355,7 @@ Status check_edge_edit(const storage::Graph& graph, const storage::SetEdgeStateR
 ClosureChange apply_edge_edit(storage::EditableGraph& map, std::uint64_t sequence,
                               const storage::SetEdgeStateRecord& record, std::uint32_t loop_edge_spacing) {
   if (!check_edge_edit(map, record).ok()) return {};
-  const Cause cause{sequence, record.edge, record.note};
+  const Cause cause{sequence, record.edge, record.note, record.submitted};
   switch (*action_of(record)) {
     case EdgeAction::kRemove:
       return change_states(map, removal(map, record.edge), cause, loop_edge_spacing);

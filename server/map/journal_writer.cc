@@ -7,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "proto/base/clock.h"
 #include "proto/base/mutex.h"
 
 namespace relmap::map {
@@ -27,6 +28,11 @@ std::size_t queue_bytes(const storage::JournalRecord& record) {
 
 }  // namespace
 
+void stamp(storage::JournalRecord& record) {
+  if (storage::Submission* submitted = storage::submission(record); submitted && submitted->time_us == 0)
+    submitted->time_us = now_us();
+}
+
 JournalWriter::JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch,
                              std::shared_ptr<storage::Budget> budget, bool one_at_a_time, OnDurable on_durable,
                              OnIdle on_idle)
@@ -42,6 +48,7 @@ JournalWriter::JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint6
 JournalWriter::~JournalWriter() { stop(); }
 
 Status JournalWriter::submit(storage::JournalRecord record, Done done) {
+  stamp(record);
   const std::size_t bytes = queue_bytes(record);
   const MutexLock lock(mutex_);
   if (stopping_) return {Reason::SHUTTING_DOWN, "the map takes no more records"};

@@ -26,6 +26,9 @@ struct DurableRecord {
   std::size_t bytes = 0;
 };
 
+// Sets when the record was submitted to now, unless it says so or cannot.
+void stamp(storage::JournalRecord& record);
+
 // Thread-safe.
 class JournalWriter {
  public:
@@ -41,8 +44,9 @@ class JournalWriter {
                 bool one_at_a_time, OnDurable on_durable, OnIdle on_idle);
   ~JournalWriter();
 
-  // Queues a record. BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN, or health(); otherwise `done` is called once,
-  // from the writer's thread. Records become durable in the order in which they were submitted, or not at all.
+  // Queues a record, stamped. BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN, or health(); otherwise `done` is
+  // called once, from the writer's thread. Records become durable in the order in which they were submitted, or not at
+  // all.
   Status submit(storage::JournalRecord record, Done done);
 
   // Deterministic mode: tells that record `sequence` and everything that follows from it has been applied.

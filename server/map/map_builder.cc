@@ -6,6 +6,7 @@
 
 #include "server/map/deletion.h"
 #include "server/map/edge_edit.h"
+#include "server/map/event_teller.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/tracks.h"
@@ -65,6 +66,7 @@ void MapBuilder::freeze(const storage::Session& session) { relaxer_.freeze(sessi
 
 Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& record,
                           std::optional<PreparedKeyframe> prepared) {
+  EventTeller events(map_, record);
   Applied applied = std::visit(
       [&](const auto& r) {
         if constexpr (std::is_same_v<std::decay_t<decltype(r)>, storage::KeyframeRecord>)
@@ -82,6 +84,7 @@ Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& 
     state.idle_records = 0;
   state.applied_sequence = sequence;
   map_.publish();
+  events.tell(sequence, record, applied);
   return applied;
 }
 
@@ -211,7 +214,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::ClosureP
   return recorded([&](storage::EditableGraph& map) {
     ClosureChange change = apply_proposal(map, sequence, record, loop_edge_spacing_, rules_);
     if (record.unseen.valid())
-      change.append(apply_unseen(map, sequence, {record.query, record.unseen}, loop_edge_spacing_));
+      change.append(apply_unseen(map, sequence, {record.query, record.unseen}, loop_edge_spacing_, record.submitted));
     return change;
   });
 }

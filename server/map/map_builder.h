@@ -20,7 +20,7 @@ struct Applied {
   std::optional<FrameId> frame;      // the frame that a keyframe became
   std::vector<std::uint32_t> words;  // of that frame
   ClosureChange closures;
-  std::vector<EdgeChange> edges;  // only of closure proposals and an operator's edits
+  std::vector<EdgeChange> edges;  // only of records of closures: proposals, what was not seen, an operator's edits
   rba::RbaSummary relaxation;
   double relax_seconds = 0;  // wall clock, for statistics only
 };
@@ -32,10 +32,10 @@ class MapBuilder {
   MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaOptions rba,
              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing, ConsistencyRules rules = {});
 
-  // Applies the record and publishes the map. Publishing rounds the estimates, so the next record finds the same map
-  // whether it follows at once or after a restart. A record that no longer fits the map (for example a proposal for a
-  // frame that has been deleted) changes nothing.
-  // `prepared`: what prepare() made of a keyframe's record; without it, it is made here.
+  // Applies the record, publishes the map, and records for the log of events what happened (event_teller.h). Publishing
+  // rounds the estimates, so the next record finds the same map whether it follows at once or after a restart. A record
+  // that no longer fits the map (for example a proposal for a frame that has been deleted) changes nothing. `prepared`:
+  // what prepare() made of a keyframe's record; without it, it is made here.
   Applied apply(std::uint64_t sequence, const storage::JournalRecord& record,
                 std::optional<PreparedKeyframe> prepared = {});
 

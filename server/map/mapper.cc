@@ -142,6 +142,7 @@ struct Mapper::Impl {
   CommitScheduler commits{options.commit_interval, engine, budget, commit_hooks()};
   EditAnnouncer edits;
   ClosureAnnouncer closures;
+  CommitAnnouncer commits_told;
 
   std::unique_ptr<storage::Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
@@ -165,9 +166,12 @@ CommitScheduler::Hooks Mapper::Impl::commit_hooks() {
   return {.open_lookups = [this] { return lookups.open_frames(); },
           .on_outcome =
               [this](const Status& outcome) {
-                const MutexLock lock(mutex);
-                if (!failed) storage = outcome;
-                changed.notify_all();
+                {
+                  const MutexLock lock(mutex);
+                  if (!failed) storage = outcome;
+                  changed.notify_all();
+                }
+                if (outcome.ok()) commits_told.announce();
               },
           .on_wait =
               [this](bool waiting) {  // for the disk, which is told by the commit's own time
@@ -214,6 +218,7 @@ DeterministicDriver::Hooks Mapper::Impl::driver_hooks() {
               [this](FrameId frame) {
                 const Clock::time_point begun = Clock::now();
                 auto found = recognition->look_up(*map->view(), frame);
+                for (storage::JournalRecord& record : found) stamp(record);
                 lookup_times.add(Clock::now() - begun);
                 return found;
               },
@@ -231,7 +236,7 @@ Status Mapper::Impl::load() {
     read_only = acquired.status();
   else
     return acquired.status();
-  auto opened = storage::Map::open(engine, epoch, budget);
+  auto opened = storage::Map::open(engine, epoch, budget, options.events);
   if (!opened.ok()) return opened.status();
   map = *std::move(opened);
   if (read_only.ok() && !map->digests_hold()) make_digests();
@@ -678,6 +683,8 @@ Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
 }
 
 void Mapper::watch_closures(ClosureAnnouncer::Watcher watcher) { impl_->closures.watch(std::move(watcher)); }
+
+void Mapper::watch_commits(CommitWatcher watcher) { impl_->commits_told.watch(std::move(watcher)); }
 
 void Mapper::watch_edits(EditAnnouncer::Watcher watcher) {
   const std::uint64_t told = impl_->edits.watch(std::move(watcher));

@@ -42,6 +42,7 @@ struct MapperOptions {
   // The data folder. It is named in messages, and holds the files of the place index. Empty: the index is kept in
   // memory only, within its share.
   std::string folder;
+  storage::EventLimits events = {};  // of the log of events
 };
 
 struct MapperStats {
@@ -99,9 +100,10 @@ class Mapper {
   // As storage::Map::hold_session().
   std::shared_ptr<const void> hold_session(SessionNumber session) const;
 
-  // Queues the record for the journal. If the result is OK, `done` is called once, from the journal thread, with the
-  // record's sequence when it is durable, or with the reason why it is not. Otherwise `done` is not called:
-  // BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN after stop(), or stats().storage while the disk takes nothing.
+  // Queues the record for the journal; a record that can say when it was submitted says now, unless it has a time. If
+  // the result is OK, `done` is called once, from the journal thread, with the record's sequence when it is durable, or
+  // with the reason why it is not. Otherwise `done` is not called: BUDGET_EXCEEDED if the queue is full, SHUTTING_DOWN
+  // after stop(), or stats().storage while the disk takes nothing.
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   Status submit(storage::JournalRecord record, Done done);
   Result<std::uint64_t> submit_and_wait(storage::JournalRecord record);
@@ -134,6 +136,12 @@ class Mapper {
   // at once, from the caller's thread, with all chunks edited since the map was opened. Replaces the watcher; an empty
   // function unregisters it. When this returns, the previous watcher is no longer running.
   void watch_edits(storage::Map::EditWatcher watcher);
+
+  // Calls `watcher` from now on after each commit, once view()->committed() has it. The call comes from the worker's
+  // thread and must neither wait nor call back. Replaces the watcher; an empty function unregisters it. When this
+  // returns, the previous watcher is no longer running.
+  using CommitWatcher = std::function<void()>;
+  void watch_commits(CommitWatcher watcher);
 
   // Lookups seek ways around stops in this map from now on, unless they are deterministic: then the answer must not
   // depend on which cells exist. What `newest` uses must exist until stop() returns.

@@ -10,11 +10,14 @@
 #include <random>
 #include <set>
 #include <span>
+#include <stdexcept>
 #include <thread>
 
+#include "proto/base/clock.h"
 #include "server/map/derived.h"
 #include "server/map/lookup_queue.h"
 #include "server/map/testing/points_drive.h"
+#include "storage/testing/event_follower.h"
 #include "storage/testing/fault_engine.h"
 #include "storage/testing/faulty_files.h"
 #include "storage/testing/forgetful_files.h"
@@ -204,6 +207,85 @@ TEST(Mapper, TheWatcherHearsOfEveryClosureThatIsFoundComesIntoForceOrGoes) {
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     EXPECT_TRUE(heard.empty());
   }
+}
+
+TEST(Mapper, EveryCommitIsToldOnceReadersHaveIt) {
+  const sim::PointsWorld world(small_world(20));
+  const auto mapper = open_mapper(storage::make_memory_engine());
+  std::mutex mutex;
+  std::uint64_t commits = 0, last = 0;
+  mapper->watch_commits([&] {
+    const std::uint64_t number = mapper->view()->committed()->commit_number();
+    const std::lock_guard lock(mutex);
+    EXPECT_GT(number, last);
+    last = number;
+    ++commits;
+  });
+  ASSERT_TRUE(feed(*mapper, world, 0, 20).ok());
+  const std::uint64_t applied = mapper->commit(soon()).or_throw();
+  {
+    const std::lock_guard lock(mutex);
+    EXPECT_GE(commits, 1u);
+    EXPECT_EQ(last, mapper->view()->committed()->commit_number());
+  }
+  EXPECT_EQ(storage::newest_event(*mapper->view()->committed()).or_throw().sequence, applied);
+  mapper->watch_commits([] { throw std::runtime_error("a watcher that fails"); });
+  (void)mapper->commit(soon()).or_throw();
+  mapper->watch_commits({});
+  const std::uint64_t told = commits;
+  (void)mapper->commit(soon()).or_throw();
+  EXPECT_EQ(commits, told);
+}
+
+// As a robot and an operator do, with a stop in between, in a mapper that also finds closures by itself.
+TEST(Mapper, WhenAndByWhomOutlastsARestart) {
+  const sim::PointsWorld world(small_world(90));
+  const auto engine = storage::make_memory_engine();
+  const std::int64_t begun = now_us();
+  EdgeId id;
+  SessionNumber session = 0;
+  storage::MapHash hash;
+  {
+    const auto mapper = open_mapper(engine);
+    ASSERT_TRUE(feed(*mapper, world, 0, 90).ok());
+    session = mapper->view()->sessions().at(0).number;
+    auto proposal = *true_closure(*mapper->view(), world, 62, 60);
+    ASSERT_EQ(proposal.query.session, session);
+    (void)mapper->submit_and_wait(proposal).or_throw();
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    id = mapper->view()->hot(proposal.query)->edges.back().id;
+    storage::SetEdgeStateRecord accept{id, storage::EdgeState::kAccepted, "I was there", true};
+    accept.submitted.author = "ann";
+    (void)mapper->submit_and_wait(accept).or_throw();
+    storage::SetLabelRecord label{{session, 7}, "kitchen"};
+    label.submitted = {123, "bob"};
+    (void)mapper->submit_and_wait(label).or_throw();
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    hash = storage::hash_map(*mapper->view());
+    ASSERT_TRUE(mapper->stop().ok());
+  }
+  const std::int64_t ended = now_us();
+  const auto mapper = open_mapper(engine);
+  EXPECT_EQ(storage::hash_map(*mapper->view()), hash);
+  const auto history = mapper->view()->hot(id.frame)->edge(id)->history;
+  ASSERT_EQ(history.size(), 2u);
+  for (const storage::EdgeEvent& event : history) {
+    EXPECT_GE(event.time_us, begun);
+    EXPECT_LE(event.time_us, ended);
+  }
+  EXPECT_EQ(history[0].author, "") << "nobody: a lookup would have found it";
+  EXPECT_EQ(history[1].author, "ann");
+  storage::EventFollower follower;
+  follower.follow(*mapper->view()->committed());
+  EXPECT_EQ(follower.map(), storage::ToldMap::of(*mapper->view()));
+  const storage::Event& began = follower.events().front();
+  EXPECT_TRUE(std::holds_alternative<storage::SessionEvent>(began.content));
+  EXPECT_GE(began.submitted.time_us, begun);
+  const auto label = std::ranges::find_if(follower.events(), [](const storage::Event& event) {
+    return std::holds_alternative<storage::LabelsEvent>(event.content);
+  });
+  ASSERT_NE(label, follower.events().end());
+  EXPECT_EQ(label->submitted, (storage::Submission{123, "bob"}));
 }
 
 TEST(Mapper, ASessionKeepsItsCalibration) {

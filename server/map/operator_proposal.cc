@@ -14,6 +14,7 @@ Result<std::uint64_t> write_proposal(Mapper& mapper, storage::ClosureProposalRec
                                      const OperatorProposal& proposal, std::chrono::steady_clock::time_point deadline) {
   const FrameId query = found.query, match = found.match;
   if (!proposal.accept) found.edit = proposal.edit;
+  found.submitted.author = proposal.author;
   const auto written = mapper.submit_and_wait(std::move(found));
   if (!written.ok()) return written.status();
   if (Status applied = mapper.wait_applied(*written, deadline); !applied.ok()) return applied;
@@ -25,6 +26,7 @@ Result<std::uint64_t> write_proposal(Mapper& mapper, storage::ClosureProposalRec
   if (Status possible = check_edge_edit(*view, accept); !possible.ok())
     return {possible.reason(), "proposed as " + edge->id.to_string() + ", but: " + possible.message()};
   accept.edit = proposal.edit;
+  accept.submitted.author = proposal.author;
   return mapper.submit_and_wait(std::move(accept));
 }
 

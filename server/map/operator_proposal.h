@@ -17,6 +17,7 @@ struct OperatorProposal {
   bool accept = false;  // the closure is put into force at once
   std::string note;     // of the acceptance
   storage::EditKey edit = {};
+  std::string author = {};  // the operator's name
 };
 
 // Journals the closure that propose_closure() has found and, if it is to be put into force, that edit once the closure

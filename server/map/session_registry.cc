@@ -3,7 +3,9 @@
 #include <future>
 #include <utility>
 
+#include "proto/keyframe/extension_codec.h"
 #include "proto/keyframe/keyframe.h"
+#include "storage/format/extension_tags.h"
 
 namespace relmap::map {
 
@@ -137,6 +139,9 @@ void SessionRegistry::journal(const SessionUuid& uuid, SessionNumber number) {
     const MutexLock lock(mutex_);
     Beginning& session = beginning_.at(uuid);
     record.header = session.header;
+    // When and by whom it was begun is not for a robot to say, and must not be taken for what the record says.
+    for (const std::uint32_t tag : {storage::tags::kWallTime, storage::tags::kAuthor})
+      (void)take_extension(record.header.unknown, tag);
     std::size_t namesakes = index_.namesakes(record.header);
     for (const auto& [other, beginning] : beginning_)
       namesakes += beginning.number != 0 && beginning.header.robot == record.header.robot &&

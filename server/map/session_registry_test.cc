@@ -94,6 +94,14 @@ TEST_F(SessionRegistryTest, ASessionKeepsItsNumberAndIsJournalledOnce) {
   EXPECT_EQ("morning", journalled_[0].display_name);
 }
 
+TEST_F(SessionRegistryTest, WhatARobotSaysOfWhenAndByWhomIsDropped) {
+  SessionHeader forged = header("morning");
+  forged.unknown = {{19, {1}}, {20, {'a', 'n', 'n'}}, {1000, {1}}};
+  sessions_->load(epoch_, *view_);
+  ASSERT_TRUE(sessions_->begin(forged).ok());
+  EXPECT_EQ(journalled_.back().header.unknown, (Extensions{{1000, {1}}}));
+}
+
 TEST_F(SessionRegistryTest, SessionsOfOneNameAreNumbered) {
   sessions_->load(epoch_, *view_);
   sessions_->begin(header("tour")).or_throw();

@@ -52,4 +52,19 @@ void EditAnnouncer::edited(std::uint64_t version, std::span<const storage::Chunk
     untold_.insert(chunks.begin(), chunks.end());
 }
 
+void CommitAnnouncer::watch(Watcher watcher) {
+  const MutexLock lock(mutex_);
+  watcher_ = std::move(watcher);
+}
+
+void CommitAnnouncer::announce() {
+  const MutexLock lock(mutex_);
+  if (!watcher_) return;
+  try {
+    watcher_();
+  } catch (const std::exception& error) {
+    spdlog::warn("a commit is not announced: {}", error.what());
+  }
+}
+
 }  // namespace relmap::map

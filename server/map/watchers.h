@@ -1,4 +1,4 @@
-// The callbacks that are told what the worker changed: one for closures, one for edits.
+// The callbacks that are told what the worker changed: one for closures, one for edits, one for commits.
 #pragma once
 
 #include <cstdint>
@@ -48,6 +48,22 @@ class EditAnnouncer {
       false;  // there has been a watcher: edits are no longer kept for a later one
   std::uint64_t version_ RELMAP_GUARDED_BY(mutex_) = 0;
   std::unordered_set<storage::ChunkId> untold_ RELMAP_GUARDED_BY(mutex_);
+};
+
+// Thread-safe: watch() by any thread, announce() by the worker.
+class CommitAnnouncer {
+ public:
+  using Watcher = std::function<void()>;
+  // Replaces the watcher; an empty function unregisters it. When this returns, the previous watcher is no longer
+  // running.
+  void watch(Watcher watcher);
+
+  // Tells the watcher that a commit has succeeded. Exceptions of the watcher are logged and not passed on.
+  void announce();
+
+ private:
+  Mutex mutex_;
+  Watcher watcher_ RELMAP_GUARDED_BY(mutex_);
 };
 
 }  // namespace relmap::map

@@ -40,6 +40,7 @@ struct Config {
   std::uint64_t disk_low_water_mb = 256;  // with less free disk space nothing is taken in
   std::vector<std::string> backup_roots;  // absolute paths of folders below which backups may be made; empty: nowhere
   std::string vocabulary;                 // file; empty: the shipped one
+  std::uint64_t events_max_mb = 64;       // of the log of events, on disk
   std::string log_level = "info";
   std::string log_format = "auto";  // monitor::log_formats()
   double hung_after_s = 10;         // at one piece of work; then the daemon counts as dead (monitor::judge())

@@ -184,6 +184,7 @@ Status Daemon::Impl::open_map() {
   remove_endpoints();  // left by a daemon that crashed
   map::MapperOptions map_options = config.map;
   map_options.folder = config.data;
+  map_options.events.max_bytes = config.events_max_mb << 20;
   auto opened = map::Mapper::open(*engine, budget, *vocabulary, map_options);
   if (!opened.ok()) return opened.status();
   mapper = std::move(opened).value();

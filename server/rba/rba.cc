@@ -164,6 +164,7 @@ struct Relaxer::Impl {
       const EdgeId id = local.edges[e].id;
       storage::Edge& stored = *map.edit_hot(id.frame).edge(id);
       stored.T_ab = edge.T_ab;
+      if (edge.changed) map.note_moved(id.frame);
       stored.covariance = edge.covariance;
       if (edge.previous >= 0)
         stored.correlation_with_previous =

@@ -154,7 +154,9 @@ TEST_F(AccessTest, EachRoleMayCallWhatIsForItAndNothingElse) {
     for (const auto& [role, shown] : *credentials) {
       const auto by = channel(shown);
       for (const Method& method : all_methods()) {
-        const grpc::Status status = call(by, method.path);
+        // A watch has no end, but with a token that is none it has no beginning either.
+        const std::string request = method.name == "Map.WatchMap" ? std::string("\x12\x01?") : std::string();
+        const grpc::Status status = call(by, method.path, request);
         const Role needed = expected_role(method.name);
         EXPECT_NE(status.error_code(), StatusCode::UNAUTHENTICATED) << method.name << ": " << status.error_message();
         EXPECT_NE(status.error_code(), StatusCode::UNAVAILABLE) << method.name << ": " << status.error_message();

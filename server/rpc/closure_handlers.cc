@@ -9,6 +9,7 @@
 #include "server/rpc/edit_log.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
+#include "server/rpc/request_context.h"
 
 namespace relmap::rpc {
 
@@ -104,13 +105,14 @@ Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request,
   if (Status status = check_note(request.note()); !status.ok()) return status;
   if (request.dry_run()) return propose_dry(mapper, limits, turn, *a, *b, request, deadline);
 
-  const auto written = edits.once(
-      request.idempotency_key(), request.SerializeAsString(), deadline,
-      [&](const storage::EditKey& named) -> Result<std::uint64_t> {
-        auto found = find_closure(*mapper.view(), mapper, turn, *a, *b);
-        if (!found.ok()) return found.status();
-        return map::write_proposal(mapper, *std::move(found), {request.accept(), request.note(), named}, deadline.at);
-      });
+  const auto written =
+      edits.once(request.idempotency_key(), request.SerializeAsString(), deadline,
+                 [&](const storage::EditKey& named) -> Result<std::uint64_t> {
+                   auto found = find_closure(*mapper.view(), mapper, turn, *a, *b);
+                   if (!found.ok()) return found.status();
+                   return map::write_proposal(mapper, *std::move(found),
+                                              {request.accept(), request.note(), named, current_author()}, deadline.at);
+                 });
   if (!written.ok()) return written.status();
   if (Status applied = mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;
   const auto view = mapper.view();

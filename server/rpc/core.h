@@ -28,6 +28,7 @@
 #include "server/rpc/metrics.h"
 #include "server/rpc/tls_files.h"
 #include "server/rpc/token_keeper.h"
+#include "server/rpc/watch_feed.h"
 
 namespace relmap::rpc {
 
@@ -158,11 +159,12 @@ struct Core {
         limits(l),
         routes(facts.boot_id),
         views(facts.boot_id),
-        edits(m.remembered_edits()) {}
+        edits(m.remembered_edits()),
+        feed(WatchFeed::sources_of(mapper, intake)) {}
 
   auto parts() {
     return std::tie(mapper, facts, limits, intake, process, transport, health, routes, metrics, views, edits, imports,
-                    pictures, maintenance, audit);
+                    pictures, maintenance, feed, audit);
   }
 
   map::Mapper& mapper;
@@ -180,6 +182,7 @@ struct Core {
   PictureTurn pictures;
   MaintenanceTurn maintenance;
   Audit audit;
+  WatchFeed feed;
 };
 
 // Calls `handler` with the parts of `core` whose types it names.

@@ -6,6 +6,7 @@
 
 #include "proto/base/crc32c.h"
 #include "proto/base/mutex.h"
+#include "server/rpc/request_context.h"
 
 namespace relmap::rpc {
 
@@ -73,6 +74,7 @@ Status write_and_wait(map::Mapper& mapper, EditLog& edits, const std::string& ke
     auto record = make_record();
     if (!record.ok()) return record.status();
     *storage::edit_key(*record) = named;
+    storage::submission(*record)->author = current_author();
     return mapper.submit_and_wait(std::move(record).value());
   });
   if (!written.ok()) return written.status();

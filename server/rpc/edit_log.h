@@ -41,9 +41,9 @@ class EditLog {
   std::deque<std::string> order_ RELMAP_GUARDED_BY(mutex_);
 };
 
-// Makes an edit durable, and waits until it is applied and visible. Calls `make_record` unless the edit with this key
-// and content was done before, and sets `sequence` to that of the journal record. The reasons are those of
-// `make_record`, EditLog::once(), Mapper::submit() and wait_applied().
+// Makes an edit durable as the caller's, and waits until it is applied and visible. Calls `make_record` unless the edit
+// with this key and content was done before, and sets `sequence` to that of the journal record. The reasons are those
+// of `make_record`, EditLog::once(), Mapper::submit() and wait_applied().
 Status write_and_wait(map::Mapper& mapper, EditLog& edits, const std::string& key, const std::string& content,
                       const Deadline& deadline, const std::function<Result<storage::JournalRecord>()>& make_record,
                       std::uint64_t& sequence);

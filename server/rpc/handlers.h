@@ -48,6 +48,8 @@ class FreezeSessionReply;
 class DeleteSessionRequest;
 class GetStatusRequest;
 class GetStatusReply;
+class WatchMapRequest;
+class MapEvent;
 class ExportRequest;
 class ExportReply;
 class WaitIdleRequest;
@@ -121,6 +123,9 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest& request, const
                                       map::Mapper& mapper, const DaemonFacts& facts, const Routes& routes,
                                       const Intake& intake, const ProcessProbe& process, const Transport& transport,
                                       const HealthProbe& health, const Metrics& metrics);
+// Each watcher reads the committed log of events by itself (map_watch.h).
+Result<LiveProducer<v1::MapEvent>> watch_map(const v1::WatchMapRequest& request, const Deadline& deadline,
+                                             map::Mapper& mapper, WatchFeed& feed);
 Result<Producer<v1::ExportReply>> export_trajectories(const v1::ExportRequest& request, const Deadline& deadline,
                                                       map::Mapper& mapper, ViewKeeper& views);
 Result<v1::WaitIdleReply> wait_idle(const v1::WaitIdleRequest& request, const Deadline& deadline, map::Mapper& mapper);

@@ -5,6 +5,7 @@
 #include "relmap/v1/map.pb.h"
 #include "server/map/graph_piece.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/request_context.h"
 
 namespace relmap::rpc {
 
@@ -59,6 +60,7 @@ Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop)
   const auto covariance = from_wire(loop.covariance());
   if (!covariance.ok()) return covariance.status();
   proposal.covariance = *covariance;
+  proposal.submitted.author = current_author();
   return proposal;
 }
 

@@ -115,8 +115,9 @@ v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us) {
     added.set_reason(to_wire(event.reason));
     *added.mutable_cause() = to_wire(event.cause);
     added.set_note(event.note);
+    if (event.time_us == 0) continue;
     added.set_time_us(event.time_us);
-    added.set_author(event.author);
+    added.set_author(event.author.empty() ? "relmapd" : event.author);  // what no operator did, the daemon did
   }
   tell_suspicion(edge, message);
   message.set_time_us(time_us);

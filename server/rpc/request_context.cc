@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "storage/graph/frame.h"
+
 namespace relmap::rpc {
 
 namespace {
@@ -34,6 +36,8 @@ std::string checked_traceparent(std::string_view text) {
 }
 
 const RequestContext* current_request() { return current; }
+
+std::string current_author() { return current ? current->caller.substr(0, storage::kMaxAuthorBytes) : std::string(); }
 
 RequestScope::RequestScope(const RequestContext& context) : outer_(current) { current = &context; }
 RequestScope::~RequestScope() { current = outer_; }

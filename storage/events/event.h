@@ -3,14 +3,13 @@
 // only what relaxation moved is gathered between two commits.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "proto/base/bytes.h"
-#include "proto/base/status.h"
 #include "storage/graph/frame.h"
 #include "storage/journal/journal_record.h"
 

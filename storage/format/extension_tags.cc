@@ -1,6 +1,8 @@
 #include "storage/format/extension_tags.h"
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "proto/keyframe/extension_codec.h"
 #include "storage/format/codec.h"
@@ -206,6 +208,92 @@ bool take_edit_key(Extensions& extensions, EditKey& edit) {
   edit.content = r.get<std::uint64_t>();
   if (!r.ok() || r.at_end() || bytes->size() > sizeof(edit.content) + kMaxEditKeyBytes) return false;
   edit.key.assign(bytes->begin() + sizeof(edit.content), bytes->end());
+  return true;
+}
+
+void add_submission(Extensions& extensions, std::int64_t time_us, const std::string& author) {
+  if (time_us != 0) {
+    ByteWriter w;
+    w.put(time_us);
+    add_extension(extensions, kWallTime, w.take());
+  }
+  if (!author.empty()) add_extension(extensions, kAuthor, {author.begin(), author.end()});
+}
+
+bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string& author) {
+  if (const auto bytes = take_extension(extensions, kWallTime)) {
+    ByteReader r(*bytes);
+    time_us = r.get<std::int64_t>();
+    if (!r.at_end() || time_us == 0) return false;
+  }
+  if (const auto bytes = take_extension(extensions, kAuthor)) {
+    if (bytes->empty() || bytes->size() > kMaxAuthorBytes) return false;
+    author.assign(bytes->begin(), bytes->end());
+  }
+  return true;
+}
+
+// Events that one record brought about were submitted together, so one entry says it of all of them.
+void add_submissions(Extensions& extensions, const std::vector<EdgeEvent>& history) {
+  ByteWriter times, authors;
+  std::uint64_t timed = 0, authored = 0;  // the last event of each list
+  std::int64_t time_before = 0;
+  const std::string* author_before = nullptr;
+  for (std::size_t i = 0; i < history.size(); ++i) {
+    const EdgeEvent& event = history[i];
+    if (i > 0 && event.journal_sequence == history[i - 1].journal_sequence) continue;
+    if (event.time_us != 0) {
+      varint::put_unsigned(times, event.journal_sequence - timed);
+      varint::put_signed(times, event.time_us - time_before);
+      timed = event.journal_sequence;
+      time_before = event.time_us;
+    }
+    if (!event.author.empty()) {
+      const bool same = author_before && *author_before == event.author;
+      varint::put_unsigned(authors, event.journal_sequence - authored);
+      varint::put_unsigned(authors, same ? 0 : event.author.size());
+      if (!same) authors.put_bytes(as_bytes(event.author));
+      authored = event.journal_sequence;
+      author_before = &event.author;
+    }
+  }
+  if (times.size() > 0) add_extension(extensions, kWallTime, times.take());
+  if (authors.size() > 0) add_extension(extensions, kAuthor, authors.take());
+}
+
+bool take_submissions(Extensions& extensions, std::vector<EdgeEvent>& history) {
+  const auto times = take_extension(extensions, kWallTime), authors = take_extension(extensions, kAuthor);
+  const auto each_of = [&history](std::uint64_t sequence, auto change) {
+    for (EdgeEvent& event : history)
+      if (event.journal_sequence == sequence) change(event);
+  };
+  if (times) {
+    ByteReader r(*times);
+    std::uint64_t sequence = 0, time = 0;
+    while (r.ok() && !r.at_end()) {
+      const std::uint64_t before = std::exchange(sequence, sequence + varint::get_unsigned(r));
+      time += static_cast<std::uint64_t>(varint::get_signed(r));
+      if (sequence < before) return false;
+      each_of(sequence, [&](EdgeEvent& event) { event.time_us = static_cast<std::int64_t>(time); });
+    }
+    if (!r.ok() || times->empty()) return false;
+  }
+  if (authors) {
+    ByteReader r(*authors);
+    std::uint64_t sequence = 0;
+    std::string author;
+    while (r.ok() && !r.at_end()) {
+      const std::uint64_t before = std::exchange(sequence, sequence + varint::get_unsigned(r));
+      const std::size_t length = varint::get_count(r);
+      if (length > 0) {
+        const auto bytes = r.get_bytes(length);
+        author.assign(bytes.begin(), bytes.end());
+      }
+      if (sequence < before || author.empty() || author.size() > kMaxAuthorBytes) return false;
+      each_of(sequence, [&](EdgeEvent& event) { event.author = author; });
+    }
+    if (!r.ok() || authors->empty()) return false;
+  }
   return true;
 }
 

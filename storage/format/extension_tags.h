@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "proto/base/map_identity.h"
@@ -28,9 +29,10 @@ inline constexpr std::uint32_t kEditKey = 31;       // of an edit in the journal
 
 inline constexpr std::uint32_t kDigests = 36;       // of the map's state: the commit as of which its digests are right
 
-// These tags say how the map came about, so map hashes leave them out. The last three are reserved.
+// These tags say how the map came about, so map hashes leave them out. kOwner is reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
-inline constexpr std::uint32_t kOwner = 18, kWallTime = 19, kAuthor = 20;
+inline constexpr std::uint32_t kOwner = 18;
+inline constexpr std::uint32_t kWallTime = 19, kAuthor = 20;  // of edits, and of edges for the events of their history
 inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kAuthor; }
 
 // They write nothing where the value is unknown or the default.
@@ -45,6 +47,8 @@ void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
 void add_digests_commit(Extensions& extensions, std::uint64_t commit);
 void add_edit_key(Extensions& extensions, const EditKey& edit);
+void add_submission(Extensions& extensions, std::int64_t time_us, const std::string& author);
+void add_submissions(Extensions& extensions, const std::vector<EdgeEvent>& history);
 // They return false if the extension is malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
@@ -57,5 +61,8 @@ bool take_before_frozen(Extensions& extensions, SessionState& state);
 bool take_shown(Extensions& extensions, std::uint64_t& shown);
 bool take_digests_commit(Extensions& extensions, std::uint64_t& commit);
 bool take_edit_key(Extensions& extensions, EditKey& edit);
+bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string& author);
+// Of the history as it was read. What is said of an event that it no longer has is dropped.
+bool take_submissions(Extensions& extensions, std::vector<EdgeEvent>& history);
 
 }  // namespace relmap::storage::tags

@@ -82,6 +82,7 @@ Extensions edge_extensions(const Edge& e) {
   tags::add_closure_tests(all, e.tests);
   tags::add_way_around(all, e.around.get());
   tags::add_unseen(all, e.unseen);
+  tags::add_submissions(all, e.history);
   return all;
 }
 
@@ -107,7 +108,7 @@ void get_history(ByteReader& r, Edge& e) {
     const auto state = r.get<EdgeState>();
     const auto reason = static_cast<Reason>(get_unsigned(r));
     const EdgeId cause = varint::get_edge(r, e.id.frame);
-    e.history.push_back({sequence, state, reason, cause, r.get_string()});
+    e.history.push_back({sequence, state, reason, cause, r.get_string(), 0, {}});
   }
 }
 
@@ -202,7 +203,7 @@ Edge get_edge(ByteReader& r, FrameId id) {
     e.unknown = get_extensions(r);
     if (!tags::take_uniqueness(e.unknown, e.uniqueness) || !tags::take_carried(e.unknown, e.carried) ||
         !tags::take_closure_tests(e.unknown, e.tests) || !tags::take_way_around(e.unknown, e.around) ||
-        !tags::take_unseen(e.unknown, e.unseen))
+        !tags::take_unseen(e.unknown, e.unseen) || !tags::take_submissions(e.unknown, e.history))
       spend(r);
   }
   return e;

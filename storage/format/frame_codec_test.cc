@@ -79,7 +79,7 @@ Bytes dumped(const FrameHot& f) {
     if (e.around) dump(w, e.around->from), dump(w, e.around->T), w.put_array(e.around->covariance.data(), 36);
     for (const EdgeEvent& event : e.history) {
       w.put(event.journal_sequence), w.put(event.state), w.put(event.reason), dump(w, event.cause);
-      w.put_string(event.note);
+      w.put_string(event.note), w.put(event.time_us), w.put_string(event.author);
     }
   }
   dump_ids(w, f.incoming);

@@ -46,7 +46,7 @@ std::string escaped(std::string_view label) {
 
 }  // namespace
 
-bool is_known(char first) { return std::string_view("\0msgqhwcvlid", 12).find(first) != std::string_view::npos; }
+bool is_known(char first) { return std::string_view("\0msgqhwcvlide", 13).find(first) != std::string_view::npos; }
 
 std::string map_state() { return "m"; }
 
@@ -83,6 +83,19 @@ std::string_view all_edits() { return "i"; }
 std::optional<std::uint64_t> edit_of(std::string_view key) {
   if (key.size() != 9 || !key.starts_with(all_edits())) return std::nullopt;
   return (std::uint64_t{get_u32(key.substr(1))} << 32) | get_u32(key.substr(5));
+}
+
+std::string events(std::uint64_t sequence, std::uint32_t ordinal) {
+  std::string key(all_events());
+  put_u32(key, static_cast<std::uint32_t>(sequence >> 32));
+  put_u32(key, static_cast<std::uint32_t>(sequence));
+  put_u32(key, ordinal);
+  return key;
+}
+std::string_view all_events() { return "e"; }
+std::optional<EventKey> events_of(std::string_view key) {
+  if (key.size() != 13 || !key.starts_with(all_events())) return std::nullopt;
+  return EventKey{(std::uint64_t{get_u32(key.substr(1))} << 32) | get_u32(key.substr(5)), get_u32(key.substr(9))};
 }
 
 std::string pending(ChunkId id) { return chunk_key(all_pending(), id); }

@@ -43,6 +43,15 @@ std::string edit(std::uint64_t sequence);
 std::string_view all_edits();
 std::optional<std::uint64_t> edit_of(std::string_view key);
 
+// A block of the log of events (storage/events), by the position of its last event; and the log's head.
+std::string events(std::uint64_t sequence, std::uint32_t ordinal);
+std::string_view all_events();  // prefix of all these, and the key of the head
+struct EventKey {
+  std::uint64_t sequence = 0;
+  std::uint32_t ordinal = 0;
+};
+std::optional<EventKey> events_of(std::string_view key);  // nullopt: not a block's key
+
 // A closed chunk's part; while the chunk is open, the prefix of its frames' records.
 std::string part(Part part, ChunkId id);
 // A frame's record: while its chunk is open (hot, warm), or for good (cold, words).

@@ -43,6 +43,8 @@ enum class Verification : std::uint8_t {
 // Whether the closure is metric, so that it may become an edge. An imported one was verified elsewhere, if at all.
 inline bool is_metric(Verification v) { return v != Verification::kNone && v != Verification::kEpipolar; }
 
+inline constexpr std::size_t kMaxAuthorBytes = 128;  // of a name
+
 // A change of the state of a loop closure.
 struct EdgeEvent {
   std::uint64_t journal_sequence = 0;  // of the record that caused it

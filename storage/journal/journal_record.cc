@@ -226,8 +226,19 @@ bool take_extensions(Record&, Extensions) {
   return false;
 }
 
-Extensions extensions_of(const SessionRecord& x) { return header_extensions(x.header); }
-bool take_extensions(SessionRecord& x, Extensions all) { return set_header_extensions(x.header, std::move(all)); }
+void add_submission(Extensions& all, const Submission& x) { tags::add_submission(all, x.time_us, x.author); }
+bool take_submission(Extensions& all, Submission& x) { return tags::take_submission(all, x.time_us, x.author); }
+
+Extensions extensions_of(const SessionRecord& x) {
+  Extensions all = header_extensions(x.header);
+  (void)take_extension(all, tags::kWallTime);  // a robot may have written anything there
+  (void)take_extension(all, tags::kAuthor);
+  add_submission(all, x.submitted);
+  return all;
+}
+bool take_extensions(SessionRecord& x, Extensions all) {
+  return take_submission(all, x.submitted) && set_header_extensions(x.header, std::move(all));
+}
 
 Extensions extensions_of(const ClosureProposalRecord& x) {
   Extensions all = x.unknown;
@@ -235,12 +246,14 @@ Extensions extensions_of(const ClosureProposalRecord& x) {
   tags::add_way_around(all, x.around.get());
   tags::add_unseen_place(all, x.unseen);
   tags::add_edit_key(all, x.edit);
+  add_submission(all, x.submitted);
   return all;
 }
 bool take_extensions(ClosureProposalRecord& x, Extensions all) {
   x.unknown = std::move(all);
   return tags::take_uniqueness(x.unknown, x.uniqueness) && tags::take_way_around(x.unknown, x.around) &&
-         tags::take_unseen_place(x.unknown, x.unseen) && tags::take_edit_key(x.unknown, x.edit);
+         tags::take_unseen_place(x.unknown, x.unseen) && tags::take_edit_key(x.unknown, x.edit) &&
+         take_submission(x.unknown, x.submitted);
 }
 
 Extensions extensions_of(const SetEdgeStateRecord& x) {
@@ -249,6 +262,7 @@ Extensions extensions_of(const SetEdgeStateRecord& x) {
   if (x.alone) add_extension(all, tags::kAlone, {});
   tags::add_shown(all, x.shown);
   tags::add_edit_key(all, x.edit);
+  add_submission(all, x.submitted);
   return all;
 }
 bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
@@ -259,27 +273,30 @@ bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
     return !there || there->empty();
   };
   return take_flag(tags::kDecided, x.decided) && take_flag(tags::kAlone, x.alone) &&
-         tags::take_shown(x.unknown, x.shown) && tags::take_edit_key(x.unknown, x.edit);
+         tags::take_shown(x.unknown, x.shown) && tags::take_edit_key(x.unknown, x.edit) &&
+         take_submission(x.unknown, x.submitted);
 }
 
 Extensions extensions_of(const SetLabelRecord& x) {
   Extensions all = x.unknown;
   tags::add_edit_key(all, x.edit);
+  add_submission(all, x.submitted);
   return all;
 }
 bool take_extensions(SetLabelRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  return tags::take_edit_key(x.unknown, x.edit);
+  return tags::take_edit_key(x.unknown, x.edit) && take_submission(x.unknown, x.submitted);
 }
 
 Extensions extensions_of(const SetSessionStateRecord& x) {
   Extensions all = x.unknown;
   tags::add_edit_key(all, x.edit);
+  add_submission(all, x.submitted);
   return all;
 }
 bool take_extensions(SetSessionStateRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  return tags::take_edit_key(x.unknown, x.edit);
+  return tags::take_edit_key(x.unknown, x.edit) && take_submission(x.unknown, x.submitted);
 }
 
 template <typename Record>

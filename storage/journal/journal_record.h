@@ -25,7 +25,6 @@ struct Submission {
 
   bool operator==(const Submission&) const = default;
 };
-inline constexpr std::size_t kMaxAuthorBytes = 128;
 
 // From here on the session `header.uuid` has the number `number`.
 struct SessionRecord {
@@ -157,6 +156,20 @@ auto edit_key(Record& record) {
       [](auto& r) -> Key* {
         if constexpr (requires { r.edit; })
           return &r.edit;
+        else
+          return nullptr;
+      },
+      record);
+}
+
+// When the record was submitted and by whom, or null if the record does not say so.
+template <typename Record>
+auto submission(Record& record) {
+  using Submitted = std::conditional_t<std::is_const_v<Record>, const Submission, Submission>;
+  return std::visit(
+      [](auto& r) -> Submitted* {
+        if constexpr (requires { r.submitted; })
+          return &r.submitted;
         else
           return nullptr;
       },

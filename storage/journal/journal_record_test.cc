@@ -96,6 +96,38 @@ TEST(JournalRecord, AnEditKeepsItsName) {
   EXPECT_EQ(decode_record(encode_record(long_name, 0)).reason(), Reason::CORRUPT);
 }
 
+TEST(JournalRecord, SaysWhenItWasSubmittedAndByWhom) {
+  const Submission ann{1'700'000'000'000'000, "ann"};
+  const auto kept = [&](JournalRecord record, const Submission& submitted) {
+    *submission(record) = submitted;
+    auto decoded = decode_record(encode_record(record, 0)).or_throw();
+    return *submission(decoded.record) == submitted;
+  };
+  SetLabelRecord named;
+  named.edit = {"a key", 7};
+  named.unknown = {{7, {}}, {1000, {1}}};
+  SessionRecord session;
+  session.header.unknown = named.unknown;
+  for (const Submission& submitted : {ann, Submission{ann.time_us, ""}, Submission{0, "ann"}, Submission{}}) {
+    EXPECT_TRUE(kept(session, submitted));
+    EXPECT_TRUE(kept(ClosureProposalRecord(), submitted));
+    EXPECT_TRUE(kept(SetEdgeStateRecord(), submitted));
+    EXPECT_TRUE(kept(named, submitted));
+    EXPECT_TRUE(kept(SetSessionStateRecord(), submitted));
+  }
+  JournalRecord other = KeyframeRecord();
+  EXPECT_EQ(submission(other), nullptr);
+  EXPECT_EQ(encode_record(SetLabelRecord(), 0)[0], 1) << "as before records said it";
+
+  session.header.unknown = {{19, {1}}, {20, Bytes(1000)}, {1000, {1}}};
+  EXPECT_TRUE(kept(session, ann)) << "whatever a robot said";
+  EXPECT_TRUE(kept(session, {}));
+
+  SetLabelRecord long_name;
+  long_name.submitted.author = std::string(kMaxAuthorBytes + 1, 'k');
+  EXPECT_EQ(decode_record(encode_record(long_name, 0)).reason(), Reason::CORRUPT);
+}
+
 TEST(JournalRecord, WithoutExtensionsIsWhatFormat2Wrote) {
   SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kRemoved, "", false, false, 0, {}};
   EXPECT_EQ(encode_record(edit, 0)[0], 1);

@@ -9,6 +9,7 @@
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
 #include "storage/maintenance/skipped_cursor.h"
+#include "storage/maintenance/stored_events.h"
 #include "storage/maintenance/stored_graph.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
@@ -47,6 +48,7 @@ class Rewriter {
     mend_labels();
     mend_pending(stored);
     mend_state(stored);
+    mend_events(stored.state ? stored.state->applied_sequence : engine_.applied_sequence());
     commit();
   }
 
@@ -417,6 +419,16 @@ class Rewriter {
       tell(Reason::DATA_LOSS, {}, damage.what + "; they wait no longer");
       if (!damage.key.empty()) remove(damage.key, "pending");
     }
+  }
+  // What is damaged is dropped: those who follow the log are told that something is missing.
+  void mend_events(std::uint64_t applied_sequence) {
+    bool damaged = false;
+    const auto head = check_events(*snapshot_, applied_sequence, [&](const EventDamage& damage) {
+      tell(damage.reason, {}, damage.what + (damage.head ? "; mended" : "; dropped from the log"));
+      damaged = true;
+      if (!damage.key.empty() && !damage.head) remove(damage.key, "events");
+    });
+    if (damaged && head) put(std::string(keys::all_events()), encode_event_head(*head));
   }
   void mend_state(const StoredSessions& stored) {
     if (!stored.state && stored.state_damage.empty()) return;  // a map that was never committed

@@ -12,6 +12,7 @@
 #include "storage/maintenance/recount.h"
 #include "storage/maintenance/references.h"
 #include "storage/maintenance/skipped_cursor.h"
+#include "storage/maintenance/stored_events.h"
 #include "storage/maintenance/stored_sessions.h"
 
 namespace relmap::storage {
@@ -41,6 +42,7 @@ class Verifier {
       walk_appearance();
       check_labels();
       check_state();
+      check_events();
     } catch (const Stopped&) {
       summary_.complete = false;
     }
@@ -361,6 +363,13 @@ class Verifier {
     static constexpr const char* kNames[] = {"candidate closures", "accepted closures", "quarantined closures",
                                              "removed closures"};
     for (std::size_t i = 0; i < 4; ++i) counter(kNames[i], closures[i], closures_[i]);
+  }
+
+  void check_events() {
+    if (!options_.sessions.empty()) return;
+    const std::uint64_t applied = stored_.state ? stored_.state->applied_sequence : ~std::uint64_t{0};
+    (void)storage::check_events(snapshot_, applied,
+                                [&](const EventDamage& damage) { find(damage.reason, {}, damage.what); });
   }
 
   const EngineSnapshot& snapshot_;

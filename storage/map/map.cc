@@ -36,7 +36,7 @@ Map::~Map() {
 }
 
 Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
-                                       std::shared_ptr<Budget> budget) try {
+                                       std::shared_ptr<Budget> budget, EventLimits events) try {
   auto impl = std::make_unique<Impl>();
   impl->snapshot = engine->snapshot();
   const EngineSnapshot& snapshot = *impl->snapshot;
@@ -53,6 +53,8 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
     impl->state = std::move(*decoded);
   }
   impl->digests_hold = impl->state.digests_commit == snapshot.commit_number();
+  impl->events = EventWriter(events);
+  if (Status told = impl->events.open(snapshot); !told.ok()) return told;
   Status failed;
   // An edit that cannot be read is forgotten: it is an answer to a question that will hardly be asked.
   throw_if(snapshot.scan(keys::all_edits(), [&](std::string_view key, ByteSpan value) {
@@ -300,6 +302,16 @@ void Map::remember_edit(std::uint64_t sequence, EditKey edit) {
 }
 
 const std::map<std::uint64_t, EditKey>& Map::edits() const { return impl_->edits; }
+
+void Map::record(const Event& event) {
+  impl_->events.record(event);
+  impl_->charge_events();
+}
+
+void Map::note_moved(FrameId frame) {
+  impl_->events.note_moved(frame);
+  impl_->charge_events();
+}
 
 std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
 void Map::watch_edits(EditWatcher watcher) { impl_->edit_watcher = std::move(watcher); }

@@ -16,6 +16,7 @@
 
 #include "storage/engine/engine.h"
 #include "storage/graph/digest.h"
+#include "storage/events/event_log.h"
 #include "storage/graph/editable_graph.h"
 #include "storage/graph/map_state.h"
 #include "storage/memory/budget.h"
@@ -28,8 +29,9 @@ class Map final : public EditableGraph {
  public:
   // Loads the state, and reads all sessions once; they and the frames stay on disk. The caller has to apply the journal
   // again from applied_sequence + 1 on.
+  // `events` limits the log of events.
   static Result<std::unique_ptr<Map>> open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
-                                           std::shared_ptr<Budget> budget);
+                                           std::shared_ptr<Budget> budget, EventLimits events = {});
   ~Map() override;
 
   // The graph as the worker sees it, with its own edits. Worker only.
@@ -69,6 +71,11 @@ class Map final : public EditableGraph {
   // Those remembered, by sequence.
   const std::map<std::uint64_t, EditKey>& edits() const;
 
+  // Adds to the log of events, in the next commit. Events ascend by position.
+  void record(const Event& event);
+  // Relaxation changed the edge that is stored with the frame: the next commit tells that it moved.
+  void note_moved(FrameId frame);
+
   // Makes all edits visible to new readers, and returns the new view.
   std::shared_ptr<const MapView> publish();
   // publish() calls the watcher with the chunks in which the hot part of a frame was edited, and with the version of
@@ -80,8 +87,8 @@ class Map final : public EditableGraph {
   // Once the session's record was read or edited, views find it in memory as long as the result lives. Any thread.
   std::shared_ptr<const void> hold_session(SessionNumber number) const;
 
-  // Publishes, writes everything that is dirty together with state().applied_sequence, and trims the journal. If it
-  // fails, everything stays dirty and can be committed again. A commit under way is finished first.
+  // Publishes, writes everything that is dirty and what was recorded together with state().applied_sequence, and trims
+  // the journal. If it fails, everything stays dirty and can be committed again. A commit under way is finished first.
   Status commit();
   // Begins a commit that is written while the worker goes on editing: encodes what is dirty, finishes the commit under
   // way, lets a thread write this one, and returns. That thread calls `written` when it is done. If the result is not

@@ -9,6 +9,7 @@
 #include <span>
 #include <type_traits>
 
+#include "proto/base/clock.h"
 #include "storage/format/chunk_codec.h"
 #include "storage/format/frame_codec.h"
 #include "storage/format/keys.h"
@@ -295,6 +296,7 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   write_all(*batch);  // while the commit before, which it builds upon, is still being written
   if (const auto before = finish_commit(); before && !before->ok()) return *before;
 
+  events.begin_commit(*snapshot, state.applied_sequence, now_us(), batch->puts, batch->deletes);
   auto commit = std::make_unique<Commit>();
   for (const SessionNumber number : dirty_sessions) commit->sessions.push_back(*place_of(sessions, number));
   commit->labels = labels;
@@ -304,6 +306,7 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   committing = std::move(commit);
   committing->chunks = std::exchange(dirty, {});
   committing->bytes = dirty_bytes;
+  committing->event_bytes = std::exchange(event_bytes, 0);
   dirty_sessions.clear();
   committing->pending = state.pending.take_changes();
   committing->edits = std::exchange(changed_edits, {});
@@ -378,6 +381,9 @@ void Map::Impl::restore(Commit& commit) noexcept {
     take_back(chunk.cold, at->second.cold, removed);
   }
   for (const auto& session : commit.sessions) dirty_sessions.insert(session->number);
+  events.failed();
+  event_bytes += commit.event_bytes;
+  charge_events();  // what was kept in two places may take less in one
   state.pending.add_changes(commit.pending);
   changed_edits.merge(commit.edits);
   spare_hot.clear();  // what could not be written needs the room
@@ -407,6 +413,7 @@ std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
 
 void Map::Impl::complete(Commit& commit) noexcept {
   snapshot = engine->snapshot();
+  events.committed();
   recent_hot.clear();
   recent_warm.clear();
   cache->committed(snapshot->commit_number(), written<FrameHot>(*commit.batch, commit.batch->hot),

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "proto/base/mutex.h"
+#include "storage/events/event_writer.h"
 #include "storage/map/map_view_impl.h"
 #include "storage/map/session_records.h"
 #include "storage/map/working_chunk.h"
@@ -71,6 +72,8 @@ struct Map::Impl {
   std::set<std::uint64_t> changed_edits;  // remembered or forgotten since the last commit was begun
   MapState state;
   bool digests_hold = false;      // the digests in the snapshot are right, and commits keep them so
+  EventWriter events{{}};
+  std::size_t event_bytes = 0;    // part of dirty_bytes: what the next commit tells
   std::size_t dirty_bytes = 0;    // charged, including what a commit is writing
   std::size_t pending_bytes = 0;  // charged for state.pending
   RecentChunks<FrameHot> recent_hot;
@@ -81,7 +84,8 @@ struct Map::Impl {
   struct Batch;
   struct Commit {
     WorkingChunks chunks;
-    std::size_t bytes = 0;  // part of dirty_bytes
+    std::size_t bytes = 0;        // part of dirty_bytes
+    std::size_t event_bytes = 0;  // part of `bytes`
     SessionTable sessions;
     LabelChanges labels;
     SkippedTable skipped;
@@ -140,6 +144,7 @@ struct Map::Impl {
   std::shared_ptr<const MapView> publish() noexcept;
   std::shared_ptr<const MapView> show();  // a new version of what is published
   void charge_rest();
+  void charge_events();
 
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
   std::shared_ptr<const Session> last_committed(SessionNumber number) const;

@@ -153,6 +153,16 @@ void Map::Impl::publish_sessions() {
   session_bytes = bytes;
 }
 
+void Map::Impl::charge_events() {
+  const std::size_t bytes = events.memory_bytes();
+  if (bytes > event_bytes)
+    budget->charge(Share::kDirty, bytes - event_bytes);
+  else
+    budget->release(Share::kDirty, event_bytes - bytes);
+  dirty_bytes += bytes - event_bytes;
+  event_bytes = bytes;
+}
+
 void Map::Impl::charge_rest() {
   const auto charge = [this](Share share, std::size_t& charged, std::size_t bytes) {
     if (bytes == charged) return;

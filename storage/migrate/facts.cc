@@ -143,7 +143,7 @@ Result<MapFactSums> sum_facts(const Engine& engine, int format,
       SessionNumber session = 0;
       for (const char byte : key.substr(1, sizeof session)) session = session << 8 | static_cast<std::uint8_t>(byte);
       facts.add_skipped(session, item);
-    } else if (!key.starts_with(keys::all_pending())) {
+    } else if (!key.starts_with(keys::all_pending()) && !key.starts_with(keys::all_events())) {
       facts.add(key, value);
     }
     return true;

@@ -255,6 +255,8 @@ class Salvage {
         lose("skipped sequences of session " + std::to_string(number) + ": " + copied.to_string());
     (void)copy_keys(keys::all_pending());
     (void)copy_keys(keys::all_edits());
+    if (Status copied = copy_keys(keys::all_events()); !copied.ok())
+      lose("events, of which those who follow them are told: " + copied.to_string());
     for (int first = 0; first < 256; ++first)
       if (const char byte = static_cast<char>(first); !keys::is_known(byte))
         if (Status copied = copy_keys({&byte, 1}); !copied.ok())

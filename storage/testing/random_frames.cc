@@ -1,6 +1,8 @@
 #include "storage/testing/random_frames.h"
 
 #include <limits>
+#include <optional>
+#include <utility>
 
 namespace relmap::storage {
 namespace {
@@ -66,6 +68,13 @@ Extensions RandomFrames::extensions() {
   return all;
 }
 
+Submission RandomFrames::submission() {
+  Submission s;
+  if (below(2) == 1) s.time_us = static_cast<std::int64_t>(rng_());
+  if (below(2) == 1) s.author = below(2) == 1 ? "ann" : "x" + text(kMaxAuthorBytes - 1);
+  return s;
+}
+
 Uniqueness RandomFrames::uniqueness() {
   Uniqueness u;
   u.known = below(2) == 1;
@@ -113,8 +122,9 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   for (std::uint32_t n = below(4); n > 0; --n) e.bound_frames.push_back(frame_id());
   for (std::uint32_t n = below(4); n > 0; --n) e.consistent_with.push_back(edge_id());
   for (std::uint32_t n = below(3), sequence = 0; n > 0; --n)
-    e.history.push_back({sequence += below(1000), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
-                         some_reason(*this), edge_id(), below(2) == 1 ? "a note" : ""});
+    e.history.push_back({sequence += 1 + below(1000), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
+                         some_reason(*this), edge_id(), below(2) == 1 ? "a note" : "", submission().time_us,
+                         submission().author});
   e.uniqueness = uniqueness();
   e.around = way_around();
   for (std::uint32_t n = below(4), index = 0; n > 0; --n) e.unseen.push_back(index += 1 + below(100));
@@ -238,6 +248,12 @@ std::vector<ProposedBinding> RandomFrames::bindings() {
 }
 
 JournalRecord RandomFrames::record() {
+  JournalRecord record = unsubmitted();
+  if (Submission* submitted = storage::submission(record)) *submitted = submission();
+  return record;
+}
+
+JournalRecord RandomFrames::unsubmitted() {
   switch (below(12)) {
     case 0:
       return SessionRecord{1 + below(9), text(30), header()};
@@ -284,6 +300,57 @@ JournalRecord RandomFrames::record() {
     default:
       return IdleWorkRecord{rng_()};
   }
+}
+
+Event RandomFrames::event(EventPosition at) {
+  Event event{at, submission(), text(20), {}};
+  const auto edge_event = [this] {
+    const Edge e = edge(frame_id(), below(5));
+    return ClosureEvent{e.id,           e.a,       e.kind,        e.state, e.reason, e.carries, e.T_ab,
+                        e.verification, e.inliers, e.probability, e.spread};
+  };
+  switch (below(9)) {
+    case 0: {
+      const Session s = session(1 + below(9));
+      event.content = SessionEvent{s.number, s.header.uuid, s.header.robot, s.display_name, s.state};
+      break;
+    }
+    case 1:
+      event.content = FrameAddedEvent{frame_id(), static_cast<std::int64_t>(rng_()),
+                                      below(2) == 1 ? std::optional<SE3>(transform()) : std::nullopt,
+                                      static_cast<MotionSource>(below(kMotionSources))};
+      break;
+    case 2:
+      event.content = SkippedEvent{1 + below(9), skipped()};
+      break;
+    case 3:
+      event.content = FramesRemovedEvent{1 + below(9), below(1000)};
+      break;
+    case 4:
+      event.content = SessionDeletedEvent{1 + below(9), session(1).header.uuid};
+      break;
+    case 5:
+      event.content = edge_event();
+      break;
+    case 6:
+      event.content = ClosureRemovedEvent{edge_id()};
+      break;
+    case 7: {
+      LabelsEvent labels{frame_id(), {}};
+      for (std::uint32_t n = below(4); n > 0; --n) labels.labels.push_back(text(30));
+      event.content = std::move(labels);
+      break;
+    }
+    default: {
+      FramesMovedEvent moved;
+      for (std::uint32_t n = below(5), first = 0; n > 0; --n) {
+        first += below(100);
+        moved.ranges.push_back({1 + below(3), first, first + below(50)});
+      }
+      event.content = std::move(moved);
+    }
+  }
+  return event;
 }
 
 }  // namespace relmap::storage

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "storage/events/event.h"
 #include "storage/graph/frame.h"
 #include "storage/journal/journal_record.h"
 
@@ -27,12 +28,15 @@ class RandomFrames {
   Session session(SessionNumber number);
   Skipped skipped();
   JournalRecord record();
+  Event event(EventPosition at);
 
  private:
   EdgeId edge_id();
   LandmarkId landmark_id();
   std::string text(std::uint32_t max_size);
   Extensions extensions();
+  Submission submission();
+  JournalRecord unsubmitted();
   Uniqueness uniqueness();
   std::shared_ptr<const WayAround> way_around();
   SessionHeader header();

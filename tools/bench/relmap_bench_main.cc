@@ -46,6 +46,8 @@ const Subcommand kSubcommands[] = {
      relmap::bench::declare_unpack},
     {"vast", "A town driven for 150 km by a fleet, through a daemon that is killed and asked meanwhile",
      relmap::bench::declare_vast},
+    {"watch", "Watch the map beside a fleet: latency of what happens, cost for the worker, memory",
+     relmap::bench::declare_watch},
 };
 
 }  // namespace

@@ -35,5 +35,6 @@ Run declare_storage(CLI::App& app);
 Run declare_suspicion(CLI::App& app);
 Run declare_unpack(CLI::App& app);
 Run declare_vast(CLI::App& app);
+Run declare_watch(CLI::App& app);
 
 }  // namespace relmap::bench
