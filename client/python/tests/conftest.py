@@ -107,14 +107,17 @@ def client(daemon: Daemon) -> Iterator[relmap.Client]:
         yield connected
 
 
+def frontend_arguments(file: pathlib.Path) -> List[str]:
+    """Of relmap-frontend, to make the keyframes of the drive beside this file of keyframes."""
+    options = "--robot cart --session pictures --uuid 7a0c1f52-5f0e-4c7d-9d43-0a8f6b1f2e11 --quiet"
+    return ["--source", "sim", str(file.with_suffix("")), *options.split()]
+
+
 @pytest.fixture(scope="session")
 def keyframe_files(tmp_path_factory: pytest.TempPathFactory) -> List[pathlib.Path]:
     """Keyframes as C++ writes them: of points; and of pictures, with JPEGs."""
     folder = tmp_path_factory.mktemp("keyframes")
     program("relmap-sim", "points", "--out", str(folder / "points"), "--frames", "60", "--appearance", "100")
     program("relmap-sim", "pictures", "--out", str(folder / "drive"), "--pairs", "24", "--laps", "0.15")
-    program(
-        "relmap-frontend", "--source", "sim", str(folder / "drive"), "--robot", "cart", "--session", "pictures",
-        "--out", str(folder / "drive.bin"), "--quiet",
-    )  # fmt: skip
+    program("relmap-frontend", *frontend_arguments(folder / "drive.bin"), "--out", str(folder / "drive.bin"))
     return [folder / "points/keyframes.bin", folder / "drive.bin"]

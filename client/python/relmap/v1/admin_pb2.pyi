@@ -150,12 +150,14 @@ class GetStatsRequest(_message.Message):
     def __init__(self) -> None: ...
 
 class ListAuditReply(_message.Message):
-    __slots__ = ["entries", "next_page_token"]
+    __slots__ = ["entries", "next_page_token", "unreadable"]
     ENTRIES_FIELD_NUMBER: _ClassVar[int]
     NEXT_PAGE_TOKEN_FIELD_NUMBER: _ClassVar[int]
+    UNREADABLE_FIELD_NUMBER: _ClassVar[int]
     entries: _containers.RepeatedCompositeFieldContainer[AuditEntry]
     next_page_token: str
-    def __init__(self, entries: _Optional[_Iterable[_Union[AuditEntry, _Mapping]]] = ..., next_page_token: _Optional[str] = ...) -> None: ...
+    unreadable: int
+    def __init__(self, entries: _Optional[_Iterable[_Union[AuditEntry, _Mapping]]] = ..., next_page_token: _Optional[str] = ..., unreadable: _Optional[int] = ...) -> None: ...
 
 class ListAuditRequest(_message.Message):
     __slots__ = ["failed", "from_us", "method", "page_size", "page_token", "until_us", "who"]

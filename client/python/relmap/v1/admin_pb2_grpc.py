@@ -170,7 +170,10 @@ class AdminServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ListAudit(self, request, context):
-        """What operators did and tried, the newest first. UNSUPPORTED: the daemon keeps no audit log.
+        """What operators did and tried, the newest first. A page may have fewer entries than were asked for, or none, although
+        there are more. New entries and new files of the log change nothing for the pages of a list. Of these, the audit log
+        itself names the call for the first. UNSUPPORTED (the daemon keeps no audit log), INVALID_ARGUMENT (the times, or a
+        token of no audit log), VIEW_EXPIRED (what the page begins with has been deleted since).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

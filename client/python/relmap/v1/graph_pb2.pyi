@@ -256,12 +256,14 @@ class Session(_message.Message):
     def __init__(self, number: _Optional[int] = ..., uuid: _Optional[str] = ..., robot: _Optional[str] = ..., name: _Optional[str] = ..., camera: _Optional[_Union[_common_pb2.Camera, _Mapping]] = ..., oneway: bool = ..., first: _Optional[int] = ..., last: _Optional[int] = ..., frames: _Optional[int] = ..., first_time_us: _Optional[int] = ..., last_time_us: _Optional[int] = ..., refused: _Optional[int] = ..., given_up: _Optional[int] = ..., next_sequence: _Optional[int] = ..., state: _Optional[_Union[SessionState, str]] = ..., raw: _Optional[_Union[_common_pb2.RawStereo, _Mapping]] = ...) -> None: ...
 
 class Suspicion(_message.Message):
-    __slots__ = ["doubts", "value"]
+    __slots__ = ["doubts", "remark", "value"]
     DOUBTS_FIELD_NUMBER: _ClassVar[int]
+    REMARK_FIELD_NUMBER: _ClassVar[int]
     VALUE_FIELD_NUMBER: _ClassVar[int]
     doubts: _containers.RepeatedCompositeFieldContainer[Doubt]
+    remark: str
     value: float
-    def __init__(self, value: _Optional[float] = ..., doubts: _Optional[_Iterable[_Union[Doubt, _Mapping]]] = ...) -> None: ...
+    def __init__(self, value: _Optional[float] = ..., doubts: _Optional[_Iterable[_Union[Doubt, _Mapping]]] = ..., remark: _Optional[str] = ...) -> None: ...
 
 class Uniqueness(_message.Message):
     __slots__ = ["alike", "changed", "compared", "differs", "runner_up", "runner_up_inliers", "runner_up_probability"]

@@ -185,7 +185,7 @@ class MapServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ListEdges(self, request, context):
-        """NO_SUCH_SESSION, NO_SUCH_FRAME.
+        """NO_SUCH_SESSION, NO_SUCH_FRAME, INVALID_ARGUMENT (also for a region of more than 100,000 frames).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
