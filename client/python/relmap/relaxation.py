@@ -24,6 +24,7 @@ _HUBER_SIGMAS = 3.0
 _ROTATION_ROUNDS, _POSITION_ROUNDS = 6, 4
 _DENSE = 1500  # junctions up to which the network is solved by one factorisation
 _LEAST_VARIANCE = 1e-10
+_CARRIED_VARIANCE = (1e4, 10.0)  # m^2, rad^2: what is known of a ride beside what closures measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +200,8 @@ class _Relaxation:
         for row in range(len(known)):
             a = place.get((int(known.a[row, 0]), int(known.a[row, 1])))
             b = place.get((int(known.b[row, 0]), int(known.b[row, 1])))
-            if known.state[row] == EdgeState.ACCEPTED and a is not None and b is not None and a != b:
+            counts = known.state[row] == EdgeState.ACCEPTED and known.carries[row]
+            if counts and a is not None and b is not None and a != b:
                 rows.append(row)
                 at_a.append(a)
                 at_b.append(b)
@@ -298,6 +300,7 @@ class _Relaxation:
         for c, chain in enumerate(self.chains):
             misfits.append(self._misfits(kind, self.T[c][:-1], self.T[c][1:], chain.step))
             variance = np.maximum(chain.variance[:, kind], _LEAST_VARIANCE)
+            variance = np.where(chain.carried, np.maximum(variance, _CARRIED_VARIANCE[kind]), variance)
             variances.append(variance)
         sums = [np.vstack([np.zeros(3), np.cumsum(m, axis=0)]) for m in misfits]
         ohms = [np.concatenate([[0.0], np.cumsum(v)]) for v in variances]
