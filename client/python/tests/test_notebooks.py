@@ -22,7 +22,7 @@ def test_a_notebook_runs(name: str, own_daemon: Daemon, tmp_path: pathlib.Path, 
     monkeypatch.setenv("RELMAP_SERVER", own_daemon.server)
     monkeypatch.setenv("REPORT", str(tmp_path / "report.html"))
     nbclient.NotebookClient(
-        notebook, timeout=PATIENCE_S, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
+        notebook, timeout=int(PATIENCE_S), kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
     ).execute()
     shown = [output.get("data", {}) for cell in code for output in cell.outputs]
     if name != "judge_closures.ipynb":
