@@ -33,6 +33,9 @@ struct Client::Impl {
   // Gives the call its deadline, and what names it in the daemon's logs.
   void begin(grpc::ClientContext& context, Clock::time_point until) const {
     context.set_deadline(until);
+    name(context);
+  }
+  void name(grpc::ClientContext& context) const {
     if (!options.request_id.empty()) context.AddMetadata("x-request-id", options.request_id);
     if (!options.traceparent.empty()) context.AddMetadata("traceparent", options.traceparent);
   }

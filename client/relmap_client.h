@@ -16,6 +16,7 @@
 
 #include "client/admin_types.h"
 #include "client/map_types.h"
+#include "client/watch_types.h"
 
 namespace relmap::client {
 
@@ -79,6 +80,15 @@ class Client {
   // Imports a piece of a graph that was made elsewhere; pieces come in the order of their frames. Returns the session's
   // number. See Map.ImportGraph.
   Result<SessionNumber> import_graph(const GraphPiece& piece);
+
+  // Follows what happens to the map: calls `sink` with each event, by the calling thread, and ends with the status with
+  // which the sink fails, or with OK once `options.stopped` says so. A watcher who watches from now on, then lists, and
+  // applies all events to the lists, holds what the map holds. If the connection breaks, it is made again, with the
+  // last token and by connect_again(); the sink is told of both. Without `reconnect` it ends with the reason, and it
+  // always does with UNAUTHENTICATED, NOT_ALLOWED, INVALID_ARGUMENT (a token that was mangled), UNIMPLEMENTED (the
+  // daemon is too old), CORRUPT, NO_SUCH_FILE and BAD_CONFIG (credentials). ClientOptions::deadline is not for watches.
+  using WatchSink = std::function<Status(const WatchEvent& event)>;
+  Status watch(const WatchOptions& options, const WatchSink& sink);
 
   // Exports sessions (empty: all but mono sessions). If `take` fails, the export ends with its status. A stream that
   // breaks is resumed.

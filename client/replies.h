@@ -2,6 +2,7 @@
 #pragma once
 
 #include "client/map_types.h"
+#include "client/watch_types.h"
 
 namespace relmap::v1 {
 class Edge;
@@ -14,6 +15,7 @@ class FrameId;
 class GetStatusReply;
 class Robot;
 class LocaliseReply;
+class MapEvent;
 class MatchImageReply;
 class RouteStep;
 class RouteSummary;
@@ -40,6 +42,8 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message);
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message);
 DaemonStatus read_status(const v1::GetStatusReply& message);
 RobotStatus read_robot(const v1::Robot& message);
+// Nullopt: an event of a kind that a later version tells.
+Result<std::optional<WatchEvent>> read_event(const v1::MapEvent& message);
 
 FrameId read_id(const v1::FrameId& id);
 EdgeId read_id(const v1::EdgeId& id);

@@ -10,6 +10,7 @@
 #include "proto/base/utf8.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
+#include "relmap/v1/watch.pb.h"
 
 namespace {
 
@@ -98,7 +99,7 @@ void ask(ByteReader in) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const ByteSpan bytes(data + 1, size - 1);
-  switch (data[0] % 13) {
+  switch (data[0] % 14) {
     case 0:
       read_as(bytes, read_edge);
       break;
@@ -140,8 +141,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 11:
       read_as(bytes, read_robot);
       break;
-    default:
+    case 12:
       ask(ByteReader(bytes));
+      break;
+    default:
+      read_as(bytes, read_event);
   }
   return 0;
 }

@@ -145,6 +145,7 @@ class OldClient : public ::testing::TestWithParam<std::string> {
          {"session_uuid: '0123456789abcdef' robot: 'graph' name: 'imported' "
           "frames { odom_from_frame { rotation { w: 1 } translation { } } time_us: 1000000 } "
           "frames { odom_from_frame { rotation { w: 1 } translation { z: 1 } } time_us: 2000000 driven_us: 1000000 }"}},
+        {"Map/GetClosureMatrix", {"sessions: 1"}},
         {"Map/FindLabels", {""}},
         {"Map/WatchMap", {""}},
         {"Map/ListRobots", {""}},
@@ -156,6 +157,7 @@ class OldClient : public ::testing::TestWithParam<std::string> {
         {"Admin/Compact", {""}},
         {"Admin/Reindex", {""}},
         {"Admin/GetStats", {""}},
+        {"Admin/ListAudit", {"page_size: 3"}},
         {"Admin/WaitIdle", {""}},
         {"Admin/Commit", {""}},
         {"Admin/SetLogLevel", {"level: 'debug'"}},
@@ -167,8 +169,10 @@ class OldClient : public ::testing::TestWithParam<std::string> {
   GenericReplies call(const google::protobuf::MethodDescriptor& method, const std::vector<std::string>& texts) {
     std::vector<std::string> bytes;
     for (const std::string& text : texts) bytes.push_back(bytes_of(*old_.parse(*method.input_type(), text)));
-    // An ingest stream goes on until the client ends it: a welcome and an acknowledgement are enough.
-    return call_generic(channel_, path_of(method), bytes, method.name() == "Stream" ? 2 : 100000);
+    // These go on until the client ends them: a welcome and an acknowledgement are enough, the state of storage and
+    // that there is no more to tell.
+    const bool endless = method.name() == "Stream" || method.name() == "WatchMap";
+    return call_generic(channel_, path_of(method), bytes, endless ? 2 : 100000);
   }
 
   const storage::TemporaryFolder folder_;
@@ -185,7 +189,6 @@ class OldClient : public ::testing::TestWithParam<std::string> {
 const std::map<std::string, grpc::StatusCode> kAlwaysRefused{
     {"Admin/Repair", grpc::StatusCode::FAILED_PRECONDITION},
     {"Admin/Reindex", grpc::StatusCode::FAILED_PRECONDITION},
-    {"Map/WatchMap", grpc::StatusCode::UNIMPLEMENTED},  // not served yet
 };
 
 TEST_P(OldClient, CallsEveryMethodAndReadsWhatItIsTold) {
@@ -226,11 +229,14 @@ TEST_P(OldClient, ReadsTheReasonOfEveryFailure) {
       {"Map/ProposeEdge", {"a { session: 1 index: 5 } b { session: 1 index: 5 }"}},
       {"Map/SetLabel", {"frame { session: 1 index: 7 } label: ' '"}},
       {"Map/ImportGraph", {"session_uuid: 'short'"}},
+      {"Map/GetClosureMatrix", {"sessions: 9"}},
       {"Map/FindLabels", {"page_token: 'not one'"}},
+      {"Map/WatchMap", {"resume_token: 'not one'"}},
       {"Map/Export", {"format: EXPORT_FORMAT_TUM sessions: 9"}},
       {"Admin/Repair", {""}},
       {"Admin/Backup", {"folder: 'relative'"}},
       {"Admin/Reindex", {""}},
+      {"Admin/ListAudit", {"page_token: 'not one'"}},
       {"Admin/FreezeSession", {"session: 9 frozen: true"}},
       {"Admin/DeleteSession", {"session: 1 uuid: 'of another'"}},
   };
@@ -315,6 +321,9 @@ TEST_P(OldDaemon, AnswersEveryCallOfTheClient) {
     piece.session = SessionUuid::random();
     piece.frames.emplace_back();
     expect_ok("import_graph", client->import_graph(piece).status());
+    client::WatchOptions once;
+    once.reconnect = false;
+    expect_ok("watch", client->watch(once, [](const auto&) { return Status(); }));
     expect_ok("export_trajectories",
               client->export_trajectories(client::ExportFormat::kTum, {}, [](const auto&) { return Status(); }));
     expect_ok("export_frames", client->export_frames({}, true, [](const auto&) { return Status(); }));
@@ -335,9 +344,9 @@ TEST_P(OldDaemon, AnswersEveryCallOfTheClient) {
     expect_ok("commit", client->commit().status());
   }
   // Those that no client calls: the front-end's own, those of other languages, and those that are always refused.
-  const std::set<std::string> elsewhere{"/relmap.v1.Ingest/Stream",        "/relmap.v1.Ingest/GetAcknowledgement",
-                                        "/relmap.v1.Map/GetNeighbourhood", "/relmap.v1.Map/WatchMap",
-                                        "/relmap.v1.Admin/Repair",         "/relmap.v1.Admin/Reindex"};
+  const std::set<std::string> elsewhere{"/relmap.v1.Ingest/Stream", "/relmap.v1.Ingest/GetAcknowledgement",
+                                        "/relmap.v1.Map/GetNeighbourhood", "/relmap.v1.Admin/Repair",
+                                        "/relmap.v1.Admin/Reindex"};
   for (const auto* method : old_.methods())
     EXPECT_TRUE(called_.contains(path_of(*method)) || elsewhere.contains(path_of(*method))) << path_of(*method);
 }

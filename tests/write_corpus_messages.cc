@@ -15,6 +15,7 @@
 #include "relmap/v1/ingest.pb.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
+#include "relmap/v1/watch.pb.h"
 #include "tests/write_corpus.h"
 
 namespace relmap::testing {
@@ -380,6 +381,13 @@ void write_replies(const std::string& root) {
   add_message<v1::TransformBetweenReply>(replies, 9);
   add_message<v1::GetStatusReply>(replies, 10);
   add_message<v1::Robot>(replies, 11);
+  add_message<v1::MapEvent>(replies, 13);
+  const pb::OneofDescriptor& events = *v1::MapEvent::descriptor()->FindOneofByName("event");
+  for (int i = 0; i < events.field_count(); ++i) {
+    v1::MapEvent event;
+    fill(*event.GetReflection()->MutableMessage(&event, events.field(i)));
+    replies.add("event_" + events.field(i)->name(), {13}, as_bytes(event.SerializeAsString()));
+  }
   constexpr int kAsk = 12, kFrame = 0, kLabel = 1, kView = 2, kRobot = 3;
   replies.add("ask_frames", {kAsk, kFrame, 1, 0, 0, 0, 2, 0, 0, 0, kFrame, 1, 0, 0, 0, 9, 0, 0, 0, 0});
   replies.add("ask_label_and_robot", {kAsk, kLabel, 'h', 'a', 'l', 'l', '1', kRobot, 2 + 4, kRobot, kRobot});

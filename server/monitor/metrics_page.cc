@@ -181,10 +181,15 @@ void collect_rpc(const rpc::Core& core, Collector& page) {
   const rpc::Transport& transport = core.transport;
   if (transport.gateway) {
     using Kind = rpc::Gateway::Kind;
-    for (const auto& [kind, name] : {std::pair(Kind::kQuestion, "question"), std::pair(Kind::kStream, "stream"),
-                                     std::pair(Kind::kEdit, "edit"), std::pair(Kind::kWait, "wait")})
+    for (const auto& [kind, name] :
+         {std::pair(Kind::kQuestion, "question"), std::pair(Kind::kStream, "stream"), std::pair(Kind::kEdit, "edit"),
+          std::pair(Kind::kWait, "wait"), std::pair(Kind::kWatch, "watch")})
       page.set("relmap_rpc_running", transport.gateway->running(kind), {{"kind", name}});
   }
+  const rpc::WatchFeed::Counts watched = core.feed.counts();
+  page.set("relmap_watch_events_total", watched.told);
+  page.set("relmap_watch_resyncs_total", watched.resyncs);
+  page.set("relmap_watch_lag_records", watched.lag);
   if (transport.connections) {
     const rpc::ConnectionCounts counts = transport.connections->counts(rpc::Connections::Clock::now());
     page.set("relmap_connections", counts.open);
@@ -283,7 +288,11 @@ const std::vector<MetricFamily>& metric_families() {
       {"relmap_robots_silent", kGauge, "", "Sessions that have not ended, and were last heard one to ten minutes ago"},
       {"relmap_lcm_up", kGauge, "", "1: LCM is listened to. 0: it could not start. Absent without LCM"},
       {"relmap_rpc_seconds", kHistogram, "method, reason", "Finished calls, by method and outcome"},
-      {"relmap_rpc_running", kGauge, "kind", "Calls not answered yet: question, stream, edit, wait"},
+      {"relmap_rpc_running", kGauge, "kind", "Calls not answered yet: question, stream, edit, wait, watch"},
+      {"relmap_watch_events_total", kCounter, "", "Events of the map told, counted for each watcher"},
+      {"relmap_watch_resyncs_total", kCounter, "",
+       "Watchers told to list again: what they had missed was no longer kept, or their map was another one"},
+      {"relmap_watch_lag_records", kGauge, "", "Committed records that the slowest watcher has not been told of"},
       {"relmap_connections", kGauge, "", "Open connections of gRPC"},
       {"relmap_connections_limit", kGauge, "", "So many over TCP may be open, and as many at the socket"},
       {"relmap_connections_refused_total", kCounter, "", "Connections refused for want of room"},

@@ -32,7 +32,8 @@ std::string unusual() {
          "lookup_threads: 3\ncommit_interval_ms: 10\nevents.max_mb: 5\nrpc.threads: 2\nrpc.max_concurrent: 5\n"
          "rpc.max_concurrent_per_caller: 4\nrpc.max_waiting: 3\nrpc.stalled_s: 1.5\nrpc.max_connections: 9\n"
          "rpc.quiet_s: 7\nrpc.max_connections_per_peer: 8\nrpc.max_ingest_streams: 11\n"
-         "rpc.max_ingest_streams_per_caller: 12\nrpc.max_search_frames: 1000000000\nrpc.default_deadline_s: 0.001\n"
+         "rpc.max_ingest_streams_per_caller: 12\nrpc.max_watchers: 13\nrpc.max_watchers_per_caller: 6\n"
+         "rpc.max_search_frames: 1000000000\nrpc.default_deadline_s: 0.001\n"
          "ingest.max_keyframes_per_s: 0.1\ningest.max_new_sessions_per_min: 1000000\ningest.robots: [a, 'b: c']\n"
          "routes.mixes: [{metre: 1e-9, driven_second: 0.3}, {square_metre_of_variance: 30}]\nrba.window: 9\n"
          "rba.delta_eps: 0.07\nrba.idle_delta_eps: 0.02\nrba.budget: 123456\nrba.huber_px: 3.25\n";

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 #include <new>
 #include <random>
 
@@ -20,11 +21,13 @@ namespace {
 // theirs separately.
 constexpr std::size_t kBytesPerCall = 64 * 1024;
 constexpr std::size_t kMaxRequestId = 64;
-constexpr int kEditThreads = 4;  // edits take turns (EditLog); others may wait until what they wrote is visible
-constexpr int kWaitThreads = 4;  // all wait for the same, so more would gain nothing
-constexpr std::chrono::milliseconds kWatchInterval{500};
-constexpr std::chrono::minutes kTold{1};  // between lines in the log of what one caller may not call
-constexpr std::size_t kMaxTold = 256;     // lines in that time
+constexpr int kEditThreads = 4;   // edits take turns (EditLog); others may wait until what they wrote is visible
+constexpr int kWaitThreads = 4;   // all wait for the same, so more would gain nothing
+constexpr int kWatchThreads = 1;  // so that many watchers take no more than one core
+constexpr std::chrono::milliseconds kLookInterval{500};
+constexpr std::chrono::seconds kLeaves{1};  // that a watcher who takes nothing gets to take the end of his stream
+constexpr std::chrono::minutes kTold{1};    // between lines in the log of what one caller may not call
+constexpr std::size_t kMaxTold = 256;       // lines in that time
 
 // Whose calls are counted together. Those who prove nothing are told apart by their address.
 std::string counted_as(const Identity& caller, std::string peer) {
@@ -50,10 +53,12 @@ std::string traceparent_of(const grpc::CallbackServerContext& context) {
   return checked_traceparent({given->second.data(), given->second.size()});
 }
 
-std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerContext& context, double default_s) {
+std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerContext& context, Lane lane,
+                                                  double default_s) {
   const auto now = std::chrono::steady_clock::now();
   const auto left = context.deadline() - std::chrono::system_clock::now();
   const auto max_wait = std::chrono::hours(24);
+  if (left > max_wait && lane == Lane::kWatches) return std::chrono::steady_clock::time_point::max();
   if (left > max_wait)
     return now +
            std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(default_s));
@@ -74,7 +79,8 @@ Gateway::Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metr
       picture_thread_(1),
       maintenance_thread_(1),
       edit_threads_(kEditThreads),
-      wait_threads_(kWaitThreads) {
+      wait_threads_(kWaitThreads),
+      watch_thread_(kWatchThreads) {
   watch_ = std::thread([this] { watch(); });
 }
 
@@ -87,33 +93,45 @@ Gateway::~Gateway() {
   watch_.join();
 }
 
-// Cancels calls whose callers take nothing: they would hold memory, and their place among those that may run, for ever.
+void Gateway::drain() {
+  const MutexLock lock(mutex_);
+  draining_ = true;
+  look_ = true;
+  stop_.notify_all();
+}
+
+// Wakes streams that wait and whose time has come, and cancels calls whose callers take nothing: they would hold
+// memory, and their place among those that may run, for ever.
 void Gateway::watch() {
   const MutexLock lock(mutex_);
   for (;;) {
-    stop_.wait_for(mutex_, kWatchInterval, [this]() RELMAP_REQUIRES(mutex_) { return stopping_; });
+    stop_.wait_for(mutex_, kLookInterval, [this]() RELMAP_REQUIRES(mutex_) { return stopping_ || look_; });
     if (stopping_) return;
-    std::vector<Call*> stalled;
+    look_ = false;
+    std::vector<std::pair<Call*, Status>> stalled;
     const auto now = std::chrono::steady_clock::now();
-    for (Call* call : open_)
-      if (call->stalled(now)) stalled.push_back(call);
-    for (Call* call : stalled) {
-      if (!open_.contains(call)) continue;
-      {
-        const RequestScope scope(call->request_);
-        spdlog::warn("{} from {}: it has taken no message for {} s, and is cancelled", call->method_,
-                     call->context_->peer(), limits_.stalled_s);
-      }
-      call->written();
-      cancelling_ = call;
-      {
-        const MutexUnlock unlocked(mutex_);  // the call may end in this thread
-        call->context_->TryCancel();
-      }
-      cancelling_ = nullptr;
-      stop_.notify_all();
+    for (Call* call : open_) {
+      call->look(now);
+      if (Status why = call->stalled(now); !why.ok()) stalled.emplace_back(call, std::move(why));
     }
+    for (const auto& [call, why] : stalled)
+      if (open_.contains(call)) cancel(call, why.message());
   }
+}
+
+void Gateway::cancel(Call* call, const std::string& why) {
+  {
+    const RequestScope scope(call->request_);
+    spdlog::warn("{} from {}: {}, and is cancelled", call->method_, call->context_->peer(), why);
+  }
+  call->written();
+  cancelling_ = call;
+  {
+    const MutexUnlock unlocked(mutex_);  // the call may end in this thread
+    call->context_->TryCancel();
+  }
+  cancelling_ = nullptr;
+  stop_.notify_all();
 }
 
 // A call that is being cancelled stays until that is done.
@@ -132,6 +150,8 @@ Gateway::Kind Gateway::kind_of(Lane lane) {
       return Kind::kEdit;
     case Lane::kWaits:
       return Kind::kWait;
+    case Lane::kWatches:
+      return Kind::kWatch;
     case Lane::kGeneral:
     case Lane::kPictures:
     case Lane::kMaintenance:
@@ -148,6 +168,8 @@ Gateway::Limit Gateway::limit_of(Kind kind) const {
       return {limits_.max_waiting, limits_.max_concurrent_per_caller, "edits", "wait"};
     case Kind::kWait:
       return {limits_.max_waiting, limits_.max_concurrent_per_caller, "calls of WaitIdle", "wait"};
+    case Kind::kWatch:
+      return {limits_.max_watchers, limits_.max_watchers_per_caller, "watches", "are open"};
     case Kind::kQuestion:
       break;
   }
@@ -164,6 +186,8 @@ TaskPool& Gateway::threads_of(Lane lane) {
       return edit_threads_;
     case Lane::kWaits:
       return wait_threads_;
+    case Lane::kWatches:
+      return watch_thread_;
     case Lane::kGeneral:
     case Lane::kIngest:
       break;
@@ -181,7 +205,7 @@ Status Gateway::enter(const std::string& caller, Lane lane, std::size_t bytes) {
   if (++load.calls[static_cast<std::size_t>(kind)] > limit.per_caller)
     return {Reason::BUDGET_EXCEEDED,
             std::to_string(limit.per_caller) + " " + limit.what + " of " + caller + " " + limit.state + " already"};
-  if (kind == Kind::kStream) return {};
+  if (lasts(kind)) return {};
   const std::size_t share = budget_.allowance(storage::Share::kReplies);
   if (!first && load.bytes > share / 2)
     return {Reason::BUDGET_EXCEEDED, "calls of " + caller + " use half of the " + std::to_string(share) +
@@ -210,7 +234,7 @@ Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* m
       method_(method),
       lane_(lane),
       request_{choose_request_id(*context), traceparent_of(*context)},
-      deadline_{deadline_of(*context, gateway.limits_.default_deadline_s), [this]() -> Status {
+      deadline_{deadline_of(*context, lane, gateway.limits_.default_deadline_s), [this]() -> Status {
                   if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
                   if (cancelled_) return {Reason::DEADLINE, "the caller has gone"};
                   return check_caller();
@@ -227,11 +251,44 @@ Call::~Call() {
   --gateway_.calls_;
 }
 
-bool Call::stalled(std::chrono::steady_clock::time_point now) const {
+// A watcher may take messages as slowly as he likes, but must take the end of his stream.
+Status Call::stalled(std::chrono::steady_clock::time_point now) const {
   const std::int64_t since = writing_since_;
-  if (since == 0) return false;
+  if (since == 0) return {};
   const std::chrono::duration<double> waited = now.time_since_epoch() - std::chrono::steady_clock::duration(since);
-  return waited.count() > gateway_.limits_.stalled_s;
+  if (lane_ == Lane::kWatches) {
+    if (waited < kLeaves) return {};
+    const Status over = deadline_.check();
+    return over.ok() ? over : Status(over.reason(), "it takes no message, although " + over.message());
+  }
+  if (waited.count() <= gateway_.limits_.stalled_s) return {};
+  char text[64];
+  std::snprintf(text, sizeof text, "it has taken no message for %g s", gateway_.limits_.stalled_s);
+  return {Reason::DEADLINE, text};
+}
+
+// Wakes it if its time has come.
+void Call::look(std::chrono::steady_clock::time_point now) {
+  if (sleep_ != Sleep::kAsleep) return;
+  if (now.time_since_epoch().count() >= wake_at_ || !deadline_.check().ok()) wake();
+}
+
+void Call::wait(std::chrono::steady_clock::time_point until) {
+  wake_at_ = until.time_since_epoch().count();
+  auto awake = Sleep::kAwake;
+  const bool at_once = until <= std::chrono::steady_clock::now();
+  if (!at_once && sleep_.compare_exchange_strong(awake, Sleep::kAsleep)) return;
+  sleep_ = Sleep::kAwake;
+  post(resume_);
+}
+
+void Call::wake() {
+  for (auto was = sleep_.load(); was != Sleep::kWoken;) {
+    const auto next = was == Sleep::kAsleep ? Sleep::kAwake : Sleep::kWoken;
+    if (!sleep_.compare_exchange_weak(was, next)) continue;
+    if (was == Sleep::kAsleep) post(resume_);
+    return;
+  }
 }
 
 void Call::leave() {
@@ -253,7 +310,7 @@ Status Call::admit_caller(std::size_t bytes) {
   if (Status may = check_role(caller_); !may.ok()) return may;
   entered_as_ = counted_as(caller_, context_->peer());
   entered_ = true;
-  entered_bytes_ = lane_ == Lane::kIngest ? 0 : bytes;
+  entered_bytes_ = Gateway::lasts(Gateway::kind_of(lane_)) ? 0 : bytes;
   return gateway_.enter(entered_as_, lane_, entered_bytes_);
 }
 
@@ -284,8 +341,8 @@ Status Call::admit(std::size_t more) {
     return Status(Reason::BUDGET_EXCEEDED, std::string(what) + " use half of the " + std::to_string(share) +
                                                " bytes that the memory budget leaves for replies");
   };
-  if (kind == Gateway::Kind::kStream && static_cast<std::size_t>(running) * bytes > share / 2)
-    return too_much("open streams of keyframes");
+  if (Gateway::lasts(kind) && static_cast<std::size_t>(running) * bytes > share / 2)
+    return too_much(kind == Gateway::Kind::kWatch ? "open watches" : "open streams of keyframes");
   charge_.emplace(gateway_.budget_, storage::Share::kReplies);
   if (Status status = charge_->grow_to(kBytesPerCall); !status.ok()) return status;
   // The picture that is being described has reserved memory; those that wait behind it do not.
@@ -316,7 +373,10 @@ Status Call::check_caller() const {
 void Call::post(std::function<void()> task) { gateway_.threads_of(lane_).post(std::move(task)); }
 
 void Call::asks(const google::protobuf::Message& request) {
-  if (gateway_.audit_ && is_audited(method_)) asked_ = AuditLog::text_of(request);
+  if (!gateway_.audit_ || !is_audited(method_)) return;
+  asked_ = AuditLog::text_of(request);
+  const google::protobuf::FieldDescriptor* token = request.GetDescriptor()->FindFieldByName("page_token");
+  goes_on_ = token && !request.GetReflection()->GetString(request, token).empty();
 }
 
 grpc::Status Call::end(const Status& status) {
@@ -333,7 +393,8 @@ grpc::Status Call::end(const Status& status) {
     spdlog::warn("{} from {}: {}", method_, context_->peer(), status.to_string());
   else
     spdlog::debug("{} from {}: {} in {} us", method_, context_->peer(), status.to_string(), took.count());
-  if (gateway_.audit_ && is_audited(method_)) {
+  // Of a list that is read page by page, the first page is told, so that reading the audit log does not fill it.
+  if (gateway_.audit_ && is_audited(method_) && !(goes_on_ && status.ok())) {
     AuditLog::Entry entry;
     entry.who = caller_.name;
     entry.role = std::string(access::role_name(caller_.role));

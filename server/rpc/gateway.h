@@ -37,8 +37,10 @@ namespace relmap::rpc {
 // that no query waits behind them. Edits wait for the disk, and WaitIdle for all that was sent: each kind has threads
 // and a limit of its own, so that many of them hold up nothing else. What waits for the disk must be in one of these
 // two, or in maintenance. Streams of keyframes last as long as a robot drives: they have a limit of their own, but no
-// deadline and no thread.
-enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest, kEdits, kWaits };
+// deadline and no thread. Watches last as long as somebody looks: they have a limit of their own, one thread together,
+// and no deadline but their caller's. A watcher who takes no message is not cut off: he holds one message, and that is
+// all that he costs.
+enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest, kEdits, kWaits, kWatches };
 
 class Call;
 
@@ -51,12 +53,12 @@ class Gateway {
   ~Gateway();
 
   // From now on refuses new calls with SHUTTING_DOWN and interrupts running ones (Deadline::check()).
-  void drain() { draining_ = true; }
+  void drain();
   // The number of calls that gRPC still holds; their answers may still be in transit.
   int calls() const { return calls_; }
   // Lanes whose calls are counted together, so that those of others have room.
-  enum class Kind : std::uint8_t { kQuestion, kStream, kEdit, kWait };
-  static constexpr std::size_t kKinds = 4;
+  enum class Kind : std::uint8_t { kQuestion, kStream, kEdit, kWait, kWatch };
+  static constexpr std::size_t kKinds = 5;
   // The number of calls of the kind that are not answered yet.
   int running(Kind kind) const { return running_[static_cast<std::size_t>(kind)]; }
 
@@ -64,8 +66,8 @@ class Gateway {
   template <typename Request, typename Reply, typename Handler>
   grpc::ServerUnaryReactor* unary(grpc::CallbackServerContext* context, const char* method, Lane lane,
                                   const Request* request, Reply* reply, Handler handler);
-  // Answers with a stream. `handler` is a Result<Producer<Reply>>(const Request&, const Deadline&). The request lives
-  // until the stream ends.
+  // Answers with a stream. `handler` is a Result<Producer<Reply>>(const Request&, const Deadline&), or returns a
+  // LiveProducer, whose stream may wait. The request lives until the stream ends.
   template <typename Reply, typename Request, typename Handler>
   grpc::ServerWriteReactor<Reply>* stream(grpc::CallbackServerContext* context, const char* method, Lane lane,
                                           const Request* request, Handler handler);
@@ -74,6 +76,7 @@ class Gateway {
   friend class Call;
 
   void watch();
+  void cancel(Call* call, const std::string& why) RELMAP_REQUIRES(mutex_);
   void forget(Call* call);
   static Kind kind_of(Lane lane);
   struct Limit {
@@ -81,7 +84,10 @@ class Gateway {
     const char *what, *state;  // for messages: "calls", "are running"
   };
   Limit limit_of(Kind kind) const;
-  // The calls of one caller, and the memory that they hold for replies, streams of keyframes apart.
+  // Whether its calls last long, wait for others mostly, and have memory of their own: not part of what a caller may
+  // use for the answers to his questions.
+  static bool lasts(Kind kind) { return kind == Kind::kStream || kind == Kind::kWatch; }
+  // The calls of one caller, and the memory that they hold for replies, those that last apart.
   struct Load {
     std::array<int, kKinds> calls{};
     std::size_t bytes = 0;
@@ -108,12 +114,13 @@ class Gateway {
   Mutex mutex_;
   ConditionVariable stop_;
   bool stopping_ RELMAP_GUARDED_BY(mutex_) = false;
+  bool look_ RELMAP_GUARDED_BY(mutex_) = false;                    // at all calls, now
   std::set<Call*> open_ RELMAP_GUARDED_BY(mutex_);                 // admitted, and not destroyed yet
   Call* cancelling_ RELMAP_GUARDED_BY(mutex_) = nullptr;           // by watch_, which is about to cancel it
   std::map<std::string, Load> callers_ RELMAP_GUARDED_BY(mutex_);  // those who have calls that run
   std::map<std::string, std::chrono::steady_clock::time_point> told_of_ RELMAP_GUARDED_BY(mutex_);
   // Declared last, so that they are joined first.
-  TaskPool general_, picture_thread_, maintenance_thread_, edit_threads_, wait_threads_;
+  TaskPool general_, picture_thread_, maintenance_thread_, edit_threads_, wait_threads_, watch_thread_;
   std::thread watch_;
 };
 
@@ -140,8 +147,18 @@ class Call {
   // A message was given to gRPC, or has left it. A call whose message does not leave in time is cancelled.
   void writing() { writing_since_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
   void written() { writing_since_ = 0; }
-  void cancel() { cancelled_ = true; }
+  void cancel() {
+    cancelled_ = true;
+    wake();
+  }
   void post(std::function<void()> task);
+
+  // For a stream that waits. `resume` is its next step, which is posted when wake() is called after wait(), or was
+  // since the last step began to look for something to send; at `until` at the latest; and when the call is to end.
+  // After wait() the call may be at its next step already, and must not be touched.
+  void resume_with(std::function<void()> resume) { resume_ = std::move(resume); }
+  void wait(std::chrono::steady_clock::time_point until);
+  void wake();  // thread-safe
   // Counts and logs the call, and returns what the caller gets, to be written at once. Must be called last, once.
   grpc::Status end(const Status& status);
 
@@ -155,7 +172,9 @@ class Call {
   Status admit_caller(std::size_t bytes);
   Status check_role(const Identity& caller) const;
   void leave();
-  bool stalled(std::chrono::steady_clock::time_point now) const;
+  // Why it is to be cancelled, since its caller takes no message; OK if it is not.
+  Status stalled(std::chrono::steady_clock::time_point now) const;
+  void look(std::chrono::steady_clock::time_point now);
 
   Gateway& gateway_;
   grpc::CallbackServerContext* const context_;
@@ -166,12 +185,17 @@ class Call {
   Identity caller_;
   std::atomic<bool> cancelled_{false};
   Deadline deadline_;
-  std::atomic<std::int64_t> writing_since_{0};  // 0: nothing is being written
+  std::atomic<std::int64_t> writing_since_{0};                  // 0: nothing is being written
+  enum class Sleep : std::uint8_t { kAwake, kAsleep, kWoken };  // kWoken: while it was awake
+  std::atomic<Sleep> sleep_{Sleep::kAwake};
+  std::atomic<std::int64_t> wake_at_{0};
+  std::function<void()> resume_;
   bool counted_ = false, running_ = false, entered_ = false;
   std::string known_peer_;  // over whose connection a known caller calls; empty: the caller is not known
   std::string entered_as_;  // whose calls it is counted among
   std::size_t entered_bytes_ = 0;
-  std::string asked_;  // the request, for the audit log
+  std::string asked_;     // the request, for the audit log
+  bool goes_on_ = false;  // it asks for another page of a list
   std::optional<Charge> charge_;
 };
 
@@ -218,10 +242,12 @@ template <typename Reply, typename Request, typename Handler>
 grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* context, const char* method, Lane lane,
                                                  const Request* request, Handler handler) {
   // A step takes one message from the producer and writes it. The next step is posted when the caller has taken the
-  // message, so a slow caller holds no thread.
+  // message, or when the stream is woken, so neither a slow caller nor a map that is quiet holds a thread.
   class Reactor final : public grpc::ServerWriteReactor<Reply> {
    public:
-    Reactor(Gateway& gateway, grpc::CallbackServerContext* c, const char* m, Lane l) : call(gateway, c, m, l) {}
+    Reactor(Gateway& gateway, grpc::CallbackServerContext* c, const char* m, Lane l) : call(gateway, c, m, l) {
+      call.resume_with([this] { step(); });
+    }
     void OnCancel() override { call.cancel(); }
     void OnDone() override { delete this; }
     void OnWriteDone(bool ok) override {
@@ -231,14 +257,21 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
     }
     void step() {
       bool more = false;
+      std::optional<Waiting> waiting;
       const Status status = call.guarded([&]() -> Status {
         if (Status late = call.deadline().check(); !late.ok()) return late;
-        auto next = producer();
+        auto next = producer(wake);
         if (!next.ok()) return next.status();
-        more = next->has_value();
-        if (more) message = std::move(**next);
+        if (!next->has_value()) return {};
+        if (const auto* wait = std::get_if<Waiting>(&**next)) {
+          waiting = *wait;
+          return {};
+        }
+        more = true;
+        message = std::move(std::get<Reply>(**next));
         return {};
       });
+      if (status.ok() && waiting) return call.wait(waiting->until);
       if (status.ok() && more) {
         call.writing();
         return this->StartWrite(&message);
@@ -247,7 +280,8 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
       this->Finish(call.end(status));
     }
     Call call;
-    Producer<Reply> producer;
+    const Wake wake = [this] { call.wake(); };
+    LiveProducer<Reply> producer;
     Reply message;
   };
   auto* reactor = new Reactor(*this, context, method, lane);
@@ -261,7 +295,7 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
     const Status status = call.guarded([&]() -> Status {
       if (Status late = call.deadline().check(); !late.ok()) return late;
       auto producer = handler(*request, call.deadline());
-      if (producer.ok()) reactor->producer = std::move(producer).value();
+      if (producer.ok()) reactor->producer = live(std::move(producer).value());
       return producer.status();
     });
     if (status.ok()) return reactor->step();

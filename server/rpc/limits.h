@@ -12,6 +12,8 @@ struct RpcLimits {
   int max_concurrent_per_caller = 48;      // of max_concurrent
   int max_ingest_streams = 256;            // not counted in max_concurrent
   int max_ingest_streams_per_caller = 64;  // of max_ingest_streams
+  int max_watchers = 256;                  // watches of the map; not counted in max_concurrent either
+  int max_watchers_per_caller = 64;        // of max_watchers
   int max_waiting = 64;                    // edits, and again calls of WaitIdle, that wait; not counted there either
   double stalled_s = 30;                   // a call is ended whose caller has not taken a message for so long
   int max_pictures = 16;                   // RPCs with a picture, of max_concurrent

@@ -37,6 +37,13 @@ class MapService final : public v1::Map::CallbackService {
   Unary* ListEdges(Context* context, const v1::ListEdgesRequest* request, v1::ListEdgesReply* reply) override {
     return unary(context, "Map.ListEdges", request, reply, list_edges);
   }
+  Unary* ExplainEdge(Context* context, const v1::ExplainEdgeRequest* request, v1::ExplainEdgeReply* reply) override {
+    return unary(context, "Map.ExplainEdge", request, reply, explain_edge);
+  }
+  Unary* GetClosureMatrix(Context* context, const v1::GetClosureMatrixRequest* request,
+                          v1::GetClosureMatrixReply* reply) override {
+    return unary(context, "Map.GetClosureMatrix", request, reply, get_closure_matrix);
+  }
   Unary* SetEdgeState(Context* context, const v1::SetEdgeStateRequest* request, v1::SetEdgeStateReply* reply) override {
     return unary(context, "Map.SetEdgeState", request, reply, set_edge_state, Lane::kEdits);
   }
@@ -53,7 +60,7 @@ class MapService final : public v1::Map::CallbackService {
     return unary(context, "Map.FindLabels", request, reply, find_labels);
   }
   Stream<v1::MapEvent>* WatchMap(Context* context, const v1::WatchMapRequest* request) override {
-    return unimplemented<v1::MapEvent>(context, "Map.WatchMap", request);
+    return stream<v1::MapEvent>(context, "Map.WatchMap", request, watch_map, Lane::kWatches);
   }
   Unary* ListRobots(Context* context, const v1::ListRobotsRequest* request, v1::ListRobotsReply* reply) override {
     return unary(context, "Map.ListRobots", request, reply, list_robots);
@@ -73,9 +80,10 @@ class MapService final : public v1::Map::CallbackService {
       return in_turn(lane, [&] { return call(core_, handler, r, d); });
     });
   }
-  template <typename Reply, typename Request, typename... Parts>
+  // `Messages` is a Producer or a LiveProducer.
+  template <typename Reply, typename Messages, typename Request, typename... Parts>
   Stream<Reply>* stream(Context* context, const char* method, const Request* request,
-                        Result<Producer<Reply>> (*handler)(const Request&, const Deadline&, Parts...),
+                        Result<Messages> (*handler)(const Request&, const Deadline&, Parts...),
                         Lane lane = Lane::kGeneral) {
     return gateway_.stream<Reply>(context, method, lane, request, [=, this](const Request& r, const Deadline& d) {
       return in_turn(lane, [&] { return call(core_, handler, r, d); });
@@ -86,15 +94,6 @@ class MapService final : public v1::Map::CallbackService {
     if (lane != Lane::kPictures) return handler();
     const MutexLock lock(core_.pictures.mutex);
     return handler();
-  }
-
-  // For an RPC that is defined but not served yet. It answers with its name, through the gateway like all others.
-  template <typename Reply, typename Request>
-  Stream<Reply>* unimplemented(Context* context, const char* method, const Request* request) {
-    return gateway_.stream<Reply>(
-        context, method, Lane::kGeneral, request, [method](const Request&, const Deadline&) -> Result<Producer<Reply>> {
-          return Status(Reason::UNIMPLEMENTED, std::string(method) + " is not served by this version of relmapd");
-        });
   }
 
   Core& core_;

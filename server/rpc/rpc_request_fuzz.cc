@@ -23,6 +23,7 @@
 #include "relmap/v1/ingest.pb.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
+#include "relmap/v1/watch.pb.h"
 #include "server/ingest/mapper_sink.h"
 #include "server/rpc/gatekeeper.h"
 #include "server/rpc/roles.h"
@@ -162,6 +163,7 @@ class Daemon {
     kUsual,
     kPatient,  // the daemon has done what the messages ask of it, and says so, before it is told that there are no more
     kLeaves,   // after the first answer
+    kWatches,  // until it has been told all that there is
   };
   // Sends the messages of a call, and returns how it ended and what was answered.
   std::pair<grpc::Status, std::vector<std::string>> call(const std::string& path,
@@ -193,12 +195,14 @@ class Daemon {
       grpc::Slice whole;
       if (reply.DumpToSingleSlice(&whole).ok())
         replies.emplace_back(reinterpret_cast<const char*>(whole.begin()), whole.size());
-      if (manner == Manner::kLeaves) context.TryCancel();
+      v1::MapEvent event;
+      const bool told = manner == Manner::kWatches && event.ParseFromString(replies.back()) && event.has_caught_up();
+      if (manner == Manner::kLeaves || told) context.TryCancel();
     }
     grpc::Status status;
     stream->Finish(&status, this);
     must(done());
-    if (manner == Manner::kLeaves && status.error_code() == grpc::StatusCode::CANCELLED) status = grpc::Status();
+    if (manner >= Manner::kLeaves && status.error_code() == grpc::StatusCode::CANCELLED) status = grpc::Status();
     return {status, std::move(replies)};
   }
 
@@ -536,7 +540,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     may_change = may_change || edits(method);
     const auto [status, replies] = daemon->call("/" + method.service()->full_name() + "/" + method.name(), messages,
-                                                how < 192                   ? Daemon::Manner::kUsual
+                                                method.name() == "WatchMap" ? Daemon::Manner::kWatches
+                                                : how < 192                 ? Daemon::Manner::kUsual
                                                 : method.client_streaming() ? Daemon::Manner::kPatient
                                                                             : Daemon::Manner::kLeaves);
     check_status(method.full_name(), status);

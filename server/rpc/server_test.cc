@@ -146,19 +146,6 @@ TEST_F(Server, AMapIsReindexedWithoutIt) {
   EXPECT_THAT(error_of(status).message(), testing::HasSubstr("relmap-admin reindex"));
 }
 
-TEST_F(Server, AnRpcThatIsNotServedYetIsRefusedByName) {
-  const auto expect_unimplemented = [](const grpc::Status& status, const std::string& name) {
-    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-    EXPECT_EQ(error_of(status).reason(), v1::REASON_UNIMPLEMENTED);
-    EXPECT_THAT(error_of(status).message(), testing::HasSubstr(name));
-  };
-  const auto watching = context();
-  const auto watch = map_stub_->WatchMap(watching.get(), {});
-  v1::MapEvent event;
-  EXPECT_FALSE(watch->Read(&event));
-  expect_unimplemented(watch->Finish(), "Map.WatchMap");
-}
-
 // gRPC itself would answer as if there were no such method.
 TEST_F(Server, ARequestThatCannotBeReadIsRefusedByName) {
   v1::SetLabelRequest label;

@@ -1,5 +1,4 @@
-// The three gRPC services over a Core. They only connect each RPC with the gateway and its handler. An RPC without a
-// handler answers UNIMPLEMENTED with its name.
+// The three gRPC services over a Core. They only connect each RPC with the gateway and its handler.
 #pragma once
 
 #include <grpcpp/impl/codegen/service_type.h>

@@ -32,6 +32,7 @@ Examples:
   relmap --server /var/lib/relmap/map status
   relmap --server map.example:50070 --credentials anna.pem sessions
   relmap top                             # robots, sessions, worker, memory, once a second
+  relmap watch                           # what happens to the map, as it happens
   relmap session freeze survey-2026      # takes no more keyframes, and is not adjusted any more
   relmap session delete test-drive       # takes its frames out of the map, for good
   relmap localise left.png right.png --calibration calib.txt
@@ -82,8 +83,8 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
   for (const auto add :
-       {add_status, add_top, add_sessions, add_session, add_frame, add_transform, add_localise, add_match, add_route,
-        add_label, add_labels, add_edges, add_edge, add_import, add_ingest, add_export, add_map, add_wait})
+       {add_status, add_top, add_watch, add_sessions, add_session, add_frame, add_transform, add_localise, add_match,
+        add_route, add_label, add_labels, add_edges, add_edge, add_import, add_ingest, add_export, add_map, add_wait})
     add(app, action);
 }
 

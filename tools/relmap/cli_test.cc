@@ -39,6 +39,7 @@ TEST(Cli, HelpIsDataAndSucceeds) {
 TEST(Cli, TheHelpOfEachCommandHasExamplesOfIt) {
   const std::vector<std::vector<const char*>> commands{{"status"},
                                                        {"top"},
+                                                       {"watch"},
                                                        {"sessions"},
                                                        {"session"},
                                                        {"session", "freeze"},

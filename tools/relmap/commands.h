@@ -17,6 +17,7 @@ using Action = std::function<Status(client::Client&, terminal::Console&)>;
 void add_status(CLI::App& app, Action& action);
 void add_wait(CLI::App& app, Action& action);
 void add_top(CLI::App& app, Action& action);
+void add_watch(CLI::App& app, Action& action);
 void add_sessions(CLI::App& app, Action& action);
 void add_session(CLI::App& app, Action& action);
 void add_frame(CLI::App& app, Action& action);

@@ -1,0 +1,279 @@
+// Watchers of the map beside a fleet, some of which read nothing: how long after a commit they have it, and what they
+// cost the worker and the memory.
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/relmap_client.h"
+#include "client/server_address.h"
+#include "proto/base/clock.h"
+#include "proto/base/mutex.h"
+#include "proto/base/quantile.h"
+#include "relmap/v1/map.grpc.pb.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+#include "tools/bench/stopwatch.h"
+#include "tools/bench/subcommand.h"
+
+namespace relmap::bench {
+
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+using testing::built_program;
+using testing::RunningDaemon;
+
+constexpr double kSentEach_hz = 2;    // keyframes a second of each robot
+constexpr std::uint32_t kDrives = 4;  // different ones, which robots share
+constexpr double kSettle_s = 2;       // of each phase, not measured
+
+struct WatchBenchOptions {
+  std::uint32_t robots = 20, watchers = 50, stalled = 10;
+  double seconds = 10;  // of a phase
+  std::uint32_t rounds = 4;
+  std::size_t memory_budget_mb = 1024;
+};
+
+// A daemon to which robots send all the time.
+class WatchedFleet {
+ public:
+  WatchedFleet(const std::string& folder, const WatchBenchOptions& options)
+      : folder_(folder),
+        // Without closures the worker is the thread that works most.
+        daemon_({.data = folder + "/map",
+                 .lcm = "",
+                 .memory_budget_mb = options.memory_budget_mb,
+                 .more = {"--no-closures"}}) {
+    for (std::uint32_t i = 0; i < options.robots; ++i) {
+      const std::string name = "robot-" + std::to_string(i);
+      robots_.push_back(std::make_unique<testing::Process>(
+          std::vector<std::string>{built_program("relmap-frontend"), drive(i % kDrives), "--robot", name, "--session",
+                                   name, "--server", data(), "--spool", "none", "--quiet", "--rate",
+                                   std::to_string(kSentEach_hz)},
+          testing::ProcessOptions{.standard_output = "", .standard_error = folder + "/" + name + ".log"}));
+    }
+    const auto begin = Clock::now();
+    const auto client = daemon_.client();
+    while (client->status().or_throw().frames < 4 * options.robots) {
+      if (seconds_since(begin) > 300) throw std::runtime_error("the robots do not send: " + daemon_.log());
+      std::this_thread::sleep_for(milliseconds(100));
+    }
+  }
+
+  RunningDaemon& daemon() { return daemon_; }
+  std::string data() const { return folder_ + "/map"; }
+
+  // Processor time of each thread so far, by its number.
+  std::map<std::string, double> thread_seconds() {
+    std::map<std::string, double> seconds;
+    for (const auto& task : fs::directory_iterator("/proc/" + std::to_string(daemon_.process().pid()) + "/task")) {
+      std::ifstream file(task.path() / "schedstat");
+      double ns = 0;
+      if (file >> ns) seconds[task.path().filename()] = 1e-9 * ns;
+    }
+    return seconds;
+  }
+
+ private:
+  std::string drive(std::uint32_t seed) const {
+    const std::string path = folder_ + "/drive-" + std::to_string(seed);
+    if (fs::exists(path)) return path;
+    const testing::Finished done =
+        testing::run_program({built_program("relmap-sim"), "points", "--out", path, "--frames", "2000",
+                              "--frames-per-lap", "300", "--appearance", "100", "--seed", std::to_string(seed + 1)});
+    if (done.exit_code != 0) throw std::runtime_error(done.standard_error);
+    return path;
+  }
+
+  const std::string folder_;
+  RunningDaemon daemon_;
+  std::vector<std::unique_ptr<testing::Process>> robots_;
+};
+
+// Watchers who read, each in a thread of its own, and others who do not.
+class Onlookers {
+ public:
+  Onlookers(const std::string& server, const WatchBenchOptions& options) {
+    const auto address = client::resolve_server(server).or_throw().address;
+    for (std::uint32_t i = 0; i < options.stalled; ++i) {
+      grpc::ChannelArguments arguments;
+      arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+      asleep_.push_back(std::make_unique<Asleep>());
+      Asleep& one = *asleep_.back();
+      one.stub = v1::Map::NewStub(grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+      v1::WatchMapRequest request;
+      request.set_from(v1::WATCH_FROM_OLDEST);
+      one.reader = one.stub->WatchMap(&one.context, request);
+    }
+    for (std::uint32_t i = options.stalled; i < options.watchers; ++i)
+      threads_.emplace_back([this, server] { watch(server); });
+    const auto begin = Clock::now();
+    while (begun_ < threads_.size()) {
+      if (seconds_since(begin) > 120) throw std::runtime_error("watchers do not catch up");
+      std::this_thread::sleep_for(milliseconds(10));
+    }
+  }
+  ~Onlookers() {
+    stop_ = true;
+    for (std::thread& thread : threads_) thread.join();
+    for (const auto& one : asleep_) one->context.TryCancel();
+  }
+
+  // Milliseconds from each commit until each watcher had all of it.
+  std::vector<double> latencies_ms() {
+    const MutexLock lock(mutex_);
+    return latencies_ms_;
+  }
+  std::uint64_t events() const { return events_; }
+
+ private:
+  struct Asleep {
+    grpc::ClientContext context;
+    std::unique_ptr<v1::Map::Stub> stub;
+    std::unique_ptr<grpc::ClientReader<v1::MapEvent>> reader;
+  };
+
+  void watch(const std::string& server) {
+    const auto client = client::Client::connect(server).or_throw();
+    client::WatchOptions options;
+    options.stopped = [this] { return stop_.load(); };
+    std::uint64_t known = 0;
+    const Status watched = client->watch(options, [&](const client::WatchEvent& event) {
+      const auto* caught_up = std::get_if<client::CaughtUp>(&event.what);
+      if (!caught_up) {
+        ++events_;
+        return Status();
+      }
+      const std::int64_t us = now_us() - caught_up->time_us;
+      if (known == 0) ++begun_;
+      if (known != 0 && caught_up->journal_sequence > known) {
+        const MutexLock lock(mutex_);
+        latencies_ms_.push_back(1e-3 * static_cast<double>(us));
+      }
+      known = caught_up->journal_sequence;
+      return Status();
+    });
+    if (!watched.ok()) std::fprintf(stderr, "a watch failed: %s\n", watched.to_string().c_str());
+  }
+
+  std::atomic<bool> stop_{false};
+  std::atomic<std::size_t> begun_{0};
+  std::atomic<std::uint64_t> events_{0};
+  Mutex mutex_;
+  std::vector<double> latencies_ms_ RELMAP_GUARDED_BY(mutex_);
+  std::vector<std::unique_ptr<Asleep>> asleep_;
+  std::vector<std::thread> threads_;
+};
+
+struct Phase {
+  std::map<std::string, double> threads_s;
+  double process_s = 0, seconds = 0;
+  std::uint64_t frames = 0;
+
+  void add(const Phase& other) {
+    for (const auto& [thread, s] : other.threads_s) threads_s[thread] += s;
+    process_s += other.process_s;
+    seconds += other.seconds;
+    frames += other.frames;
+  }
+  double per_frame_us(double s) const { return 1e6 * s / static_cast<double>(frames); }
+};
+
+Phase measure(WatchedFleet& fleet, client::Client& client, double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(kSettle_s));
+  const auto before = fleet.thread_seconds();
+  const double cpu = fleet.daemon().process().cpu_seconds();
+  const std::uint64_t frames = client.status().or_throw().frames;
+  const auto begin = Clock::now();
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  Phase phase;
+  phase.seconds = seconds_since(begin);
+  phase.frames = client.status().or_throw().frames - frames;
+  phase.process_s = fleet.daemon().process().cpu_seconds() - cpu;
+  for (const auto& [thread, s] : fleet.thread_seconds())
+    if (const auto found = before.find(thread); found != before.end()) phase.threads_s[thread] = s - found->second;
+  return phase;
+}
+
+// Of the memory for replies, the part that is used.
+double replies_share(client::Client& client) {
+  for (const client::MemoryShare& share : client.status().or_throw().memory_shares)
+    if (share.name == "replies") return static_cast<double>(share.used) / static_cast<double>(share.allowance);
+  throw std::runtime_error("no share is called replies");
+}
+
+void run(const WatchBenchOptions& options, Report& report) {
+  const storage::TemporaryFolder folder;
+  WatchedFleet fleet(folder / "fleet", options);
+  const auto client = fleet.daemon().client();
+  Phase quiet, watched;
+  std::vector<double> ms;
+  double share = 0, resident_bytes = 0;
+  std::uint64_t events = 0;
+  for (std::uint32_t round = 0; round < options.rounds; ++round) {
+    // In turn, and the other way round each second time, since a map that grows costs more.
+    for (int half = 0; half < 2; ++half) {
+      if ((half == 0) == (round % 2 == 0)) {
+        quiet.add(measure(fleet, *client, options.seconds));
+        continue;
+      }
+      const double resident = static_cast<double>(client->status().or_throw().resident_bytes);
+      Onlookers onlookers(fleet.data(), options);
+      watched.add(measure(fleet, *client, options.seconds));
+      share = std::max(share, replies_share(*client));
+      resident_bytes =
+          std::max(resident_bytes, static_cast<double>(client->status().or_throw().resident_bytes) - resident);
+      const auto more = onlookers.latencies_ms();
+      ms.insert(ms.end(), more.begin(), more.end());
+      events += onlookers.events();
+    }
+  }
+  if (ms.empty()) throw std::runtime_error("nobody heard of a commit");
+  const auto worker = std::max_element(quiet.threads_s.begin(), quiet.threads_s.end(),
+                                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  const double quiet_us = quiet.per_frame_us(worker->second);
+  const double watched_us = watched.per_frame_us(watched.threads_s.at(worker->first));
+  report.add("watchers", options.watchers, "of the map, and");
+  report.add("stalled", options.stalled, "of them that read nothing");
+  report.add("robots", options.robots, "that send");
+  report.add("keyframes_per_s", static_cast<double>(watched.frames) / watched.seconds, "of all robots together");
+  report.add("commit_to_client_p50_ms", quantile(ms, 0.5), "from a commit until a watcher has all of it");
+  report.add("commit_to_client_p99_ms", quantile(ms, 0.99), "");
+  report.add("commit_to_client_max_ms", quantile(ms, 1), "");
+  report.add("messages_per_s", static_cast<double>(events) / watched.seconds, "told to all watchers that read");
+  report.add("worker_us", quiet_us, "the worker's processor time of a keyframe, without watchers");
+  report.add("worker_watched_us", watched_us, "with them");
+  report.add("worker_ratio", watched_us / quiet_us, "");
+  report.add("daemon_us", quiet.per_frame_us(quiet.process_s), "the daemon's processor time of a keyframe, without");
+  report.add("daemon_watched_us", watched.per_frame_us(watched.process_s), "with them");
+  report.add("replies_share", share, "of the memory for replies that is used, all watches and calls together");
+  report.add("resident_growth_mb", 1e-6 * resident_bytes, "while they watch");
+}
+
+}  // namespace
+
+Run declare_watch(CLI::App& app) {
+  auto options = std::make_shared<WatchBenchOptions>();
+  app.add_option("--robots", options->robots, "that send 2 keyframes a second each")->capture_default_str();
+  app.add_option("--watchers", options->watchers, "of the map")->capture_default_str();
+  app.add_option("--stalled", options->stalled, "of them, that read nothing")->capture_default_str();
+  app.add_option("--seconds", options->seconds, "of a phase with watchers, and again without")->capture_default_str();
+  app.add_option("--rounds", options->rounds, "of both phases")->capture_default_str();
+  app.add_option("--memory-budget-mb", options->memory_budget_mb, "of the daemon")->capture_default_str();
+  return [options](Report& report) { run(*options, report); };
+}
+
+}  // namespace relmap::bench
