@@ -61,16 +61,19 @@ double changed_share(const ClosureDigest& c) {
 double changed(const ClosureDigest& c) { return 0.5 * ramp(changed_share(c), 0.25, 0.7) * unless_confirmed(c); }
 
 bool motion_contradicts(const ClosureDigest& c) {
-  return c.tests.motion == storage::MotionSays::kContradicts || c.reason == Reason::CONTRADICTS_MOTION;
+  return c.carried || c.tests.motion == storage::MotionSays::kContradicts || c.reason == Reason::CONTRADICTS_MOTION;
 }
 // One against none leaves it open which of the two is wrong; the more oppose it and the fewer agree, the less it is.
-// That the odometry contradicts it is explained by a ride if enough closures say the same.
+double opposed(const ClosureDigest& c) {
+  const double against = c.tests.opposing, all = against + c.agreeing;
+  return against > 0 ? 0.9 * against / all * (1 - std::exp2(-against)) : 0;
+}
+// Closures that contradict the odometry can agree only with their like, as those along two stretches that look alike
+// do; so it takes three times as many to explain it by a ride.
+double against_motion(const ClosureDigest& c) { return motion_contradicts(c) ? 0.8 * std::exp2(-c.agreeing / 3.0) : 0; }
 double contradiction(const ClosureDigest& c) {
-  const double against = c.tests.opposing, for_it = c.agreeing;
-  const double by_closures = against > 0 ? 0.9 * against / (against + for_it) * (1 - std::exp2(-against)) : 0;
-  const double by_motion = motion_contradicts(c) || c.carried ? 0.7 * std::max(alone(c), c.carried ? 0.15 : 0.5) : 0;
-  const double once = c.was_contradicted ? 0.5 * std::max(0.2, alone(c)) : 0;
-  return 1 - (1 - by_closures) * (1 - std::max(by_motion, once));
+  const double once = c.was_contradicted ? 0.4 * std::max(0.2, alone(c)) : 0;
+  return 1 - (1 - opposed(c)) * (1 - std::max(against_motion(c), once));
 }
 
 double lonely(const ClosureDigest& c) { return c.verification == Verification::kCompounded ? 0 : 0.6 * alone(c); }

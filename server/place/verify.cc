@@ -223,7 +223,7 @@ class Record {
   // What looks alike, before a pose is known.
   void add_alike(const StereoCamera& camera, const MapPoints& map, std::span<const DescriptorMatch> alike) {
     if (!query_.keep_matches) return;
-    matches_.clear();
+    kept_.clear();
     for (const DescriptorMatch& match : alike) add(camera, map, match, false);
   }
   // What was matched where a pose was found, and which of it (indices, ascending) agrees with the pose; what looked
@@ -231,38 +231,62 @@ class Record {
   void add_fit(const StereoCamera& camera, const MapPoints& map, std::span<const DescriptorMatch> matches,
                std::span<const std::uint32_t> inliers) {
     if (!query_.keep_matches) return;
-    const std::vector<PointMatch> alike = std::exchange(matches_, {});
-    std::vector<bool> known(query_.features.size());
-    for (std::uint32_t i = 0; i < matches.size(); ++i) {
-      known[matches[i].feature] = true;
+    const std::vector<Kept> alike = std::exchange(kept_, {});
+    for (std::uint32_t i = 0; i < matches.size(); ++i)
       add(camera, map, matches[i], std::binary_search(inliers.begin(), inliers.end(), i));
-    }
-    for (const PointMatch& match : alike)
-      if (!known[match.feature]) matches_.push_back(match);
+    add_new(alike);
+  }
+  // What does not agree by an earlier verification, whose frame is placed at T_frame_earlier in this one's `frame`.
+  void add_outliers(const Record& earlier, const StereoCamera& camera, FrameId frame, const SE3& T_frame_earlier) {
+    std::vector<Kept> outliers;
+    for (Kept kept : earlier.kept_)
+      if (!kept.match.inlier && place_in(camera, frame, T_frame_earlier * *kept.match.point, kept))
+        outliers.push_back(std::move(kept));
+    add_new(outliers);
   }
   // `found`, if given, is the pose of the query in the frame, with the camera that took it.
-  std::vector<PointMatch> take(const SE3* T_frame_query = nullptr, double focal_length = 0) {
+  std::vector<PointMatch> take(const SE3* T_frame_query = nullptr, double focal_length = 0) const {
+    std::vector<PointMatch> matches;
+    for (const Kept& kept : kept_) matches.push_back(kept.match);
     StereoCamera camera = query_.camera;
     if (camera.f == 0) camera.f = focal_length;
-    if (T_frame_query && camera.f > 0) set_residuals(query_.features, camera, *T_frame_query, matches_);
-    sort_matches(matches_);
-    return std::move(matches_);
+    if (T_frame_query && camera.f > 0) set_residuals(query_.features, camera, *T_frame_query, matches);
+    sort_matches(matches);
+    return matches;
   }
 
  private:
+  struct Kept {
+    PointMatch match;
+    FrameId measured_in;
+    Vector2 measured;  // there, pixels
+  };
+
+  // Sets where the point lies in the frame; false if the frame cannot see it.
+  static bool place_in(const StereoCamera& camera, FrameId frame, const Vector3& point, Kept& kept) {
+    kept.match.point = point;
+    kept.match.seen_in = kept.measured_in == frame ? FrameId() : kept.measured_in;
+    kept.match.pixel = kept.measured;
+    if (kept.measured_in == frame) return true;
+    if (!(point.z() > 0)) return false;
+    kept.match.pixel = camera.project(point).head<2>();
+    return true;
+  }
   void add(const StereoCamera& camera, const MapPoints& map, const DescriptorMatch& match, bool inlier) {
     const MapPoint& point = map.points[match.point];
-    PointMatch kept{match.feature, {point.u, point.v}, {}, inlier, point.point};
-    if (point.placed != 0) {
-      if (!(point.point.z() > 0)) return;
-      kept.seen_in = map.frames[point.placed].frame;
-      kept.pixel = camera.project(point.point).head<2>();
-    }
-    matches_.push_back(kept);
+    Kept kept{{match.feature, {}, {}, inlier, {}}, map.frames[point.placed].frame, {point.u, point.v}};
+    if (place_in(camera, map.frames.front().frame, point.point, kept)) kept_.push_back(std::move(kept));
+  }
+  // Adds what is of features that are not kept yet.
+  void add_new(const std::vector<Kept>& more) {
+    std::vector<bool> known(query_.features.size());
+    for (const Kept& kept : kept_) known[kept.match.feature] = true;
+    for (const Kept& kept : more)
+      if (!known[kept.match.feature]) kept_.push_back(kept);
   }
 
   const QueryPicture& query_;
-  std::vector<PointMatch> matches_;
+  std::vector<Kept> kept_;
 };
 
 // A pose of the query among the points around a candidate.
@@ -538,6 +562,8 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
     if (auto nearer = is_own ? verify_in_main_frame(graph, query, *found, seed, record_nearer)
                              : verify_stereo(graph, query, found->main_frame, seed, record_nearer);
         nearer.ok()) {
+      record_nearer.add_outliers(record, session->header.camera, nearer->place.match,
+                                 found->T_main_query * first.T_match_query.inverse());
       found = std::move(nearer);
       is_nearer = true;
     }

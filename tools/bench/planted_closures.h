@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "storage/graph/graph.h"
@@ -25,9 +27,10 @@ class Planter {
   Planter(PlantingGround ground, double apart, std::uint64_t seed)
       : ground_(std::move(ground)), apart_(apart), random_(seed, 77, 0) {}
 
-  // Plants one closure that stands by itself, or up to `length` that agree with each other, as along two stretches that
-  // look alike. Copies the figures of a true closure in force; plants nothing if there is none, or no place for it.
-  void plant(SessionNumber session, std::uint32_t length);
+  // Plants one closure that stands by itself, within a session or between two, or up to `length` that agree with each
+  // other, as along two stretches that look alike. Copies the figures of a true closure in force; plants nothing if
+  // there is none, or no place for it.
+  void plant(std::uint32_t length);
 
   const std::vector<EdgeId>& planted() const { return planted_; }
 
@@ -35,8 +38,9 @@ class Planter {
   struct Site {
     FrameId a, b;
   };
-  std::vector<storage::Edge> donors(const storage::Graph& graph, SessionNumber session) const;
-  std::optional<Site> site(const storage::Graph& graph, SessionNumber session, std::uint32_t length);
+  std::vector<storage::Edge> donors(const storage::Graph& graph) const;
+  FrameId some_frame(const storage::Graph& graph, std::uint32_t before_end);
+  std::optional<Site> site(const storage::Graph& graph, std::uint32_t length);
   bool plant(const Site& site, const storage::Edge& donor, const SE3& T_ab);
 
   const PlantingGround ground_;
