@@ -274,6 +274,20 @@ void add_lists(const Corpus& corpus) {
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { *r.mutable_frame() = frame(9, 45); }))
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { r.set_page_token("x"); }))
                  .bytes());
+  const auto explained = [](std::uint32_t index, std::uint32_t ordinal, bool pictures) {
+    return with<v1::ExplainEdgeRequest>([&](v1::ExplainEdgeRequest& r) {
+      *r.mutable_edge()->mutable_frame() = frame(1, index);
+      r.mutable_edge()->set_ordinal(ordinal);
+      r.set_pictures(pictures);
+    });
+  };
+  corpus.add("explain_edge", {},
+             Calls()
+                 .call("ExplainEdge", explained(45, 1, true))
+                 .call("ExplainEdge", explained(45, 0, false))
+                 .call("ExplainEdge", explained(9, 7, false))
+                 .call("ExplainEdge", v1::ExplainEdgeRequest())
+                 .bytes());
   const auto label = [](std::uint32_t index, const char* text, bool remove) {
     return with<v1::SetLabelRequest>([&](v1::SetLabelRequest& r) {
       *r.mutable_frame() = frame(1, index);
