@@ -1,12 +1,16 @@
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <cmath>
+#include <string_view>
 
 #include "client/drawing.h"
+#include "client/picture_bytes.h"
+#include "proto/base/base64.h"
 #include "proto/base/printf_text.h"
+#include "proto/base/utf8.h"
 
 namespace relmap::client {
 namespace {
+
+constexpr double kPixelsPerPoint = 2;  // of pictures: what a sharp screen shows
 
 // Widths of ' ' to '~', in thousandths of the em.
 constexpr int kDejaVuWidths[] = {317,  400, 459, 837, 636, 950, 779, 274, 390, 390, 500, 837, 317, 360, 317, 336,
@@ -22,19 +26,34 @@ constexpr int kDejaVuBoldWidths[] = {348,  456, 520, 837, 695, 1001, 872, 306,  
                                      500,  674, 715, 592, 715, 678,  435, 715,  711, 342, 342, 665, 342, 1041, 711, 687,
                                      715,  715, 493, 595, 478, 711,  651, 923,  645, 651, 582, 711, 365, 711,  837};
 
-std::string escape(const std::string& text) {
+// Not allowed in XML, or would let a name turn around what stands beside it.
+bool is_unseen(char32_t code) {
+  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x61C || code == 0x200E || code == 0x200F ||
+         (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069) || code == 0xFFFE || code == 0xFFFF;
+}
+
+std::string escape(std::string_view text) {
+  constexpr const char* kReplacement = "\xEF\xBF\xBD";  // U+FFFD
   std::string out;
-  for (const char c : text) {
-    if (c == '&')
+  while (!text.empty()) {
+    const std::string_view before = text;
+    const auto code = take_code_point(text);
+    if (!code) {
+      text.remove_prefix(1);
+      out += kReplacement;
+    } else if (*code == '\t' || *code == '\n') {
+      out += ' ';
+    } else if (is_unseen(*code)) {
+      out += kReplacement;
+    } else if (*code == '&') {
       out += "&amp;";
-    else if (c == '<')
+    } else if (*code == '<') {
       out += "&lt;";
-    else if (c == '>')
+    } else if (*code == '>') {
       out += "&gt;";
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += ' ';  // not allowed in XML
-    else
-      out += c;
+    } else {
+      out += before.substr(0, before.size() - text.size());
+    }
   }
   return out;
 }
@@ -100,13 +119,18 @@ class SvgDrawing : public Drawing {
     return thousandths * 1e-3 * style.size;
   }
 
-  Status save(const std::string& path) const override {
-    std::ofstream out(path, std::ios::binary);
-    out << body_ << "</svg>\n";
-    out.close();
-    if (!out) return {Reason::IO_ERROR, "cannot write " + path + ": " + std::strerror(errno)};
+  Status picture(const Vector2& corner, const Vector2& size, const std::string& file) override {
+    const auto bytes = reduced_picture(file, static_cast<int>(std::ceil(kPixelsPerPoint * size.x())));
+    if (!bytes.ok()) return bytes.status();
+    body_ += printf_text(
+        "<image x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" preserveAspectRatio=\"none\" "
+        "style=\"image-orientation:none\" href=\"data:image/%s;base64,",
+        corner.x(), corner.y(), size.x(), size.y(), is_png(*bytes) ? "png" : "jpeg");
+    body_ += base64(*bytes) + "\"/>\n";
     return {};
   }
+
+  Result<std::string> file() const override { return body_ + "</svg>\n"; }
 
  private:
   static std::string list(const std::vector<Vector2>& points) {
