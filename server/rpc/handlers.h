@@ -25,6 +25,8 @@ class ListSessionsRequest;
 class ListSessionsReply;
 class ListEdgesRequest;
 class ListEdgesReply;
+class ExplainEdgeRequest;
+class ExplainEdgeReply;
 class SetEdgeStateRequest;
 class SetEdgeStateReply;
 class ProposeEdgeRequest;
@@ -86,6 +88,9 @@ Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& reque
                                             map::Mapper& mapper, ViewKeeper& views);
 Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const Deadline& deadline,
                                       map::Mapper& mapper, ViewKeeper& views, const RpcLimits& limits);
+// Verifies at most two pairs of frames, from the features that are kept: no picture is decoded.
+Result<v1::ExplainEdgeReply> explain_edge(const v1::ExplainEdgeRequest& request, const Deadline& deadline,
+                                          map::Mapper& mapper, const RpcLimits& limits);
 Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& request, const Deadline& deadline,
                                              map::Mapper& mapper, EditLog& edits, const RpcLimits& limits);
 // Takes the pictures' reserve for a moment, and waits for the disk without it.

@@ -809,12 +809,12 @@ TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
 
 TEST_F(Handlers, AnEdgeTellsWhetherItIsMeasured) {
   storage::Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
-  EXPECT_FALSE(edge_message(step).unmeasured());
+  EXPECT_FALSE(edge_message(step, 0).unmeasured());
   step.kind = storage::EdgeKind::kPrior;
   step.support = storage::kMinSupport;
-  EXPECT_FALSE(edge_message(step).unmeasured()) << "landmarks on both sides tell it";
+  EXPECT_FALSE(edge_message(step, 0).unmeasured()) << "landmarks on both sides tell it";
   step.support = storage::kMinSupport - 1;
-  EXPECT_TRUE(edge_message(step).unmeasured());
+  EXPECT_TRUE(edge_message(step, 0).unmeasured());
 }
 
 TEST_F(Handlers, AMonoSessionHasNeitherEdgesNorATrajectory) {

@@ -92,7 +92,7 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
   const Status status = route::for_each_edge(view, filter, after, work.limit(), [&](const storage::Edge& edge) {
     more = static_cast<std::uint32_t>(reply.edges_size()) == max_edges || bytes > kMaxPageBytes;
     if (more) return false;
-    *reply.add_edges() = edge_message(edge);
+    *reply.add_edges() = edge_message(view, edge);
     bytes += reply.edges(reply.edges_size() - 1).ByteSizeLong();
     after = edge.id;
     return true;

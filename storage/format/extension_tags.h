@@ -17,7 +17,8 @@ namespace relmap::storage::tags {
 inline constexpr std::uint32_t kUniqueness = 1;  // of an edge, or a proposal
 inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: true if present; no bytes
 inline constexpr std::uint32_t kCarried = 3;  // of a closure: the frames along which it says that the robot was carried
-inline constexpr std::uint32_t kAlone = 25;   // of an edit of an edge: it concerns this edge only; no bytes
+inline constexpr std::uint32_t kEvidence = 22;      // of a closure: what the judgements of closures found out about it
+inline constexpr std::uint32_t kAlone = 25;         // of an edit of an edge: it concerns this edge only; no bytes
 inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state that it had before it was frozen
 inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a mark of what it may remove
 inline constexpr std::uint32_t kWayAround = 28;     // of a closure, or a proposal
@@ -33,6 +34,7 @@ inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kA
 // They write nothing where the value is unknown or the default.
 void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
+void add_closure_tests(Extensions& extensions, const ClosureTests& tests);
 void add_way_around(Extensions& extensions, const WayAround* around);  // nullptr: there is none
 void add_unseen(Extensions& extensions, const std::vector<std::uint32_t>& unseen);
 void add_unseen_place(Extensions& extensions, ClosureId closure);  // invalid: there is none
@@ -43,6 +45,7 @@ void add_edit_key(Extensions& extensions, const EditKey& edit);
 // They return false if the extension is malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
+bool take_closure_tests(Extensions& extensions, ClosureTests& tests);
 bool take_way_around(Extensions& extensions, std::shared_ptr<const WayAround>& around);
 bool take_unseen(Extensions& extensions, std::vector<std::uint32_t>& unseen);
 bool take_unseen_place(Extensions& extensions, ClosureId& closure);

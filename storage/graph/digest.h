@@ -34,6 +34,7 @@ struct ClosureDigest {
   bool decided = false;           // an operator accepted it
   bool carried = false;           // it says that the robot was carried
   Uniqueness uniqueness = {};
+  ClosureTests tests = {};
 };
 
 // A frame and its motion.
