@@ -1,11 +1,10 @@
 #include <cmath>
-#include <string_view>
 
 #include "client/drawing.h"
 #include "client/picture_bytes.h"
 #include "proto/base/base64.h"
+#include "proto/base/markup.h"
 #include "proto/base/printf_text.h"
-#include "proto/base/utf8.h"
 
 namespace relmap::client {
 namespace {
@@ -26,39 +25,7 @@ constexpr int kDejaVuBoldWidths[] = {348,  456, 520, 837, 695, 1001, 872, 306,  
                                      500,  674, 715, 592, 715, 678,  435, 715,  711, 342, 342, 665, 342, 1041, 711, 687,
                                      715,  715, 493, 595, 478, 711,  651, 923,  645, 651, 582, 711, 365, 711,  837};
 
-// Not allowed in XML, or would let a name turn around what stands beside it.
-bool is_unseen(char32_t code) {
-  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x61C || code == 0x200E || code == 0x200F ||
-         (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069) || code == 0xFFFE || code == 0xFFFF;
-}
-
-std::string escape(std::string_view text) {
-  constexpr const char* kReplacement = "\xEF\xBF\xBD";  // U+FFFD
-  std::string out;
-  while (!text.empty()) {
-    const std::string_view before = text;
-    const auto code = take_code_point(text);
-    if (!code) {
-      text.remove_prefix(1);
-      out += kReplacement;
-    } else if (*code == '\t' || *code == '\n') {
-      out += ' ';
-    } else if (is_unseen(*code)) {
-      out += kReplacement;
-    } else if (*code == '&') {
-      out += "&amp;";
-    } else if (*code == '<') {
-      out += "&lt;";
-    } else if (*code == '>') {
-      out += "&gt;";
-    } else {
-      out += before.substr(0, before.size() - text.size());
-    }
-  }
-  return out;
-}
-
-std::string hex(Colour c) { return printf_text("#%02x%02x%02x", c.red, c.green, c.blue); }
+std::string colour_text(Colour c) { return printf_text("#%02x%02x%02x", c.red, c.green, c.blue); }
 
 class SvgDrawing : public Drawing {
  public:
@@ -72,7 +39,7 @@ class SvgDrawing : public Drawing {
 
   void polyline(const std::vector<Vector2>& points, const Stroke& stroke) override {
     if (points.size() < 2) return;
-    body_ += "<polyline points=\"" + list(points) + "\" fill=\"none\" stroke=\"" + hex(stroke.colour) +
+    body_ += "<polyline points=\"" + list(points) + "\" fill=\"none\" stroke=\"" + colour_text(stroke.colour) +
              printf_text("\" stroke-width=\"%.2f\" stroke-linejoin=\"round\"", stroke.width);
     if (stroke.dash > 0)
       body_ += printf_text(" stroke-dasharray=\"%.2f\"", stroke.dash);
@@ -83,15 +50,15 @@ class SvgDrawing : public Drawing {
   }
 
   void polygon(const std::vector<Vector2>& points, Colour fill, double opacity) override {
-    body_ += "<polygon points=\"" + list(points) + "\" fill=\"" + hex(fill) + "\"";
+    body_ += "<polygon points=\"" + list(points) + "\" fill=\"" + colour_text(fill) + "\"";
     if (opacity < 1) body_ += printf_text(" fill-opacity=\"%.2f\"", opacity);
     body_ += "/>\n";
   }
 
   void disc(const Vector2& middle, double radius, Colour fill, double rim, Colour rim_colour) override {
     body_ += printf_text("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"", middle.x(), middle.y(), radius) +
-             hex(fill) + "\"";
-    if (rim > 0) body_ += printf_text(" stroke-width=\"%.2f\" stroke=\"", rim) + hex(rim_colour) + "\"";
+             colour_text(fill) + "\"";
+    if (rim > 0) body_ += printf_text(" stroke-width=\"%.2f\" stroke=\"", rim) + colour_text(rim_colour) + "\"";
     body_ += "/>\n";
   }
 
@@ -99,11 +66,11 @@ class SvgDrawing : public Drawing {
     const char* anchor = style.anchor == Anchor::kLeft ? "start" : style.anchor == Anchor::kMiddle ? "middle" : "end";
     body_ += printf_text("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\" text-anchor=\"%s\"%s fill=\"", at.x(), at.y(),
                          style.size, anchor, style.bold ? " font-weight=\"bold\"" : "") +
-             hex(style.colour) + "\"";
+             colour_text(style.colour) + "\"";
     if (style.halo > 0)
       body_ += printf_text(" stroke=\"#ffffff\" stroke-width=\"%.2f\" stroke-linejoin=\"round\" paint-order=\"stroke\"",
                            2 * style.halo);
-    body_ += ">" + escape(utf8) + "</text>\n";
+    body_ += ">" + markup_text(utf8) + "</text>\n";
   }
 
   // An upper bound: it is not known which of the fonts the reader has, and DejaVu Sans is the widest of them.

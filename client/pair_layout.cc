@@ -11,15 +11,15 @@
 namespace relmap::client {
 namespace {
 
-constexpr double kGap = 14;         // between the pictures
-constexpr double kWide = 2.2;       // wider pictures than this, as a ratio, lie above each other
-constexpr double kMaxHeight = 1.1;  // of a picture, in widths of its half of the column
-constexpr double kTitleLine = 20, kDetailLine = 15, kCountLine = 18;
-constexpr Colour kGround{226, 227, 224}, kDarkColour{22, 24, 28}, kOutlierColour{206, 208, 212};
+constexpr double kPictureGap = 14;  // between the pictures
+constexpr double kWideRatio = 2.2;  // wider pictures than this, as a ratio, lie above each other
+constexpr double kMaxRatio = 1.1;   // of a picture, in widths of its half of the column
+constexpr double kSideTitleLine = 20, kSideDetailLine = 15, kCountLine = 18;
+constexpr Colour kNoPictureColour{226, 227, 224}, kDarkColour{22, 24, 28}, kOutlierColour{206, 208, 212};
 
 const TextStyle kSideTitle{.size = 15, .colour = kInkColour, .bold = true},
     kSideDetail{.size = 12, .colour = kFaintColour}, kCountStyle{.size = 13, .colour = kInkColour},
-    kMissing{.size = 14, .colour = kInkColour};
+    kMissingStyle{.size = 14, .colour = kInkColour};
 
 // Of the camera, in pixels.
 Vector2 camera_size(const PairPicture::Side& side) {
@@ -45,7 +45,7 @@ void draw_ring(Drawing& out, const Vector2& at, double radius, const Stroke& str
   out.polyline(circle, stroke);
 }
 
-void draw_end(Drawing& out, const Vector2& at, bool hollow, Colour colour) {
+void draw_match_end(Drawing& out, const Vector2& at, bool hollow, Colour colour) {
   if (hollow) {
     draw_ring(out, at, 2.4, {kDarkColour, 2.6, 1, 0});
     draw_ring(out, at, 2.4, {colour, 1.3, 1, 0});
@@ -59,7 +59,7 @@ std::string draw_picture(Drawing& out, const FramePicture& picture, const Box& b
   Status missing = picture.missing;
   if (missing.ok() && !picture.data.empty()) missing = out.picture(box.low, box.size(), picture.data);
   if (missing.ok() && !picture.data.empty()) return {};
-  out.rectangle(box.low, box.size(), kGround, 1);
+  out.rectangle(box.low, box.size(), kNoPictureColour, 1);
   out.polyline({box.low, {box.high.x(), box.low.y()}, box.high, {box.low.x(), box.high.y()}, box.low},
                {kFaintColour, 1, 1, 5});
   return "no picture: " + (missing.ok() ? std::string("the map keeps none of it") : missing.message());
@@ -67,13 +67,13 @@ std::string draw_picture(Drawing& out, const FramePicture& picture, const Box& b
 
 // Above the points, which could make the text hard to read.
 void draw_missing(Drawing& out, const std::string& text, const Box& box) {
-  const std::vector<std::string> lines = wrap(out, text, kMissing, box.size().x() - 28);
+  const std::vector<std::string> lines = wrap(out, text, kMissingStyle, box.size().x() - 28);
   const double line = 18, tall = std::min(box.size().y() - 8, 12 + line * static_cast<double>(lines.size()));
-  out.rectangle(box.low + Vector2(6, 6), {box.size().x() - 12, tall}, kGround, 1);
+  out.rectangle(box.low + Vector2(6, 6), {box.size().x() - 12, tall}, kNoPictureColour, 1);
   double y = box.low.y() + 22;
   for (const std::string& words : lines) {
     if (y > box.high.y() - 4) break;
-    out.text({box.low.x() + 14, y}, words, kMissing);
+    out.text({box.low.x() + 14, y}, words, kMissingStyle);
     y += line;
   }
 }
@@ -82,25 +82,23 @@ void draw_missing(Drawing& out, const std::string& text, const Box& box) {
 
 PairLayout::PairLayout(const PairPicture& pair, const Drawing& measure, double width) : pair_(pair), measure_(measure) {
   const Vector2 left = camera_size(pair.left), right = camera_size(pair.right);
-  stacked_ = left.x() > kWide * left.y() && right.x() > kWide * right.y();
-  const double half = stacked_ ? width : (width - kGap) / 2;
+  stacked_ = left.x() > kWideRatio * left.y() && right.x() > kWideRatio * right.y();
+  const double half = stacked_ ? width : (width - kPictureGap) / 2;
   // Both pictures are scaled to the width of their half, or, if they are tall, to the greatest height.
-  const auto fitted = [&](const Vector2& camera) {
-    return std::min(half / camera.x(), kMaxHeight * half / camera.y());
-  };
+  const auto fitted = [&](const Vector2& camera) { return std::min(half / camera.x(), kMaxRatio * half / camera.y()); };
   left_scale_ = fitted(left);
   right_scale_ = fitted(right);
   const auto head = [&](const PairPicture::Side& side) {
-    double below = kTitleLine;
+    double below = kSideTitleLine;
     for (const std::string& detail : side.details)
-      below += kDetailLine * static_cast<double>(wrap(measure, detail, kSideDetail, half).size());
+      below += kSideDetailLine * static_cast<double>(wrap(measure, detail, kSideDetail, half).size());
     return below;
   };
   double below_pictures = 0;
   if (stacked_) {
     left_.low = {0, head(pair.left)};
     left_.high = left_.low + left_scale_ * left;
-    right_.low = {0, left_.high.y() + kGap};
+    right_.low = {0, left_.high.y() + kPictureGap};
     add_words(pair.left, {0, 0}, half);
     // Below its picture: lines cross what is between the two.
     below_pictures = head(pair.right);
@@ -109,9 +107,9 @@ PairLayout::PairLayout(const PairPicture& pair, const Drawing& measure, double w
     const double top = std::max(head(pair.left), head(pair.right));
     left_.low = {0, top};
     left_.high = left_.low + left_scale_ * left;
-    right_.low = {half + kGap, top};
+    right_.low = {half + kPictureGap, top};
     add_words(pair.left, {0, 0}, half);
-    add_words(pair.right, {half + kGap, 0}, half);
+    add_words(pair.right, {half + kPictureGap, 0}, half);
   }
   right_.high = right_.low + right_scale_ * right;
 
@@ -134,11 +132,11 @@ PairLayout::PairLayout(const PairPicture& pair, const Drawing& measure, double w
 }
 
 void PairLayout::add_words(const PairPicture::Side& side, const Vector2& at, double width) {
-  double y = at.y() + 0.75 * kTitleLine;
+  double y = at.y() + 0.75 * kSideTitleLine;
   words_.push_back({{at.x(), y}, wrap(measure_, side.title, kSideTitle, width).front(), kSideTitle});
   for (const std::string& detail : side.details)
     for (const std::string& line : wrap(measure_, detail, kSideDetail, width)) {
-      y += kDetailLine;
+      y += kSideDetailLine;
       words_.push_back({{at.x(), y}, line, kSideDetail});
     }
 }
@@ -194,7 +192,8 @@ void PairLayout::draw_matches(Drawing& out, const Vector2& corner) const {
     out.line(inlier.match.a, inlier.match.b, {inlier.colour, 1.2, 1, 0});
   }
   for (const Inlier& inlier : coloured)
-    for (const Vector2& end : {inlier.match.a, inlier.match.b}) draw_end(out, end, inlier.match.hollow, inlier.colour);
+    for (const Vector2& end : {inlier.match.a, inlier.match.b})
+      draw_match_end(out, end, inlier.match.hollow, inlier.colour);
 }
 
 }  // namespace relmap::client

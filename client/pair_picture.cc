@@ -10,24 +10,24 @@
 namespace relmap::client {
 namespace {
 
-constexpr Colour kPage{252, 252, 250}, kRule{214, 214, 208}, kTrough{230, 230, 226};
-constexpr double kMargin = 28, kColumnGap = 26;
+constexpr Colour kPairPaper{252, 252, 250}, kRowRule{214, 214, 208}, kTrough{230, 230, 226};
+constexpr double kPairMargin = 28, kWordsGap = 26;
 constexpr double kPairWidth = 2 * 640 + 14;  // of the pictures of a single pair
 constexpr double kRowPairs = 860, kRowWords = 380, kRowGap = 26;
 constexpr double kBar = 90;
 
-const TextStyle kTitle{.size = 22, .colour = kInkColour, .bold = true}, kSubtitle{.size = 15, .colour = kFaintColour},
-    kRowTitle{.size = 17, .colour = kInkColour, .bold = true}, kNote{.size = 14, .colour = kInkColour},
-    kStrong{.size = 16, .colour = kInkColour, .bold = true}, kSmall{.size = 13, .colour = kInkColour};
+const TextStyle kPairTitle{.size = 22, .colour = kInkColour, .bold = true},
+    kRowTitle{.size = 17, .colour = kInkColour, .bold = true}, kPairNote{.size = 14, .colour = kInkColour},
+    kGaugeStyle{.size = 16, .colour = kInkColour, .bold = true}, kDoubtStyle{.size = 13, .colour = kInkColour};
 
 // A column of a title, gauges and notes.
-class Words {
+class PairWords {
  public:
-  Words(const PairPicture& pair, const Drawing& measure, double width, const TextStyle& title) {
+  PairWords(const PairPicture& pair, const Drawing& measure, double width, const TextStyle& title) {
     add(measure, pair.title, title, 0, width, 1.25);
     if (!pair.title.empty()) height_ += 4;
     for (const PairPicture::Gauge& gauge : pair.gauges) {
-      const TextStyle& style = gauge.strong ? kStrong : kSmall;
+      const TextStyle& style = gauge.strong ? kGaugeStyle : kDoubtStyle;
       const double tall = gauge.strong ? 12 : 8, bar = gauge.strong ? kBar : 0.6 * kBar;
       bars_.push_back({{0, height_ + 0.35 * style.size - tall / 2 + 4}, {bar, tall}, gauge.value, gauge.colour});
       add(measure, gauge.text, style, kBar + 10, width - kBar - 10, 1.3);
@@ -35,7 +35,7 @@ class Words {
     }
     if (!pair.gauges.empty()) height_ += 6;
     for (const std::string& note : pair.notes) {
-      add(measure, note, kNote, 0, width, 1.3);
+      add(measure, note, kPairNote, 0, width, 1.3);
       height_ += 5;
     }
   }
@@ -78,47 +78,49 @@ class Words {
 }  // namespace
 
 Result<std::string> draw_pair(const PairPicture& pair, PictureFormat format) {
-  const auto measure = make_drawing(format, 1, 1, kPage, 1);
+  const auto measure = make_drawing(format, 1, 1, kPairPaper, 1);
   const PairLayout pictures(pair, *measure, kPairWidth);
   PairPicture heading, body;
   heading.title = pair.title;
   body.gauges = pair.gauges;
   body.notes = pair.notes;
-  const Words head(heading, *measure, kPairWidth, kTitle), below(body, *measure, kPairWidth, kTitle);
-  const double top = kMargin + head.height() + 4, under = top + pictures.height() + 10;
-  const auto out = make_drawing(format, kPairWidth + 2 * kMargin, under + below.height() + kMargin, kPage, 1);
-  head.draw(*out, {kMargin, kMargin});
-  pictures.draw(*out, {kMargin, top});
-  below.draw(*out, {kMargin, under});
+  const PairWords head(heading, *measure, kPairWidth, kPairTitle), below(body, *measure, kPairWidth, kPairTitle);
+  const double top = kPairMargin + head.height() + 4, under = top + pictures.height() + 10;
+  const auto out =
+      make_drawing(format, kPairWidth + 2 * kPairMargin, under + below.height() + kPairMargin, kPairPaper, 1);
+  head.draw(*out, {kPairMargin, kPairMargin});
+  pictures.draw(*out, {kPairMargin, top});
+  below.draw(*out, {kPairMargin, under});
   return out->file();
 }
 
 Result<std::string> draw_pair_sheet(const PairSheet& sheet, PictureFormat format) {
   if (sheet.pairs.empty()) return {Reason::EMPTY_MAP, "there is no pair of pictures to draw"};
-  const auto measure = make_drawing(format, 1, 1, kPage, 1);
-  const double width = kRowPairs + kColumnGap + kRowWords;
+  const auto measure = make_drawing(format, 1, 1, kPairPaper, 1);
+  const double width = kRowPairs + kWordsGap + kRowWords;
   PairPicture heading;
   heading.title = sheet.title;
   if (!sheet.subtitle.empty()) heading.notes = {sheet.subtitle};
-  const Words head(heading, *measure, width, kTitle);
+  const PairWords head(heading, *measure, width, kPairTitle);
   struct Row {
     PairLayout pictures;
-    Words words;
+    PairWords words;
     double top;
   };
   std::vector<Row> rows;
-  double y = kMargin + head.height() + (head.height() > 0 ? 12 : 0);
+  double y = kPairMargin + head.height() + (head.height() > 0 ? 12 : 0);
   for (const PairPicture& pair : sheet.pairs) {
-    rows.push_back({PairLayout(pair, *measure, kRowPairs), Words(pair, *measure, kRowWords, kRowTitle), y});
+    rows.push_back({PairLayout(pair, *measure, kRowPairs), PairWords(pair, *measure, kRowWords, kRowTitle), y});
     y += std::max(rows.back().pictures.height(), rows.back().words.height()) + kRowGap;
   }
-  const auto out = make_drawing(format, width + 2 * kMargin, y - kRowGap + kMargin, kPage, 1);
-  head.draw(*out, {kMargin, kMargin});
+  const auto out = make_drawing(format, width + 2 * kPairMargin, y - kRowGap + kPairMargin, kPairPaper, 1);
+  head.draw(*out, {kPairMargin, kPairMargin});
   for (const Row& row : rows) {
     if (&row != &rows.front())
-      out->line({kMargin, row.top - kRowGap / 2}, {kMargin + width, row.top - kRowGap / 2}, {kRule, 1, 1, 0});
-    row.pictures.draw(*out, {kMargin, row.top});
-    row.words.draw(*out, {kMargin + kRowPairs + kColumnGap, row.top});
+      out->line({kPairMargin, row.top - kRowGap / 2}, {kPairMargin + width, row.top - kRowGap / 2},
+                {kRowRule, 1, 1, 0});
+    row.pictures.draw(*out, {kPairMargin, row.top});
+    row.words.draw(*out, {kPairMargin + kRowPairs + kWordsGap, row.top});
   }
   return out->file();
 }

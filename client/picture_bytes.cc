@@ -10,7 +10,7 @@
 namespace relmap::client {
 
 namespace {
-constexpr std::size_t kSmall = 200 * 1024;  // bytes; a smaller file is passed on as it is
+constexpr std::size_t kSmallFile = 200 * 1024;  // bytes; a smaller file is passed on as it is
 }
 
 bool is_png(const std::string& file) { return file.starts_with("\x89PNG\r\n\x1a\n"); }
@@ -36,7 +36,7 @@ Result<Vector2> picture_size(const std::string& file) {
 Result<std::string> reduced_picture(const std::string& file, int width) {
   const auto picture = decode_picture(file);
   if (!picture.ok()) return picture.status();
-  if (file.size() <= kSmall || picture->cols <= width) return file;
+  if (file.size() <= kSmallFile || picture->cols <= width) return file;
   cv::Mat small;
   const double scale = static_cast<double>(width) / picture->cols;
   cv::resize(*picture, small, cv::Size(), scale, scale, cv::INTER_AREA);

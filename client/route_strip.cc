@@ -13,13 +13,14 @@
 namespace relmap::client {
 namespace {
 
-constexpr Colour kPage{252, 252, 250}, kRule{214, 214, 208}, kGround{226, 227, 224};
-constexpr double kWidth = 1200, kMargin = 36, kAxisRoom = 62, kGap = 10, kProfileHeight = 190;
-constexpr std::size_t kPerRow = 8;
+constexpr Colour kStripPaper{252, 252, 250}, kStripRule{214, 214, 208}, kNoViewColour{226, 227, 224};
+constexpr double kStripWidth = 1200, kStripMargin = 36, kAxisRoom = 62, kStopGap = 10, kProfileHeight = 190;
+constexpr std::size_t kStopsPerRow = 8;
 
-const TextStyle kTitle{.size = 24, .colour = kInkColour, .bold = true}, kSubtitle{.size = 15, .colour = kFaintColour},
-    kStopTitle{.size = 13, .colour = kInkColour, .bold = true}, kStopDetail{.size = 12, .colour = kFaintColour},
-    kTick{.size = 12, .colour = kFaintColour}, kLegend{.size = 13, .colour = kInkColour};
+const TextStyle kStripTitle{.size = 24, .colour = kInkColour, .bold = true},
+    kStripSubtitle{.size = 15, .colour = kFaintColour}, kStopTitle{.size = 13, .colour = kInkColour, .bold = true},
+    kStopDetail{.size = 12, .colour = kFaintColour}, kTickStyle{.size = 12, .colour = kFaintColour},
+    kWayStyle{.size = 13, .colour = kInkColour};
 
 struct StretchStyle {
   RouteStrip::StretchKind kind;
@@ -34,6 +35,7 @@ constexpr std::array<StretchStyle, 3> kStretches{
 
 // "41 m", "1.2 km"
 std::string distance_text(double metres) {
+  if (metres == 0) return "0";
   return metres < 1000 ? fixed(metres, metres < 10 ? 1 : 0) + " m" : fixed(metres / 1000, 1) + " km";
 }
 // "0:07", "18:40", "2:05:00"
@@ -53,9 +55,10 @@ double tick_of(double range, int ticks) {
 }
 
 std::string sigma_text(double metres) {
-  return metres < 0.0995 ? number_text(1000 * metres) + " mm"
-         : metres < 1    ? number_text(100 * metres) + " cm"
-                         : number_text(metres) + " m";
+  return metres == 0       ? "0"
+         : metres < 0.0995 ? number_text(1000 * metres) + " mm"
+         : metres < 1      ? number_text(100 * metres) + " cm"
+                           : number_text(metres) + " m";
 }
 
 class StripComposer {
@@ -75,9 +78,9 @@ class StripComposer {
   double height() const { return height_; }
 
   void draw(Drawing& out) const {
-    double y = kMargin;
+    double y = kStripMargin;
     for (const auto& [text, style] : heading_) {
-      out.text({kMargin, y + 0.8 * style.size}, text, style);
+      out.text({kStripMargin, y + 0.8 * style.size}, text, style);
       y += 1.4 * style.size;
     }
     draw_stops(out);
@@ -88,19 +91,20 @@ class StripComposer {
 
  private:
   void lay_out() {
-    double y = kMargin;
-    for (const auto& [text, style] : {std::pair(&strip_.title, kTitle), std::pair(&strip_.subtitle, kSubtitle)}) {
+    double y = kStripMargin;
+    for (const auto& [text, style] :
+         {std::pair(&strip_.title, kStripTitle), std::pair(&strip_.subtitle, kStripSubtitle)}) {
       if (text->empty()) continue;
-      for (const std::string& line : wrap(measure_, *text, style, kWidth - 2 * kMargin)) {
+      for (const std::string& line : wrap(measure_, *text, style, kStripWidth - 2 * kStripMargin)) {
         heading_.emplace_back(line, style);
         y += 1.4 * style.size;
       }
     }
     stops_top_ = y + 12;
-    const std::size_t count = strip_.stops.size(), rows = (count + kPerRow - 1) / kPerRow;
+    const std::size_t count = strip_.stops.size(), rows = (count + kStopsPerRow - 1) / kStopsPerRow;
     columns_ = (count + rows - 1) / rows;
     const double columns = static_cast<double>(std::max<std::size_t>(columns_, 4));
-    cell_ = (kWidth - 2 * kMargin - kGap * (columns - 1)) / columns;
+    cell_ = (kStripWidth - 2 * kStripMargin - kStopGap * (columns - 1)) / columns;
     for (const RouteStrip::Stop& stop : strip_.stops) {
       const auto size = picture_size(stop.picture);
       sizes_.push_back(size.ok() ? std::min(cell_ / size->x(), 0.8 * cell_ / size->y()) * *size : Vector2(0, 0));
@@ -109,31 +113,31 @@ class StripComposer {
     if (tall_ == 0) tall_ = 0.5 * cell_;
     row_height_ = tall_ + 52;
     profile_top_ = stops_top_ + row_height_ * static_cast<double>(rows) + 34;
-    low_ = {kMargin + kAxisRoom, profile_top_ + kProfileHeight};
+    low_ = {kStripMargin + kAxisRoom, profile_top_ + kProfileHeight};
     bars_top_ = low_.y() + 36;
     double below = bars_top_;
     for (const StretchStyle& style : kStretches)
       if (has(style.kind)) below += 20;
     legend_top_ = below + 8;
     for (const RouteStrip::Way& way : strip_.ways)
-      legend_lines_ += wrap(measure_, way.name, kLegend, kWidth - 2 * kMargin - kAxisRoom - 50).size();
-    height_ = legend_top_ + 20 * static_cast<double>(legend_lines_) + kMargin - 6;
+      legend_lines_ += wrap(measure_, way.name, kWayStyle, kStripWidth - 2 * kStripMargin - kAxisRoom - 50).size();
+    height_ = legend_top_ + 20 * static_cast<double>(legend_lines_) + kStripMargin - 6;
   }
 
   bool has(RouteStrip::StretchKind kind) const {
     return std::any_of(strip_.stretches.begin(), strip_.stretches.end(),
                        [&](const RouteStrip::Stretch& stretch) { return stretch.kind == kind; });
   }
-  double wide() const { return kWidth - kMargin - low_.x(); }
+  double wide() const { return kStripWidth - kStripMargin - low_.x(); }
   double x_of(double metres) const { return low_.x() + wide() * std::clamp(metres / length_, 0.0, 1.0); }
   double y_of(double sigma) const { return low_.y() - (kProfileHeight - 14) * sigma / highest_; }
 
   void draw_stops(Drawing& out) const {
     for (std::size_t i = 0; i < strip_.stops.size(); ++i) {
       const RouteStrip::Stop& stop = strip_.stops[i];
-      const Vector2 at(kMargin + static_cast<double>(i % columns_) * (cell_ + kGap),
+      const Vector2 at(kStripMargin + static_cast<double>(i % columns_) * (cell_ + kStopGap),
                        stops_top_ + static_cast<double>(i / columns_) * row_height_);
-      out.rectangle(at, {cell_, tall_}, kGround, 1);
+      out.rectangle(at, {cell_, tall_}, kNoViewColour, 1);
       if (sizes_[i].x() == 0 ||
           !out.picture(at + (Vector2(cell_, tall_) - sizes_[i]) / 2, sizes_[i], stop.picture).ok()) {
         out.text(at + Vector2(cell_ / 2, tall_ / 2 + 5), "no picture",
@@ -146,7 +150,7 @@ class StripComposer {
                cut(stop.frame.to_string() + (stop.label.empty() ? "" : " " + stop.label), kStopDetail), kStopDetail);
       // On the axis: where the picture was taken.
       number(out, {x_of(stop.distance_m), profile_top_ - 14}, i);
-      out.line({x_of(stop.distance_m), profile_top_ - 4}, {x_of(stop.distance_m), low_.y()}, {kRule, 1, 1, 0});
+      out.line({x_of(stop.distance_m), profile_top_ - 4}, {x_of(stop.distance_m), low_.y()}, {kStripRule, 1, 1, 0});
     }
   }
 
@@ -164,7 +168,7 @@ class StripComposer {
   void draw_profile(Drawing& out) const {
     const double step = tick_of(highest_, 4);
     for (double sigma = 0; sigma <= highest_ * 1.0001; sigma += step) {
-      out.line({low_.x(), y_of(sigma)}, {kWidth - kMargin, y_of(sigma)}, {kRule, 1, 1, 0});
+      out.line({low_.x(), y_of(sigma)}, {kStripWidth - kStripMargin, y_of(sigma)}, {kStripRule, 1, 1, 0});
       out.text({low_.x() - 8, y_of(sigma) + 4}, sigma_text(sigma),
                {.size = 12, .colour = kFaintColour, .anchor = Anchor::kRight});
     }
@@ -187,7 +191,7 @@ class StripComposer {
     }
     out.text({low_.x() + 6, profile_top_ + 12}, "standard deviation of the position relative to the start",
              {.size = 13, .colour = kInkColour, .halo = 2});
-    LabelPlacement placement({{low_.x(), profile_top_ + 18}, {kWidth - kMargin, low_.y() - 2}});
+    LabelPlacement placement({{low_.x(), profile_top_ + 18}, {kStripWidth - kStripMargin, low_.y() - 2}});
     for (const RouteStrip::Mark& mark : strip_.marks) {
       const TextStyle style{.size = 13, .colour = kInkColour, .bold = true, .halo = 2};
       const Vector2 at(x_of(mark.distance_m), low_.y() - 8);
@@ -213,9 +217,10 @@ class StripComposer {
         out.rectangle({from, profile_top_}, {to - from, kProfileHeight}, style.colour, 0.10);
         last = std::max(last, to);
       }
-      const double width = measure_.text_width(style.name, kTick);
-      const bool behind = last + 8 + width < kWidth - kMargin;
-      out.text({behind ? last + 8 : kWidth - kMargin - width, behind ? y + 4 : y + 15}, style.name, kTick);
+      const double width = measure_.text_width(style.name, kTickStyle);
+      const bool behind = last + 8 + width < kStripWidth - kStripMargin;
+      out.text({behind ? last + 8 : kStripWidth - kStripMargin - width, behind ? y + 4 : y + 15}, style.name,
+               kTickStyle);
       y += 20;
     }
   }
@@ -225,8 +230,8 @@ class StripComposer {
     for (std::size_t w = 0; w < strip_.ways.size(); ++w) {
       out.line({low_.x(), y + 6}, {low_.x() + 34, y + 6}, way_stroke(w));
       for (const std::string& line :
-           wrap(measure_, strip_.ways[w].name, kLegend, kWidth - 2 * kMargin - kAxisRoom - 50)) {
-        out.text({low_.x() + 44, y + 11}, line, kLegend);
+           wrap(measure_, strip_.ways[w].name, kWayStyle, kStripWidth - 2 * kStripMargin - kAxisRoom - 50)) {
+        out.text({low_.x() + 44, y + 11}, line, kWayStyle);
         y += 20;
       }
     }
@@ -289,9 +294,9 @@ std::vector<RouteStrip::Stretch> stretches_of(const std::vector<RouteStep>& step
 Result<std::string> draw_route_strip(const RouteStrip& strip, PictureFormat format) {
   if (strip.stops.empty()) return {Reason::EMPTY_MAP, "the route has no frame to draw"};
   constexpr double kScale = 1.5;
-  const auto measure = make_drawing(format, 1, 1, kPage, kScale);
+  const auto measure = make_drawing(format, 1, 1, kStripPaper, kScale);
   const StripComposer composer(strip, *measure);
-  const auto out = make_drawing(format, kWidth, composer.height(), kPage, kScale);
+  const auto out = make_drawing(format, kStripWidth, composer.height(), kStripPaper, kScale);
   composer.draw(*out);
   return out->file();
 }

@@ -32,7 +32,7 @@ FramePicture thumbnail_of(const client::Frame& frame, const SessionsByNumber& se
 PairPicture::Side side_of(FrameId frame, std::int64_t time_us, FramePicture picture, const SessionsByNumber& sessions) {
   PairPicture::Side side;
   side.title = frame.to_string();
-  side.details = {(time_us == 0 ? "" : time_text(time_us) + ", ") + session_text(sessions, frame.session)};
+  side.details = {(time_us == 0 ? "" : time_text(time_us) + ", ") + session_words(sessions, frame.session)};
   side.picture = std::move(picture);
   if (const StereoCamera* const camera = camera_of(frame, sessions)) {
     side.camera_width = camera->width;

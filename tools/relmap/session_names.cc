@@ -11,7 +11,7 @@ Result<SessionsByNumber> read_sessions(client::Client& client, terminal::Console
   return by_number;
 }
 
-std::string session_text(const SessionsByNumber& sessions, SessionNumber number) {
+std::string session_words(const SessionsByNumber& sessions, SessionNumber number) {
   const std::string text = "session " + std::to_string(number);
   const auto found = sessions.find(number);
   if (found == sessions.end()) return text;

@@ -15,6 +15,6 @@ using SessionsByNumber = std::map<SessionNumber, client::Session>;
 Result<SessionsByNumber> read_sessions(client::Client& client, terminal::Console& console);
 
 // "session 3, morning, of robot cart"; "session 3" if the map does not have it.
-std::string session_text(const SessionsByNumber& sessions, SessionNumber number);
+std::string session_words(const SessionsByNumber& sessions, SessionNumber number);
 
 }  // namespace relmap::cli
