@@ -42,6 +42,13 @@ bool is_vague(const Matrix6& covariance) {
          covariance.bottomRightCorner<3, 3>().trace() > kVagueRadians * kVagueRadians;
 }
 
+// Whether closures besides this one say that the robot was carried on the way.
+bool is_carried_by_others(const route::Transform& way, EdgeId closure) {
+  return std::ranges::any_of(way.carried.list(), [&](const route::CarriedStretch& stretch) {
+    return std::ranges::any_of(stretch.closures, [&](EdgeId id) { return id != closure; });
+  });
+}
+
 std::string way_text(const route::Transform& way) {
   return "the way between its ends without it (" + counted_text(way.edges, "edge") + ", " +
          number_text(way.distance_m) + " m)";
@@ -91,9 +98,12 @@ Result<OtherWay> other_way(const storage::Graph& graph, const storage::Edge& clo
     result.message = way_text(way) + " passes " + counted_text(way.unmeasured.steps(), "step") +
                      " that nothing measured, so it says nothing";
   } else if (comparable && chi2 > kChi2With6At99) {
-    const bool carried = closure.carried.session != 0 || !way.carried.list().empty();
+    const bool carried = is_carried_by_others(way, closure.id);
     result.verdict = carried ? Reason::CARRIED : Reason::CONTRADICTS_MOTION;
-    result.message = carried ? numbers + "; the robot was carried on it" : numbers;
+    result.message = numbers;
+    if (carried) result.message += "; other closures say, too, that the robot was carried on it";
+    if (!carried && closure.carried.session != 0)
+      result.message += "; only this closure says that the robot was carried on it";
   } else if (is_vague(way.covariance)) {
     result.verdict = Reason::OUT_OF_REACH;
     result.message = way_text(way) + " tells where the other end lies to " +

@@ -161,5 +161,37 @@ TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
   EXPECT_NEAR(described->scale * 4 * kWidth, described->camera.width, 1e-6);
 }
 
+// Blobs in a picture that is too large to be described as it is, with or without a lens that distorts.
+TEST_F(PictureQuery, ItsFeaturesAreFoundInThePictureAsItWasSent) {
+  constexpr int kLargeWidth = 2400, kLargeHeight = 1800;
+  cv::Mat picture(kLargeHeight, kLargeWidth, CV_8U, cv::Scalar(60));
+  std::vector<Vector2> blobs;
+  for (int row = 1; row < 6; ++row)
+    for (int column = 1; column < 8; ++column) {
+      const Vector2 at(300.0 * column + 3.3 * row, 300.0 * row - 2.7 * column);
+      blobs.push_back(at);
+      for (int y = static_cast<int>(at.y()) - 60; y <= at.y() + 60; ++y)
+        for (int x = static_cast<int>(at.x()) - 60; x <= at.x() + 60; ++x)
+          picture.at<std::uint8_t>(y, x) =
+              static_cast<std::uint8_t>(60 + 180 * std::exp(-(Vector2(x, y) - at).squaredNorm() / (2.0 * 16 * 16)));
+    }
+  const Bytes file = png(picture);
+  StereoCalibration lens;
+  lens.left = {1800, 1800, 1200, 900, -0.2, 0.04, 0.0004, -0.0003, 0};
+  lens.width = kLargeWidth;
+  lens.height = kLargeHeight;
+  for (const PictureCalibration& calibration : {PictureCalibration(), PictureCalibration(lens)}) {
+    const auto described = describe_picture({file, {}, calibration});
+    ASSERT_TRUE(described.ok()) << described.status().to_string();
+    ASSERT_LT(described->scale, 1);
+    int found = 0;
+    for (const Vector2& blob : blobs)
+      found += std::any_of(described->features.begin(), described->features.end(), [&](const AppearanceFeature& f) {
+        return (described->sent.of({f.u, f.v}) - blob).norm() < 0.5;
+      });
+    EXPECT_GE(found, 30) << "of " << blobs.size();
+  }
+}
+
 }  // namespace
 }  // namespace relmap::place

@@ -2,6 +2,7 @@
 
 #include "frontend/vision/picture.h"
 #include "proto/wire/convert.h"
+#include "server/map/edge_choice.h"
 #include "server/map/suspicion.h"
 #include "server/rpc/messages.h"
 #include "storage/graph/digest.h"
@@ -79,7 +80,7 @@ void tell_suspicion(const storage::Edge& edge, v1::Edge& message) {
   if (edge.kind != storage::EdgeKind::kLoop) return;
   const map::Suspicion suspicion = map::suspicion_of(storage::digest_of(edge));
   v1::Suspicion& told = *message.mutable_suspicion();
-  told.set_value(suspicion.value);
+  told.set_value(map::listed_suspicion(edge));
   told.set_remark(suspicion.remark);
   for (const map::Doubt& doubt : suspicion.doubts) {
     v1::Doubt& added = *told.add_doubts();

@@ -176,6 +176,21 @@ bool take_shown(Extensions& extensions, std::uint64_t& shown) {
   return r.at_end() && shown != 0;
 }
 
+void add_digests_commit(Extensions& extensions, std::uint64_t commit) {
+  if (commit == 0) return;
+  ByteWriter w;
+  w.put(commit);
+  add_extension(extensions, kDigests, w.take());
+}
+
+bool take_digests_commit(Extensions& extensions, std::uint64_t& commit) {
+  const auto bytes = take_extension(extensions, kDigests);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  commit = r.get<std::uint64_t>();
+  return r.at_end() && commit != 0;
+}
+
 void add_edit_key(Extensions& extensions, const EditKey& edit) {
   if (edit.key.empty()) return;
   ByteWriter w;

@@ -26,6 +26,8 @@ inline constexpr std::uint32_t kUnseen = 29;        // of a closure: frames that
 inline constexpr std::uint32_t kUnseenPlace = 30;   // of a proposal: the closure of whose place the query saw nothing
 inline constexpr std::uint32_t kEditKey = 31;       // of an edit in the journal: by what its caller names it
 
+inline constexpr std::uint32_t kDigests = 36;       // of the map's state: the commit as of which its digests are right
+
 // These tags say how the map came about, so map hashes leave them out. The last three are reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
 inline constexpr std::uint32_t kOwner = 18, kWallTime = 19, kAuthor = 20;
@@ -41,6 +43,7 @@ void add_unseen_place(Extensions& extensions, ClosureId closure);  // invalid: t
 void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
+void add_digests_commit(Extensions& extensions, std::uint64_t commit);
 void add_edit_key(Extensions& extensions, const EditKey& edit);
 // They return false if the extension is malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
@@ -52,6 +55,7 @@ bool take_unseen_place(Extensions& extensions, ClosureId& closure);
 bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
 bool take_shown(Extensions& extensions, std::uint64_t& shown);
+bool take_digests_commit(Extensions& extensions, std::uint64_t& commit);
 bool take_edit_key(Extensions& extensions, EditKey& edit);
 
 }  // namespace relmap::storage::tags

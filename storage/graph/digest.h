@@ -58,6 +58,9 @@ struct ChunkDigest {
   std::vector<FrameDigest> frames;  // those that are present, ascending by slot
 };
 
+// Which frames of a chunk are asked for: of a map without closures, none need be decoded to see that there are none.
+enum class DigestsOf : std::uint8_t { kAll, kClosures };  // closures: frames with closures, candidate or not
+
 // How far the estimate of a closure has moved away from what was measured, in standard deviations of the measurement:
 // the root of the squared Mahalanobis distance. 0 if the covariance cannot be used, or there is no metric measurement.
 float tension_of(const Edge& closure);
