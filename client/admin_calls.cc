@@ -102,27 +102,26 @@ Result<StoreStats> Client::stats() {
   return stats;
 }
 
-Result<std::vector<AuditEntry>> Client::audit(const AuditFilter& filter) {
+Result<AuditLog> Client::audit(const AuditFilter& filter) {
+  constexpr std::size_t kMaxPage = 1000;
   v1::ListAuditRequest request;
   request.set_from_us(filter.from_us);
   request.set_until_us(filter.until_us);
   request.set_who(filter.who);
   request.set_method(filter.method);
   request.set_failed(filter.failed);
-  constexpr std::size_t kMaxPage = 1000;
   request.set_page_size(static_cast<std::uint32_t>(filter.limit == 0 ? kMaxPage : std::min(filter.limit, kMaxPage)));
-  std::vector<AuditEntry> all;
-  const Status status = impl_->list_until<v1::ListAuditReply>(*impl_->admin, &v1::Admin::Stub::ListAudit, request,
-                                                              [&](const v1::ListAuditReply& page) -> Result<bool> {
-                                                                for (const v1::AuditEntry& message : page.entries()) {
-                                                                  if (filter.limit > 0 && all.size() == filter.limit)
-                                                                    return false;
-                                                                  all.push_back(read_audit(message));
-                                                                }
-                                                                return filter.limit == 0 || all.size() < filter.limit;
-                                                              });
+  AuditLog log;
+  const auto is_full = [&] { return filter.limit > 0 && log.entries.size() >= filter.limit; };
+  const Status status = impl_->list_until<v1::ListAuditReply>(
+      *impl_->admin, &v1::Admin::Stub::ListAudit, request, [&](const v1::ListAuditReply& page) -> Result<bool> {
+        log.unreadable += page.unreadable();
+        for (const v1::AuditEntry& message : page.entries())
+          if (!is_full()) log.entries.push_back(read_audit(message));
+        return !is_full();
+      });
   if (!status.ok()) return status;
-  return all;
+  return log;
 }
 
 Result<std::string> Client::set_log_level(const std::string& level) {

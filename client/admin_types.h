@@ -66,11 +66,15 @@ struct AuditEntry {
   std::string role;
   std::string from;  // the caller's address
   std::string method;
-  std::string request;  // in protobuf's text format, at most 2048 bytes
+  std::string request;  // in protobuf's text format; a long one is cut off
   std::string request_id;
   Status outcome;      // not ok: why it failed
   double seconds = 0;  // that it took
   std::string trace_id;
+};
+struct AuditLog {
+  std::vector<AuditEntry> entries;  // the newest first
+  std::uint64_t unreadable = 0;     // lines that were left out, since they are no entries
 };
 
 }  // namespace relmap::client

@@ -106,7 +106,7 @@ class Client {
   Result<Compaction> compact(const OnProgress& on_progress);
   Result<StoreStats> stats();
   // What operators did and tried, the newest first. UNSUPPORTED: the daemon keeps no audit log.
-  Result<std::vector<AuditEntry>> audit(const AuditFilter& filter = {});
+  Result<AuditLog> audit(const AuditFilter& filter = {});
   // Changes what the daemon's log tells, until the next change or start, and returns the former level. Empty: only
   // asks. INVALID_ARGUMENT: there is no such level.
   Result<std::string> set_log_level(const std::string& level);

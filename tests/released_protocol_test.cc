@@ -326,7 +326,7 @@ TEST_P(OldDaemon, AnswersEveryCallOfTheClient) {
       one.limit = 1;
       const auto audit = client->audit(one);
       expect_ok("audit", audit.status());
-      EXPECT_EQ(audit->size(), 1u);
+      EXPECT_EQ(audit->entries.size(), 1u);
     }
     expect_ok("labels", client->labels().status());
     expect_ok("edit_edge", client->edit_edge({a, 1}, client::EdgeAction::kRemove).status());

@@ -49,7 +49,7 @@ struct MapReport {
   Status robots_missing;
   client::StoreStats store;
   Status store_missing;
-  std::vector<client::AuditEntry> audit;  // the newest first
+  client::AuditLog audit;
   Status audit_missing;
 };
 

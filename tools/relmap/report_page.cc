@@ -321,14 +321,17 @@ std::string storage(const MapReport& report) {
 std::string audit(const MapReport& report) {
   std::string html = heading_html("Who edited what");
   if (!report.audit_missing.ok()) return html + left_out(report.audit_missing);
-  if (report.audit.empty()) return html + paragraph_html("Nobody has edited anything that is on record.");
+  if (report.audit.entries.empty()) return html + paragraph_html("Nobody has edited anything that is on record.");
   Table table({"when", "who", "role", "what", "request", "outcome"});
-  for (const client::AuditEntry& entry : report.audit)
+  for (const client::AuditEntry& entry : report.audit.entries)
     table.row({time_text(entry.time_us).substr(0, 19), shown_html(entry.who.empty() ? "(not known)" : entry.who),
                shown_html(entry.role), code_html(entry.method),
                "<div class=\"cut\">" + shown_html(std::string_view(entry.request).substr(0, 200)) + "</div>",
                entry.outcome.ok() ? "done" : reason_html(entry.outcome.reason())});
-  return html + table.html();
+  html += table.html();
+  if (report.audit.unreadable > 0)
+    html += paragraph_html(counted_text(report.audit.unreadable, "line") + " of the audit log cannot be read.");
+  return html;
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ MapReport report_of(const std::string& name) {
   report.robots = {robot};
   client::AuditEntry entry;
   entry.who = entry.role = entry.from = entry.method = entry.request = entry.request_id = name;
-  report.audit = {entry};
+  report.audit.entries = {entry};
   return report;
 }
 

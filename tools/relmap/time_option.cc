@@ -4,25 +4,9 @@
 #include <cmath>
 #include <regex>
 
+#include "proto/base/time_text.h"
+
 namespace relmap::cli {
-
-namespace {
-
-// The time that `match` tells: year, month, day, and perhaps hour, minute, second.
-Result<std::int64_t> time_of(const std::smatch& match, const std::string& text) {
-  const auto number = [&](std::size_t group) { return match[group].matched ? std::stoi(match[group].str()) : 0; };
-  const std::chrono::year_month_day day(std::chrono::year(number(1)),
-                                        std::chrono::month(static_cast<unsigned>(number(2))),
-                                        std::chrono::day(static_cast<unsigned>(number(3))));
-  const double seconds = match[6].matched ? std::stod(match[6].str()) : 0;
-  if (!day.ok() || number(4) > 23 || number(5) > 59 || seconds >= 60)
-    return {Reason::INVALID_ARGUMENT, "there is no time " + text};
-  const auto days = std::chrono::sys_days(day).time_since_epoch().count();
-  return ((static_cast<std::int64_t>(days) * 24 + number(4)) * 60 + number(5)) * 60'000'000 +
-         std::llround(seconds * 1e6);
-}
-
-}  // namespace
 
 std::int64_t now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -30,10 +14,19 @@ std::int64_t now_us() {
 }
 
 Result<std::int64_t> parse_time(const std::string& text, std::int64_t now_us) {
-  static const std::regex kTime(R"((\d{4})-(\d\d)-(\d\d)(?:[T ](\d\d):(\d\d)(?::(\d\d(?:\.\d{1,6})?))?)?Z?)");
+  static const std::regex kTime(R"((\d{4}-(\d\d)-(\d\d))(?:[T ](\d\d):(\d\d)(?::(\d\d(?:\.\d{1,6})?))?)?Z?)");
   static const std::regex kAgo(R"((\d{1,6}(?:\.\d{1,6})?)(s|min|h|d))");
   std::smatch match;
-  if (std::regex_match(text, match, kTime)) return time_of(match, text);
+  if (std::regex_match(text, match, kTime)) {
+    const auto part = [&](std::size_t group, const char* otherwise) {
+      return match[group].matched ? match[group].str() : std::string(otherwise);
+    };
+    // As time_text() writes it, with milliseconds.
+    const std::string seconds = (part(6, "00") + (part(6, "").size() > 2 ? "" : ".") + "000").substr(0, 6);
+    if (const auto time = time_of_text(part(1, "") + "T" + part(4, "00") + ":" + part(5, "00") + ":" + seconds + "Z"))
+      return *time;
+    return {Reason::INVALID_ARGUMENT, "there is no time " + text};
+  }
   if (std::regex_match(text, match, kAgo)) {
     const std::string unit = match[2];
     const double seconds = unit == "s" ? 1 : unit == "min" ? 60 : unit == "h" ? 3600 : 86400;
