@@ -11,7 +11,8 @@
 namespace relmap::map {
 
 // The suspicion of a closure (suspicion.h) as its digest gives it, which has it to four digits: what lists show,
-// compare and order by. 0 for an edge that is no loop closure.
+// compare and order by. 1 where the facts are no numbers, and 0 for an edge that is no loop closure.
+double listed_suspicion(const storage::ClosureDigest& closure);
 double listed_suspicion(const storage::Edge& edge);
 
 struct EdgeChoice {

@@ -14,9 +14,9 @@ namespace relmap::map {
 
 struct OtherWay {
   // OK: the way agrees. CONTRADICTS_MOTION: it does not. CARRIED: it does not, and leads along a stretch where the
-  // robot was carried, as closures besides this one say. NOT_CONNECTED: there is no other way. OUT_OF_REACH: it is too long,
-  // or leads through motion that nothing measured, or is known too badly to tell places apart. NOT_STEREO: the closure
-  // measured no metres.
+  // robot was carried, as closures besides this one say. NOT_CONNECTED: there is no other way. OUT_OF_REACH: it is too
+  // long, or leads through motion that nothing measured, or is known too badly to tell places apart. NOT_STEREO: the
+  // closure measured no metres.
   Reason verdict = Reason::NOT_CONNECTED;
   std::string message;                  // why, with the numbers
   std::optional<route::Transform> way;  // from a to b, if there is one; its covariance includes the odometry's drift

@@ -12,14 +12,14 @@ namespace {
 using testing::HasSubstr;
 
 // The closure of a frame that was proposed.
-storage::Edge closure_of(const storage::Graph& graph, FrameId query) {
+storage::Edge loop_of(const storage::Graph& graph, FrameId query) {
   for (const storage::Edge& edge : graph.hot(query)->edges)
     if (edge.kind == storage::EdgeKind::kLoop) return edge;
   throw std::runtime_error("no closure of " + query.to_string());
 }
 
-OtherWay way_of(const storage::Graph& graph, FrameId query) {
-  return other_way(graph, closure_of(graph, query)).or_throw();
+OtherWay other_way_of(const storage::Graph& graph, FrameId query) {
+  return other_way(graph, loop_of(graph, query)).or_throw();
 }
 
 // Two laps without a ride.
@@ -37,7 +37,7 @@ class OtherWayTest : public testing::Test {
     proposal.T_match_query.t.z() += metres;
     proposal.verification = storage::Verification::kStereo;
     drive_.apply(proposal);
-    if (accept) drive_.apply(edit_record(closure_of(drive_.map(), frame(query)).id, EdgeAction::kAccept, ""));
+    if (accept) drive_.apply(edit_record(loop_of(drive_.map(), frame(query)).id, EdgeAction::kAccept, ""));
   }
   static FrameId frame(std::uint32_t i) { return {kDriveSession, i}; }
 
@@ -47,7 +47,7 @@ class OtherWayTest : public testing::Test {
 
 TEST_F(OtherWayTest, OfATrueClosureAgreesAndDoesNotUseIt) {
   propose(70, 0, /*accept=*/true);
-  const OtherWay found = way_of(drive_.map(), frame(70));
+  const OtherWay found = other_way_of(drive_.map(), frame(70));
   EXPECT_EQ(found.verdict, Reason::OK) << found.message;
   ASSERT_TRUE(found.way);
   EXPECT_EQ(found.way->edges, 60u) << "all the way round, though the closure is in force";
@@ -59,7 +59,7 @@ TEST_F(OtherWayTest, OfAWrongClosureContradictsItWhetherItIsInForceOrNot) {
   propose(70, 3);
   propose(75, 3.5, /*accept=*/true);
   for (const std::uint32_t query : {70u, 75u}) {
-    const OtherWay found = way_of(drive_.map(), frame(query));
+    const OtherWay found = other_way_of(drive_.map(), frame(query));
     EXPECT_EQ(found.verdict, Reason::CONTRADICTS_MOTION) << found.message;
     EXPECT_GT(found.metres_apart, 2);
     EXPECT_GT(found.sigmas_apart, 4.1);
@@ -70,14 +70,14 @@ TEST_F(OtherWayTest, OfAWrongClosureContradictsItWhetherItIsInForceOrNot) {
 TEST_F(OtherWayTest, MayGoOverOtherClosures) {
   propose(66, 0, true);
   propose(70, 0);
-  const OtherWay found = way_of(drive_.map(), frame(70));
+  const OtherWay found = other_way_of(drive_.map(), frame(70));
   EXPECT_EQ(found.verdict, Reason::OK) << found.message;
   EXPECT_LT(found.way->edges, 15u);
 }
 
 TEST_F(OtherWayTest, ThatIsTooLongSaysNothing) {
   propose(70, 0);
-  const OtherWay found = other_way(drive_.map(), closure_of(drive_.map(), frame(70)), route::WorkLimit{5, {}}).or_throw();
+  const OtherWay found = other_way(drive_.map(), loop_of(drive_.map(), frame(70)), route::WorkLimit{5, {}}).or_throw();
   EXPECT_EQ(found.verdict, Reason::OUT_OF_REACH);
   EXPECT_FALSE(found.way);
 }
@@ -87,12 +87,12 @@ TEST_F(OtherWayTest, EndsWithItsWork) {
   const route::WorkLimit late{.max_frames = 1000, .proceed = [](std::size_t) -> Status {
                                 return {Reason::DEADLINE, ""};
                               }};
-  EXPECT_EQ(other_way(drive_.map(), closure_of(drive_.map(), frame(70)), late).reason(), Reason::DEADLINE);
+  EXPECT_EQ(other_way(drive_.map(), loop_of(drive_.map(), frame(70)), late).reason(), Reason::DEADLINE);
 }
 
 TEST_F(OtherWayTest, WithoutMetresIsNotCompared) {
   propose(70, 0);
-  storage::Edge closure = closure_of(drive_.map(), frame(70));
+  storage::Edge closure = loop_of(drive_.map(), frame(70));
   closure.verification = storage::Verification::kEpipolar;
   EXPECT_EQ(other_way(drive_.map(), closure)->verdict, Reason::NOT_STEREO);
 }
@@ -100,7 +100,7 @@ TEST_F(OtherWayTest, WithoutMetresIsNotCompared) {
 TEST(OtherWayOfARide, IsCarriedIfOthersSayItToo) {
   RiddenDrive ridden(kBeyond);
   for (std::uint32_t i = kCircuit + 4; i < kCircuit + 30; i += 4) ridden.drive().apply(ridden.closure(i));
-  const storage::Edge closure = closure_of(ridden.map(), RiddenDrive::frame(kCircuit + 20));
+  const storage::Edge closure = loop_of(ridden.map(), RiddenDrive::frame(kCircuit + 20));
   ASSERT_EQ(closure.state, storage::EdgeState::kAccepted) << reason_name(closure.reason);
   // The nearest closures lead past the ride, which is compared only without them.
   class Alone final : public storage::ForwardingGraph<storage::Graph> {

@@ -13,7 +13,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 // A closure as most true ones are.
-ClosureDigest good() {
+ClosureDigest ordinary() {
   ClosureDigest closure;
   closure.state = storage::EdgeState::kAccepted;
   closure.reason = Reason::CONSISTENT;
@@ -28,28 +28,28 @@ ClosureDigest good() {
   return closure;
 }
 
-ClosureDigest with(void (*change)(ClosureDigest&)) {
-  ClosureDigest closure = good();
+ClosureDigest ordinary_but(void (*change)(ClosureDigest&)) {
+  ClosureDigest closure = ordinary();
   change(closure);
   return closure;
 }
 
 // The weight of a kind of doubt, and its message; 0 without one.
-double weight(const ClosureDigest& closure, DoubtKind kind) {
+double weight_of(const ClosureDigest& closure, DoubtKind kind) {
   for (const Doubt& doubt : suspicion_of(closure).doubts)
     if (doubt.kind == kind) return doubt.weight;
   return 0;
 }
-std::string words(const ClosureDigest& closure, DoubtKind kind) {
+std::string words_of(const ClosureDigest& closure, DoubtKind kind) {
   for (const Doubt& doubt : suspicion_of(closure).doubts)
     if (doubt.kind == kind) return doubt.message;
   return {};
 }
 
-TEST(Suspicion, OfAnOrdinaryClosureIsSmall) { EXPECT_LT(suspicion_value(good()), 0.05); }
+TEST(Suspicion, OfAnOrdinaryClosureIsSmall) { EXPECT_LT(suspicion_value(ordinary()), 0.05); }
 
 TEST(Suspicion, CombinesItsDoubtsAsIndependentOnesAndListsTheHeaviestFirst) {
-  const Suspicion found = suspicion_of(with([](ClosureDigest& c) {
+  const Suspicion found = suspicion_of(ordinary_but([](ClosureDigest& c) {
     c.inliers = 25;
     c.agreeing = 1;
     c.unseen = 3;
@@ -87,29 +87,29 @@ TEST(Suspicion, EachFactThatSpeaksAgainstAClosureRaisesIt) {
       {DoubtKind::kUnseen, [](ClosureDigest& c) { c.unseen = 6; }, "6 frames"},
   };
   for (const auto& fact : facts) {
-    const ClosureDigest worse = with(fact.worse);
-    EXPECT_GT(weight(worse, fact.kind), weight(good(), fact.kind)) << fact.says;
-    EXPECT_GT(suspicion_value(worse), suspicion_value(good())) << fact.says;
-    EXPECT_THAT(words(worse, fact.kind), HasSubstr(fact.says));
+    const ClosureDigest worse = ordinary_but(fact.worse);
+    EXPECT_GT(weight_of(worse, fact.kind), weight_of(ordinary(), fact.kind)) << fact.says;
+    EXPECT_GT(suspicion_value(worse), suspicion_value(ordinary())) << fact.says;
+    EXPECT_THAT(words_of(worse, fact.kind), HasSubstr(fact.says));
   }
 }
 
 TEST(Suspicion, WeighsWhatPicturesShowLessIfOthersConfirmIt) {
   const auto poor = [](std::uint16_t agreeing) {
-    ClosureDigest closure = good();
+    ClosureDigest closure = ordinary();
     closure.inliers = 25;
     closure.tests = {};
     closure.agreeing = agreeing;
     return closure;
   };
-  EXPECT_GT(weight(poor(0), DoubtKind::kFewInliers), 2 * weight(poor(6), DoubtKind::kFewInliers));
+  EXPECT_GT(weight_of(poor(0), DoubtKind::kFewInliers), 2 * weight_of(poor(6), DoubtKind::kFewInliers));
   EXPECT_GT(suspicion_value(poor(0)), suspicion_value(poor(1)));
   EXPECT_GT(suspicion_value(poor(1)), suspicion_value(poor(6)));
 }
 
 TEST(Suspicion, FindsWhatLooksGoodButFitsNothing) {
   // A look-alike: its own figures are those of a true one.
-  const ClosureDigest planted = with([](ClosureDigest& c) {
+  const ClosureDigest planted = ordinary_but([](ClosureDigest& c) {
     c.agreeing = 0;
     c.tests = {3, storage::MotionSays::kContradicts, 0.5F};
     c.decided = true;
@@ -123,7 +123,7 @@ TEST(Suspicion, FindsWhatLooksGoodButFitsNothing) {
 
 TEST(Suspicion, OfManyAgainstOneIsTheOnes) {
   const auto opposed = [](std::uint16_t opposing, std::uint16_t agreeing) {
-    ClosureDigest closure = good();
+    ClosureDigest closure = ordinary();
     closure.agreeing = agreeing;
     closure.tests.opposing = opposing;
     return suspicion_value(closure);
@@ -132,7 +132,7 @@ TEST(Suspicion, OfManyAgainstOneIsTheOnes) {
 }
 
 TEST(Suspicion, SaysWhatIsNotKnown) {
-  ClosureDigest imported = good();
+  ClosureDigest imported = ordinary();
   imported.verification = storage::Verification::kImported;
   imported.inliers = 0;
   imported.probability = imported.spread = 0;
@@ -148,7 +148,7 @@ TEST(Suspicion, SaysWhatIsNotKnown) {
   EXPECT_EQ(suspicion_value(bridge), 0);
   EXPECT_THAT(suspicion_of(bridge).remark, HasSubstr("deleted session"));
 
-  ClosureDigest proposed = good();
+  ClosureDigest proposed = ordinary();
   proposed.uniqueness = {};
   EXPECT_THAT(suspicion_of(proposed).remark, HasSubstr("not measured"));
 }

@@ -72,26 +72,26 @@ class EvidenceHandlers : public testing::Test {
   Deadline deadline_;
 };
 
-constexpr FrameId kEarly{1, 4}, kLate{1, 44};  // one lap apart
+constexpr FrameId kBefore{1, 4}, kAgain{1, 44};  // one lap apart
 
 TEST_F(EvidenceHandlers, ACandidateIsExplained) {
-  const v1::Edge proposed = propose(kEarly, kLate);
+  const v1::Edge proposed = propose(kBefore, kAgain);
   const auto reply = explain(proposed.id()).or_throw();
   EXPECT_EQ(reply.edge().state(), v1::EDGE_STATE_CANDIDATE);
   EXPECT_EQ(reply.edge().history_size(), 1);
   EXPECT_TRUE(has(reply.edge().suspicion(), v1::DOUBT_KIND_LONELY));
   EXPECT_GT(reply.edge().suspicion().value(), 0);
-  EXPECT_EQ(reply.edge().time_us(), map_.mapper->view()->hot(kLate)->time_us);
+  EXPECT_EQ(reply.edge().time_us(), map_.mapper->view()->hot(kAgain)->time_us);
   EXPECT_EQ(reply.correspondences_reason(), v1::REASON_OK) << reply.correspondences_message();
   EXPECT_EQ(reply.motion().verdict(), v1::REASON_OK) << reply.motion().message();
-  EXPECT_EQ(reply.motion().edges(), kLate.index - proposed.a().index());
+  EXPECT_EQ(reply.motion().edges(), kAgain.index - proposed.a().index());
   EXPECT_EQ(reply.agreements_size(), 0);
   EXPECT_EQ(reply.map_version(), map_.mapper->view()->version());
   EXPECT_FALSE(reply.has_picture_a()) << "nobody asked for it";
 }
 
 TEST_F(EvidenceHandlers, CorrespondencesLieInBothFramesWhereTheirPointsProject) {
-  const v1::Edge proposed = propose(kEarly, kLate);
+  const v1::Edge proposed = propose(kBefore, kAgain);
   const FrameId a = from_wire(proposed.a()).or_throw(), b = from_wire(proposed.b()).or_throw();
   const auto reply = explain(proposed.id()).or_throw();
   const StereoCamera camera = map_.circuit.options().camera;
@@ -123,7 +123,7 @@ TEST_F(EvidenceHandlers, CorrespondencesLieInBothFramesWhereTheirPointsProject) 
 }
 
 TEST_F(EvidenceHandlers, AnAcceptedClosureNamesThoseThatAgree) {
-  const v1::Edge first = propose(kEarly, kLate), second = propose({1, 6}, {1, 46});
+  const v1::Edge first = propose(kBefore, kAgain), second = propose({1, 6}, {1, 46});
   const auto reply = explain(second.id()).or_throw();
   EXPECT_EQ(reply.edge().state(), v1::EDGE_STATE_ACCEPTED);
   ASSERT_EQ(reply.agreements_size(), 1);
@@ -140,7 +140,7 @@ TEST_F(EvidenceHandlers, AnAcceptedClosureNamesThoseThatAgree) {
 }
 
 TEST_F(EvidenceHandlers, AWrongClosureIsContradicted) {
-  propose(kEarly, kLate);
+  propose(kBefore, kAgain);
   propose({1, 6}, {1, 46});
   // Good figures, but another place of the circuit.
   v1::Edge planted = record({1, 20}, {1, 47}, truth({1, 7}, {1, 47}), storage::Verification::kStereo);
@@ -158,7 +158,7 @@ TEST_F(EvidenceHandlers, AWrongClosureIsContradicted) {
 }
 
 TEST_F(EvidenceHandlers, SaysWhyThereAreNoCorrespondences) {
-  const v1::Edge imported = record(kEarly, kLate, truth(kEarly, kLate), storage::Verification::kImported);
+  const v1::Edge imported = record(kBefore, kAgain, truth(kBefore, kAgain), storage::Verification::kImported);
   const auto of_imported = explain(imported.id()).or_throw();
   EXPECT_EQ(of_imported.correspondences_reason(), v1::REASON_UNSUPPORTED);
   EXPECT_THAT(of_imported.correspondences_message(), HasSubstr("imported"));
@@ -180,7 +180,7 @@ TEST_F(EvidenceHandlers, RefusesWhatIsNoClosure) {
 }
 
 TEST_F(EvidenceHandlers, EndsAtItsDeadline) {
-  const v1::Edge proposed = propose(kEarly, kLate);
+  const v1::Edge proposed = propose(kBefore, kAgain);
   v1::ExplainEdgeRequest request;
   *request.mutable_edge() = proposed.id();
   Deadline late;
@@ -189,7 +189,7 @@ TEST_F(EvidenceHandlers, EndsAtItsDeadline) {
 }
 
 TEST_F(EvidenceHandlers, AFrameWithoutAPictureSaysSo) {
-  const v1::Edge proposed = propose(kEarly, kLate);
+  const v1::Edge proposed = propose(kBefore, kAgain);
   const auto reply = explain(proposed.id(), /*pictures=*/true).or_throw();
   for (const v1::FramePicture* picture : {&reply.picture_a(), &reply.picture_b()}) {
     EXPECT_TRUE(picture->data().empty());

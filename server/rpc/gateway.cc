@@ -1,5 +1,7 @@
 #include "server/rpc/gateway.h"
 
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
