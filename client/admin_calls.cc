@@ -113,13 +113,14 @@ Result<AuditLog> Client::audit(const AuditFilter& filter) {
   request.set_page_size(static_cast<std::uint32_t>(filter.limit == 0 ? kMaxPage : std::min(filter.limit, kMaxPage)));
   AuditLog log;
   const auto is_full = [&] { return filter.limit > 0 && log.entries.size() >= filter.limit; };
-  const Status status = impl_->list_until<v1::ListAuditReply>(
-      *impl_->admin, &v1::Admin::Stub::ListAudit, request, [&](const v1::ListAuditReply& page) -> Result<bool> {
-        log.unreadable += page.unreadable();
-        for (const v1::AuditEntry& message : page.entries())
-          if (!is_full()) log.entries.push_back(read_audit(message));
-        return !is_full();
-      });
+  const Status status = impl_->list_until<v1::ListAuditReply>(*impl_->admin, &v1::Admin::Stub::ListAudit, request,
+                                                              [&](const v1::ListAuditReply& page) -> Result<bool> {
+                                                                log.unreadable += page.unreadable();
+                                                                for (const v1::AuditEntry& message : page.entries())
+                                                                  if (!is_full())
+                                                                    log.entries.push_back(read_audit(message));
+                                                                return !is_full();
+                                                              });
   if (!status.ok()) return status;
   return log;
 }

@@ -165,8 +165,8 @@ class MapPanel::Pen {
     if (picture_.route) route();
     for (const auto& [session, frames] : frames_) trajectory(frames);
     closures();
-    tears();
     for (const auto& [session, frames] : frames_) ends(session, frames);
+    tears();
     texts();
     Vector2 at;
     if (picture_.query && find_query(at)) draw_query(out_, at, 36 * panel_.plan_.heading(query_pose()));

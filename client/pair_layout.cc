@@ -21,15 +21,6 @@ const TextStyle kSideTitle{.size = 15, .colour = kInkColour, .bold = true},
     kSideDetail{.size = 12, .colour = kFaintColour}, kCountStyle{.size = 13, .colour = kInkColour},
     kMissingStyle{.size = 14, .colour = kInkColour};
 
-// Of the camera, in pixels.
-Vector2 camera_size(const PairPicture::Side& side) {
-  const FramePicture& picture = side.picture;
-  if (picture.width > 0 && picture.height > 0) return Vector2(picture.width, picture.height) / picture.scale;
-  if (side.camera_width > 0 && side.camera_height > 0)
-    return {static_cast<double>(side.camera_width), static_cast<double>(side.camera_height)};
-  return {4, 3};
-}
-
 // Evenly chosen elements, at most `most`, in their order.
 template <typename Element>
 std::vector<Element> thinned_out(const std::vector<Element>& all, std::size_t most) {
@@ -79,6 +70,19 @@ void draw_missing(Drawing& out, const std::string& text, const Box& box) {
 }
 
 }  // namespace
+
+Vector2 camera_size(const PairPicture::Side& side) {
+  const FramePicture& picture = side.picture;
+  if (picture.width > 0 && picture.height > 0) return Vector2(picture.width, picture.height) / picture.scale;
+  if (side.camera_width > 0 && side.camera_height > 0)
+    return {static_cast<double>(side.camera_width), static_cast<double>(side.camera_height)};
+  return {4, 3};
+}
+
+void draw_side(Drawing& out, const PairPicture::Side& side, const Box& box) {
+  if (const std::string missing = draw_picture(out, side.picture, box); !missing.empty())
+    draw_missing(out, missing, box);
+}
 
 PairLayout::PairLayout(const PairPicture& pair, const Drawing& measure, double width) : pair_(pair), measure_(measure) {
   const Vector2 left = camera_size(pair.left), right = camera_size(pair.right);

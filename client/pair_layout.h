@@ -9,6 +9,11 @@
 
 namespace relmap::client {
 
+// Of the camera of a side, pixels.
+Vector2 camera_size(const PairPicture::Side& side);
+// Draws the picture of a side; if there is none, a grey ground that says why.
+void draw_side(Drawing& out, const PairPicture::Side& side, const Box& box);
+
 // The two pictures with their titles above them, the matches, and a line below that counts them.
 class PairLayout {
  public:

@@ -14,6 +14,7 @@ constexpr Colour kPairPaper{252, 252, 250}, kRowRule{214, 214, 208}, kTrough{230
 constexpr double kPairMargin = 28, kWordsGap = 26;
 constexpr double kPairWidth = 2 * 640 + 14;  // of the pictures of a single pair
 constexpr double kRowPairs = 860, kRowWords = 380, kRowGap = 26;
+constexpr double kOtherWidth = 320;
 constexpr double kBar = 90;
 
 const TextStyle kPairTitle{.size = 22, .colour = kInkColour, .bold = true},
@@ -80,17 +81,31 @@ class PairWords {
 Result<std::string> draw_pair(const PairPicture& pair, PictureFormat format) {
   const auto measure = make_drawing(format, 1, 1, kPairPaper, 1);
   const PairLayout pictures(pair, *measure, kPairWidth);
-  PairPicture heading, body;
+  PairPicture heading, body, other;
   heading.title = pair.title;
   body.gauges = pair.gauges;
   body.notes = pair.notes;
-  const PairWords head(heading, *measure, kPairWidth, kPairTitle), below(body, *measure, kPairWidth, kPairTitle);
+  Vector2 small = Vector2::Zero();
+  if (pair.other) {
+    other.notes = pair.other->details;
+    other.notes.insert(other.notes.begin(), pair.other->title);
+    const Vector2 camera = camera_size(*pair.other);
+    small = std::min(kOtherWidth / camera.x(), 0.75 * kOtherWidth / camera.y()) * camera;
+  }
+  const double column = pair.other ? kPairWidth - kOtherWidth - kWordsGap : kPairWidth;
+  const PairWords head(heading, *measure, kPairWidth, kPairTitle), below(body, *measure, column, kPairTitle),
+      beside(other, *measure, kOtherWidth, kPairTitle);
   const double top = kPairMargin + head.height() + 4, under = top + pictures.height() + 10;
-  const auto out =
-      make_drawing(format, kPairWidth + 2 * kPairMargin, under + below.height() + kPairMargin, kPairPaper, 1);
+  const double end = under + std::max(below.height(), small.y() + 6 + beside.height());
+  const auto out = make_drawing(format, kPairWidth + 2 * kPairMargin, end + kPairMargin, kPairPaper, 1);
   head.draw(*out, {kPairMargin, kPairMargin});
   pictures.draw(*out, {kPairMargin, top});
   below.draw(*out, {kPairMargin, under});
+  if (pair.other) {
+    const Vector2 corner(kPairMargin + column + kWordsGap, under);
+    draw_side(*out, *pair.other, {corner, corner + small});
+    beside.draw(*out, corner + Vector2(0, small.y() + 6));
+  }
   return out->file();
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct PairPicture {
   std::string no_points;  // why there are none; for display
   std::vector<Gauge> gauges;
   std::vector<std::string> notes;  // a paragraph each
+  std::optional<Side> other;       // another place that the right picture could show; small, in a single pair only
 };
 
 struct PairSheet {

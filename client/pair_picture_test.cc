@@ -135,6 +135,19 @@ TEST(PairPicture, LinesAreFewEnoughToSeeThePictures) {
   EXPECT_THAT(said_in(svg), HasSubstr("465 of 920 matches agree, 60 of them are joined by lines; dashed: others"));
 }
 
+TEST(PairPicture, AnotherPlaceThatFitsStandsBelow) {
+  PairPicture pair = pair_of(640, 480);
+  const double height = page_of(draw_pair(pair, PictureFormat::kSvg).or_throw()).second;
+  pair.other = side("Another place that fits: 3:44", 640, 480);
+  const std::string svg = draw_pair(pair, PictureFormat::kSvg).or_throw();
+  const std::vector<Box> pictures = pictures_of(svg);
+  ASSERT_EQ(pictures.size(), 3u);
+  EXPECT_GT(pictures[2].low.y(), pictures[1].high.y());
+  EXPECT_LT(pictures[2].high.y(), page_of(svg).second);
+  EXPECT_GT(page_of(svg).second, height);
+  expect_texts_are_clear(svg);
+}
+
 TEST(PairPicture, ASheetHasARowForEachPair) {
   PairSheet sheet{"Loop closures", "3 loop closures", {pair_of(640, 480), pair_of(640, 480), pair_of(1242, 375)}};
   sheet.pairs[1].notes.push_back(std::string(900, 'm') + " and many more words that have to find room beside them");

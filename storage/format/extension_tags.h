@@ -26,7 +26,7 @@ inline constexpr std::uint32_t kUnseen = 29;        // of a closure: frames that
 inline constexpr std::uint32_t kUnseenPlace = 30;   // of a proposal: the closure of whose place the query saw nothing
 inline constexpr std::uint32_t kEditKey = 31;       // of an edit in the journal: by what its caller names it
 
-inline constexpr std::uint32_t kDigests = 36;       // of the map's state: the commit as of which its digests are right
+inline constexpr std::uint32_t kDigests = 36;  // of the map's state: the commit as of which its digests are right
 
 // These tags say how the map came about, so map hashes leave them out. The last three are reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state

@@ -101,6 +101,11 @@ PairPicture pair_of(const client::EdgeExplanation& explained, const SessionsByNu
     if (edge.suspicion->doubts.empty()) pair.notes.push_back("Nothing speaks against it.");
     if (!edge.suspicion->remark.empty()) pair.notes.push_back(edge.suspicion->remark);
   }
+  if (explained.runner_up && edge.uniqueness && edge.uniqueness->runner_up) {
+    pair.other = side_of(*edge.uniqueness->runner_up, explained.runner_up, sessions, client);
+    pair.other->title = "Another place that fits: " + pair.other->title + ", " +
+                        counted_text(edge.uniqueness->runner_up_inliers, "inlier");
+  }
   pair.notes.push_back("Motion: " + verdict_text(explained.motion));
   if (const std::string text = agreements_text(explained); !text.empty()) pair.notes.push_back(text);
   return pair;
