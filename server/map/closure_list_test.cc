@@ -152,13 +152,14 @@ class ClosureList : public ::testing::Test {
 
 TEST_F(ClosureList, EdgesByIdAreThoseThatTheFiltersTell) {
   const auto view = map_->view();
+  const auto edges = all();
   std::size_t chosen = 0;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 200; ++round) {
     const EdgeChoice choice = some_choice();
     std::vector<EdgeId> expected, found;
-    for (const auto& [edge, time_us] : all())
+    for (const auto& [edge, time_us] : edges)
       if (is_chosen(choice, edge, time_us)) expected.push_back(edge.id);
-    const std::size_t page = 1 + random_.below(40);
+    const std::size_t page = 1 + random_.below(100);
     for (EdgeId after;;) {  // page by page
       std::size_t n = 0;
       const Status status = visit_edges(*view, choice, after, kGoOn, [&](const Edge& edge, std::int64_t time_us) {
@@ -179,12 +180,13 @@ TEST_F(ClosureList, EdgesByIdAreThoseThatTheFiltersTell) {
 
 TEST_F(ClosureList, EachOrderIsTotalAndItsPagesNeitherRepeatNorLose) {
   const auto view = map_->view();
+  const auto edges = all();
   std::size_t equals = 0;
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < 100; ++round) {
     const EdgeChoice choice = round < 2 ? EdgeChoice() : some_choice();
     const auto order = round % 2 ? ClosureOrder::kSuspicion : ClosureOrder::kTime;
     std::vector<std::pair<Edge, std::int64_t>> expected;
-    for (const auto& [edge, time_us] : all())
+    for (const auto& [edge, time_us] : edges)
       if (edge.kind == EdgeKind::kLoop && is_chosen(choice, edge, time_us)) expected.emplace_back(edge, time_us);
     std::stable_sort(expected.begin(), expected.end(), [&](const auto& x, const auto& y) {
       return order == ClosureOrder::kSuspicion ? listed_suspicion(x.first) > listed_suspicion(y.first)
@@ -192,7 +194,7 @@ TEST_F(ClosureList, EachOrderIsTotalAndItsPagesNeitherRepeatNorLose) {
     });
     std::vector<ListedClosure> found;
     for (std::optional<ListedClosure> after;;) {
-      const std::size_t page = 1 + random_.below(30);
+      const std::size_t page = 1 + random_.below(100);
       const auto more = first_closures(*view, choice, order, after, page, kGoOn).or_throw();
       found.insert(found.end(), more.begin(), more.end());
       if (more.size() < page) break;
@@ -213,12 +215,13 @@ TEST_F(ClosureList, EachOrderIsTotalAndItsPagesNeitherRepeatNorLose) {
 
 TEST_F(ClosureList, CellsCountTheClosuresOfEachTwoSessions) {
   const auto view = map_->view();
+  const auto edges = all();
   for (int round = 0; round < 20; ++round) {
     std::set<SessionNumber> chosen;
     if (round > 0)
       for (std::uint32_t n = 1 + random_.below(3); n > 0; --n) chosen.insert(1 + random_.below(kSessions));
     std::map<std::pair<SessionNumber, SessionNumber>, ClosureCell> expected;
-    for (const auto& [edge, time_us] : all()) {
+    for (const auto& [edge, time_us] : edges) {
       const auto [a, b] = std::minmax({edge.a.session, edge.b.session});
       if (edge.kind != EdgeKind::kLoop || (!chosen.empty() && !chosen.contains(a) && !chosen.contains(b))) continue;
       ClosureCell& cell = expected[{a, b}];

@@ -1,6 +1,7 @@
 #include "server/route/alternatives.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -17,17 +18,20 @@ struct Candidate {
   Route route;
   std::vector<FrameId> frames;
   std::vector<double> metres, costs;  // of the edge from each frame to the next
-  storage::FrameSet beside;           // with its own frames
+  storage::FrameSet own;              // its frames
+  storage::FrameSet beside;           // and those beside it
 
   std::size_t memory_bytes() const {
     return route.path.memory_bytes() + frames.capacity() * sizeof(FrameId) +
-           (metres.capacity() + costs.capacity()) * sizeof(double) + beside.memory_bytes();
+           (metres.capacity() + costs.capacity()) * sizeof(double) + own.memory_bytes() + beside.memory_bytes();
   }
 };
 
 void add(const storage::FrameSet& more, storage::FrameSet& frames) {
   for (const auto& [chunk, mask] : more.chunks()) frames.set_chunk(chunk, frames.chunk(chunk) | mask);
 }
+
+constexpr int kAlongside = storage::kFramesPerChunk / 4;  // frames of a chunk
 
 class Finder {
  public:
@@ -77,16 +81,19 @@ class Finder {
     return rest;
   }
   void count(const Route& route) { touched_ += route.frames_touched; }
-  // From now on its ways are known, and dearer.
+  // From now on its ways are known, and dearer, and so is what lies beside it, except where that is only the beginnings
+  // of ways that branch off: a search by cells would have to open a chunk for each of these.
   void hold(const Candidate& candidate) {
-    add(candidate.beside, known_);
+    add(candidate.own, known_);
+    for (const auto& [chunk, mask] : candidate.beside.chunks())
+      if (std::popcount(mask) >= kAlongside) known_.set_chunk(chunk, known_.chunk(chunk) | mask);
     held_ += candidate.memory_bytes() + candidate.beside.memory_bytes();
   }
 
   // nullopt if it passes a frame twice, or the work ends.
   std::optional<Candidate> examine(Route route) {
     Candidate candidate;
-    storage::FrameSet own;
+    storage::FrameSet& own = candidate.own;
     {
       PathWalk walk(graph_, route.path);
       while (const auto step = walk.next()) {
@@ -202,7 +209,7 @@ class Finder {
   std::optional<Candidate> first_;
   std::vector<Candidate> candidates_;  // in the order in which they were found
   std::vector<Choice> chosen_;
-  storage::FrameSet known_;  // on and beside all routes that were found
+  storage::FrameSet known_;  // on and beside all routes that were found; these are dearer
 };
 
 }  // namespace

@@ -171,7 +171,7 @@ TEST_F(ImportGraph, AlternativesFollowTheRouteInItsStream) {
   ASSERT_TRUE(import(request).ok());
   v1::FindRouteRequest way;
   *way.mutable_from()->mutable_frame() = to_wire(FrameId{1, 10});
-  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, 10 + kLap * 2 / 5});
+  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, 10 + kLap * 9 / 20});
   way.set_alternatives(3);
   way.set_covariance(true);
   Core by_cells(*mapper_, core_.facts, {.near_route_steps = 0, .route_steps_per_message = 7});
