@@ -73,7 +73,7 @@ class Follower {
       options.stopped = [this] { return stop_.load(); };
       ended_ = client_->watch(options, [this](const client::WatchEvent& event) {
         const MutexLock lock(mutex_);
-        std::visit([&](const auto& what) { take(what, event); }, event.what);
+        std::visit([&](const auto& what) RELMAP_REQUIRES(mutex_) { take(what, event); }, event.what);
         changed_.notify_all();
         return Status();
       });
@@ -209,7 +209,7 @@ class WatchTest : public ::testing::Test {
   }
 
   const storage::TemporaryFolder folder_;
-  const DaemonOptions options_{.data = folder_ / "map", .lcm = ""};
+  const DaemonOptions options_{.data = folder_ / "map", .lcm = "", .more = {}};
   std::unique_ptr<RunningDaemon> daemon_;
 };
 

@@ -72,6 +72,7 @@ Status MapWatch::go_on_from_now(Reason reason, std::string message, std::uint64_
   const auto newest = now();
   if (!newest.ok()) return newest.status();
   at_ = *newest;
+  moved_ = true;
   v1::MapEvent& told = first_.emplace_back();
   v1::Resync& resync = *told.mutable_resync();
   resync.set_reason(to_wire(reason));

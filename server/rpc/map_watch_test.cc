@@ -24,6 +24,13 @@ storage::FrameAddedEvent added(SessionNumber session, std::uint32_t index) {
   return event;
 }
 
+storage::ClosureEvent closure(EdgeId id, FrameId a) {
+  storage::ClosureEvent event;
+  event.id = id;
+  event.a = a;
+  return event;
+}
+
 class MapWatchTest : public ::testing::Test {
  protected:
   struct Watcher {
@@ -181,8 +188,8 @@ TEST_F(MapWatchTest, FiltersBySessionAndMotionAndMovesTheTokenNevertheless) {
   log_.append({2, 0}, storage::SessionEvent{2, {}, "b", "b", {}});
   log_.append({3, 0}, added(1, 0));
   log_.append({4, 0}, added(2, 0));
-  log_.append({5, 0}, storage::ClosureEvent{{{2, 0}, 1}, {1, 0}});
-  log_.append({6, 0}, storage::ClosureEvent{{{2, 0}, 2}, {3, 0}});
+  log_.append({5, 0}, closure({{2, 0}, 1}, {1, 0}));
+  log_.append({6, 0}, closure({{2, 0}, 2}, {3, 0}));
   log_.append({7, 0}, storage::FramesMovedEvent{{{1, 0, 3}, {2, 0, 3}}});
   log_.append({8, 0}, storage::ClosureRemovedEvent{{{2, 0}, 1}});
   log_.append({9, 0}, storage::SessionDeletedEvent{2, {}});
@@ -249,7 +256,9 @@ TEST_F(MapWatchTest, GoesOnAfterATokenWhereverItWasTaken) {
     auto again = resumed(messages[i].resume_token());
     const auto rest = all(again);
     ASSERT_EQ(rest.size(), messages.size() - 1 - i);
-    if (rest.size() > 1) EXPECT_EQ(rest.front().frame_labels().frame().index(), i + 1);
+    if (rest.size() > 1) {
+      EXPECT_EQ(rest.front().frame_labels().frame().index(), i + 1);
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -53,8 +54,8 @@ class Caller {
   }
   bool hears_label(const std::string& label) {
     return read_until([&](const v1::MapEvent& event) {
-      return event.has_frame_labels() && event.frame_labels().labels_size() > 0 &&
-             event.frame_labels().labels(event.frame_labels().labels_size() - 1) == label;
+      const auto& labels = event.frame_labels().labels();
+      return std::find(labels.begin(), labels.end(), label) != labels.end();
     });
   }
   void cancel() { context_.TryCancel(); }
@@ -72,6 +73,7 @@ class Caller {
 class Watches : public testing::Test {
  protected:
   void start(RpcLimits limits = {}) {
+    commit();
     core_ = std::make_unique<Core>(*map_.mapper, map_.core->facts, limits);
     server_ = RpcServer::start(*core_, everyone_, {.host = "127.0.0.1"}).or_throw();
     address_ = "127.0.0.1:" + std::to_string(server_->port());
@@ -90,8 +92,9 @@ class Watches : public testing::Test {
     v1::SetLabelReply reply;
     const grpc::Status status = stub->SetLabel(&context, request, &reply);
     EXPECT_TRUE(status.ok()) << status.error_message();
-    EXPECT_TRUE(map_.mapper->commit(std::chrono::steady_clock::now() + kLong).ok());
+    commit();
   }
+  void commit() const { EXPECT_TRUE(map_.mapper->commit(std::chrono::steady_clock::now() + kLong).ok()); }
   int running() const { return core_->transport.gateway->running(Gateway::Kind::kWatch); }
   void expect_running(int count) const {
     const auto end = std::chrono::steady_clock::now() + kLong;
@@ -124,10 +127,10 @@ TEST_F(Watches, AWatcherWhoReadsNothingHoldsUpNobody) {
   ASSERT_TRUE(awake->catches_up());
   const std::string long_label(60, 'x');
   // More than fits into the windows of the transport, so that the sleeper's message does not leave.
-  for (int i = 0; i < 40; ++i) label(std::to_string(i) + long_label);
-  EXPECT_TRUE(awake->hears_label("39" + long_label));
+  for (int i = 0; i < 60; ++i) label(std::to_string(i) + long_label);
+  EXPECT_TRUE(awake->hears_label("59" + long_label));
   EXPECT_EQ(running(), 2) << "the time within which others must take a message is long over";
-  EXPECT_TRUE(asleep->hears_label("39" + long_label)) << "it takes up where it was";
+  EXPECT_TRUE(asleep->hears_label("59" + long_label)) << "it takes up where it was";
 }
 
 TEST_F(Watches, AreAsManyAsTheLimitsSay) {
@@ -174,6 +177,9 @@ TEST_F(Watches, EndWithTheServerAtOnceAlsoIfTheyReadNothing) {
   start();
   const auto asleep = caller(), awake = caller();
   ASSERT_TRUE(awake->catches_up());
+  // More than the sleeper's connection takes in.
+  for (int i = 0; i < 60; ++i) label(std::to_string(i) + std::string(60, 'x'));
+  ASSERT_TRUE(awake->hears_label("59" + std::string(60, 'x')));
   std::thread stopper([&] { server_->stop(kLong); });
   EXPECT_EQ(why_of(awake->finish()), Reason::SHUTTING_DOWN);
   stopper.join();  // has not waited for its deadline
