@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "client/client_impl.h"
 #include "client/replies.h"
 #include "proto/wire/convert.h"
@@ -98,6 +100,29 @@ Result<StoreStats> Client::stats() {
     stats.properties.emplace_back(property.name(), property.value());
   stats.status = read_status(reply.status());
   return stats;
+}
+
+Result<AuditLog> Client::audit(const AuditFilter& filter) {
+  constexpr std::size_t kMaxPage = 1000;
+  v1::ListAuditRequest request;
+  request.set_from_us(filter.from_us);
+  request.set_until_us(filter.until_us);
+  request.set_who(filter.who);
+  request.set_method(filter.method);
+  request.set_failed(filter.failed);
+  request.set_page_size(static_cast<std::uint32_t>(filter.limit == 0 ? kMaxPage : std::min(filter.limit, kMaxPage)));
+  AuditLog log;
+  const auto is_full = [&] { return filter.limit > 0 && log.entries.size() >= filter.limit; };
+  const Status status = impl_->list_until<v1::ListAuditReply>(*impl_->admin, &v1::Admin::Stub::ListAudit, request,
+                                                              [&](const v1::ListAuditReply& page) -> Result<bool> {
+                                                                log.unreadable += page.unreadable();
+                                                                for (const v1::AuditEntry& message : page.entries())
+                                                                  if (!is_full())
+                                                                    log.entries.push_back(read_audit(message));
+                                                                return !is_full();
+                                                              });
+  if (!status.ok()) return status;
+  return log;
 }
 
 Result<std::string> Client::set_log_level(const std::string& level) {

@@ -50,4 +50,31 @@ struct StoreStats {
   DaemonStatus status;
 };
 
+// What entries of the audit log are listed. All conditions must hold.
+struct AuditFilter {
+  std::int64_t from_us = 0, until_us = 0;  // at the first time or later, and before the second, UTC; 0: any
+  std::string who = {};                    // of this caller; empty: of all
+  std::string method = {};                 // such as "Map.SetEdgeState"; empty: all
+  bool failed = false;                     // only what did not succeed
+  std::size_t limit = 100;                 // at most so many, the newest; 0: all
+};
+
+// What an operator did or tried.
+struct AuditEntry {
+  std::int64_t time_us = 0;  // UTC
+  std::string who;           // the name in the credentials; empty: the caller was not known
+  std::string role;
+  std::string from;  // the caller's address
+  std::string method;
+  std::string request;  // in protobuf's text format; a long one is cut off
+  std::string request_id;
+  Status outcome;      // not ok: why it failed
+  double seconds = 0;  // that it took
+  std::string trace_id;
+};
+struct AuditLog {
+  std::vector<AuditEntry> entries;  // the newest first
+  std::uint64_t unreadable = 0;     // lines that were left out, since they are no entries
+};
+
 }  // namespace relmap::client

@@ -62,17 +62,27 @@ struct Client::Impl {
     return ask(*map, method, request, reply, deadline());
   }
 
-  // Asks for all pages of a list. `take` is called with each; its failure ends the list.
-  template <typename Reply, typename Method, typename Request, typename Take>
-  Status list(Method method, Request request, Take take) const {
+  // Asks for the pages of a list. `take` is called with each, and returns whether it wants the next; its failure ends
+  // the list.
+  template <typename Reply, typename Stub, typename Method, typename Request, typename Take>
+  Status list_until(Stub& stub, Method method, Request request, Take take) const {
     const Clock::time_point until = deadline();
     for (;;) {
       Reply page;
-      if (Status status = ask(*map, method, request, page, until); !status.ok()) return status;
-      if (Status status = take(page); !status.ok()) return status;
-      if (page.next_page_token().empty()) return {};
+      if (Status status = ask(stub, method, request, page, until); !status.ok()) return status;
+      const Result<bool> more = take(page);
+      if (!more.ok()) return more.status();
+      if (!*more || page.next_page_token().empty()) return {};
       request.set_page_token(page.next_page_token());
     }
+  }
+  // Asks for all pages of a list of the map. `take` is called with each; its failure ends the list.
+  template <typename Reply, typename Method, typename Request, typename Take>
+  Status list(Method method, Request request, Take take) const {
+    return list_until<Reply>(*map, method, std::move(request), [&](const Reply& page) -> Result<bool> {
+      if (Status status = take(page); !status.ok()) return status;
+      return true;
+    });
   }
 
   // Reads all messages of a stream. `take` is called with each; its failure ends the stream. A stream that breaks is

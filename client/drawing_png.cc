@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "client/drawing.h"
+#include "client/picture_bytes.h"
 
 namespace relmap::client {
 namespace {
@@ -99,15 +100,31 @@ class PngDrawing : public Drawing {
            scale_;
   }
 
-  Status save(const std::string& path) const override {
+  Status picture(const Vector2& corner, const Vector2& size, const std::string& file) override {
+    const auto decoded = decode_picture(file);
+    if (!decoded.ok()) return decoded.status();
+    const auto pixel = [this](double at) { return static_cast<int>(std::lround(at * scale_)); };
+    const cv::Rect box(cv::Point(pixel(corner.x()), pixel(corner.y())),
+                       cv::Point(pixel(corner.x() + size.x()), pixel(corner.y() + size.y())));
+    const cv::Rect seen = box & cv::Rect(0, 0, page_.cols, page_.rows);
+    if (seen.empty()) return {};
+    cv::Mat scaled;
+    cv::resize(*decoded, scaled, box.size(), 0, 0, box.width < decoded->cols ? cv::INTER_AREA : cv::INTER_CUBIC);
+    scaled(seen - box.tl()).copyTo(page_(seen));
+    return {};
+  }
+
+  Result<std::string> file() const override {
     cv::Mat picture;
     cv::resize(page_, picture, size_, 0, 0, cv::INTER_AREA);
+    std::vector<std::uint8_t> bytes;
     try {
-      if (cv::imwrite(path, picture, {cv::IMWRITE_PNG_COMPRESSION, 9})) return {};
+      if (cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9}))
+        return std::string(bytes.begin(), bytes.end());
     } catch (const cv::Exception& error) {
-      return {Reason::IO_ERROR, "cannot write " + path + ": " + error.err};
+      return {Reason::INTERNAL, "the picture cannot be encoded: " + error.err};
     }
-    return {Reason::IO_ERROR, "cannot write " + path};
+    return {Reason::INTERNAL, "the picture cannot be encoded"};
   }
 
  private:

@@ -1,12 +1,15 @@
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <cmath>
 
 #include "client/drawing.h"
+#include "client/picture_bytes.h"
+#include "proto/base/base64.h"
+#include "proto/base/markup.h"
 #include "proto/base/printf_text.h"
 
 namespace relmap::client {
 namespace {
+
+constexpr double kPixelsPerPoint = 2;  // of pictures: what a sharp screen shows
 
 // Widths of ' ' to '~', in thousandths of the em.
 constexpr int kDejaVuWidths[] = {317,  400, 459, 837, 636, 950, 779, 274, 390, 390, 500, 837, 317, 360, 317, 336,
@@ -22,24 +25,7 @@ constexpr int kDejaVuBoldWidths[] = {348,  456, 520, 837, 695, 1001, 872, 306,  
                                      500,  674, 715, 592, 715, 678,  435, 715,  711, 342, 342, 665, 342, 1041, 711, 687,
                                      715,  715, 493, 595, 478, 711,  651, 923,  645, 651, 582, 711, 365, 711,  837};
 
-std::string escape(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += ' ';  // not allowed in XML
-    else
-      out += c;
-  }
-  return out;
-}
-
-std::string hex(Colour c) { return printf_text("#%02x%02x%02x", c.red, c.green, c.blue); }
+std::string colour_text(Colour c) { return printf_text("#%02x%02x%02x", c.red, c.green, c.blue); }
 
 class SvgDrawing : public Drawing {
  public:
@@ -53,7 +39,7 @@ class SvgDrawing : public Drawing {
 
   void polyline(const std::vector<Vector2>& points, const Stroke& stroke) override {
     if (points.size() < 2) return;
-    body_ += "<polyline points=\"" + list(points) + "\" fill=\"none\" stroke=\"" + hex(stroke.colour) +
+    body_ += "<polyline points=\"" + list(points) + "\" fill=\"none\" stroke=\"" + colour_text(stroke.colour) +
              printf_text("\" stroke-width=\"%.2f\" stroke-linejoin=\"round\"", stroke.width);
     if (stroke.dash > 0)
       body_ += printf_text(" stroke-dasharray=\"%.2f\"", stroke.dash);
@@ -64,15 +50,15 @@ class SvgDrawing : public Drawing {
   }
 
   void polygon(const std::vector<Vector2>& points, Colour fill, double opacity) override {
-    body_ += "<polygon points=\"" + list(points) + "\" fill=\"" + hex(fill) + "\"";
+    body_ += "<polygon points=\"" + list(points) + "\" fill=\"" + colour_text(fill) + "\"";
     if (opacity < 1) body_ += printf_text(" fill-opacity=\"%.2f\"", opacity);
     body_ += "/>\n";
   }
 
   void disc(const Vector2& middle, double radius, Colour fill, double rim, Colour rim_colour) override {
     body_ += printf_text("<circle cx=\"%.2f\" cy=\"%.2f\" r=\"%.2f\" fill=\"", middle.x(), middle.y(), radius) +
-             hex(fill) + "\"";
-    if (rim > 0) body_ += printf_text(" stroke-width=\"%.2f\" stroke=\"", rim) + hex(rim_colour) + "\"";
+             colour_text(fill) + "\"";
+    if (rim > 0) body_ += printf_text(" stroke-width=\"%.2f\" stroke=\"", rim) + colour_text(rim_colour) + "\"";
     body_ += "/>\n";
   }
 
@@ -80,11 +66,11 @@ class SvgDrawing : public Drawing {
     const char* anchor = style.anchor == Anchor::kLeft ? "start" : style.anchor == Anchor::kMiddle ? "middle" : "end";
     body_ += printf_text("<text x=\"%.2f\" y=\"%.2f\" font-size=\"%.2f\" text-anchor=\"%s\"%s fill=\"", at.x(), at.y(),
                          style.size, anchor, style.bold ? " font-weight=\"bold\"" : "") +
-             hex(style.colour) + "\"";
+             colour_text(style.colour) + "\"";
     if (style.halo > 0)
       body_ += printf_text(" stroke=\"#ffffff\" stroke-width=\"%.2f\" stroke-linejoin=\"round\" paint-order=\"stroke\"",
                            2 * style.halo);
-    body_ += ">" + escape(utf8) + "</text>\n";
+    body_ += ">" + markup_text(utf8) + "</text>\n";
   }
 
   // An upper bound: it is not known which of the fonts the reader has, and DejaVu Sans is the widest of them.
@@ -100,13 +86,18 @@ class SvgDrawing : public Drawing {
     return thousandths * 1e-3 * style.size;
   }
 
-  Status save(const std::string& path) const override {
-    std::ofstream out(path, std::ios::binary);
-    out << body_ << "</svg>\n";
-    out.close();
-    if (!out) return {Reason::IO_ERROR, "cannot write " + path + ": " + std::strerror(errno)};
+  Status picture(const Vector2& corner, const Vector2& size, const std::string& file) override {
+    const auto bytes = reduced_picture(file, static_cast<int>(std::ceil(kPixelsPerPoint * size.x())));
+    if (!bytes.ok()) return bytes.status();
+    body_ += printf_text(
+        "<image x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" preserveAspectRatio=\"none\" "
+        "style=\"image-orientation:none\" href=\"data:image/%s;base64,",
+        corner.x(), corner.y(), size.x(), size.y(), is_png(*bytes) ? "png" : "jpeg");
+    body_ += base64(*bytes) + "\"/>\n";
     return {};
   }
+
+  Result<std::string> file() const override { return body_ + "</svg>\n"; }
 
  private:
   static std::string list(const std::vector<Vector2>& points) {

@@ -1,8 +1,10 @@
 #include "client/map_contents.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
+#include "client/colour_scale.h"
 #include "client/map_colours.h"
 
 namespace relmap::client {
@@ -10,7 +12,7 @@ namespace relmap::client {
 MapContents::MapContents(const MapPicture& picture) : picture_(picture) {
   for (std::size_t part = 0; part < picture.parts.size(); ++part)
     for (const MapPicture::Frame& frame : picture.parts[part].frames) {
-      places_[frame.id] = {part, &frame.T_root_frame};
+      places_[frame.id] = {part, &frame.T_root_frame, frame.value};
       sessions_[frame.id.session].push_back(frame.id);
     }
   for (auto& [session, frames] : sessions_) std::sort(frames.begin(), frames.end());
@@ -40,10 +42,15 @@ std::string MapContents::name(SessionNumber session) const {
 }
 
 Colour MapContents::colour(SessionNumber session) const {
+  if (picture_.scale) return kFaintColour;
   return session_colour(static_cast<std::size_t>(std::distance(sessions_.begin(), sessions_.find(session))));
 }
 
 Colour MapContents::shade(FrameId frame) const {
+  if (picture_.scale) {
+    const Place* const place = find(frame);
+    return place && std::isfinite(place->value) ? paper_scale(place->value) : kNotInForceColour;
+  }
   const Colour full = colour(frame.session);
   const std::vector<FrameId>& frames = sessions_.at(frame.session);
   if (sessions_.size() > 1 || frames.size() < 2) return full;

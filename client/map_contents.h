@@ -21,6 +21,7 @@ class MapContents {
   struct Place {
     std::size_t part = 0;
     const SE3* T_root_frame = nullptr;
+    double value = 0;  // MapPicture::Frame::value
   };
   // Null: the frame is not in the picture.
   const Place* find(FrameId frame) const;
@@ -29,8 +30,10 @@ class MapContents {
   const std::map<SessionNumber, std::vector<FrameId>>& sessions() const { return sessions_; }
   // The name of a session, with its number if there are more sessions than colours.
   std::string name(SessionNumber session) const;
+  // Grey, if frames are coloured by their values.
   Colour colour(SessionNumber session) const;
-  // The colour of a frame: that of its session, or, if there is only one session, a shade from light to dark in time.
+  // The colour of a frame: that of its value, if there is a scale; else that of its session, or, if there is only one
+  // session, a shade from light to dark in time.
   Colour shade(FrameId frame) const;
 
   // The edge of the robot's motion that leads to this frame from an older one in the same part; null: there is none.

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "client/colour_scale.h"
 #include "client/map_colours.h"
 #include "client/map_panel.h"
 #include "client/text_wrap.h"
@@ -23,9 +24,11 @@ void no_sample(Drawing&, const Vector2&, const Vector2&) {}
 
 MapLegend::MapLegend(const MapContents& contents, const Drawing& measure, double width)
     : contents_(contents), measure_(measure), width_(width) {
+  add_scale();
   add_sessions();
   add_motion();
   add_closures();
+  add_tears();
   const MapPicture& picture = contents.picture();
   if (picture.route)
     add(picture.route->caption.empty() ? "route" : picture.route->caption, "from the ring to the disc",
@@ -49,11 +52,42 @@ MapLegend::MapLegend(const MapContents& contents, const Drawing& measure, double
 }
 
 void MapLegend::add(const std::string& text, const std::string& detail, Sample sample) {
-  Entry entry{wrap(measure_, text, kPlain, width_ - kTextLeft), {}, std::move(sample)};
+  Entry entry{{}, {}, std::move(sample)};
+  if (!text.empty() || detail.empty()) entry.text = wrap(measure_, text, kPlain, width_ - kTextLeft);
   if (!detail.empty()) entry.detail = wrap(measure_, detail, kSmall, width_ - kTextLeft);
   height_ += kLine * static_cast<double>(entry.text.size()) + kDetailLine * static_cast<double>(entry.detail.size()) +
              kEntryGap;
   entries_.push_back(std::move(entry));
+}
+
+void MapLegend::add_scale() {
+  const auto& scale = contents_.picture().scale;
+  if (!scale) return;
+  add(scale->name, "", no_sample);
+  // Colour by colour, from the top down.
+  constexpr int kSteps = 5;
+  for (int k = 0; k < kSteps; ++k) {
+    const double from = static_cast<double>(k) / kSteps, to = static_cast<double>(k + 1) / kSteps;
+    const std::string& text = k == 0 ? scale->low : k + 1 == kSteps ? scale->high : std::string();
+    add(text, "", [from, to](Drawing& out, const Vector2& a, const Vector2& b) {
+      constexpr int kStrips = 8;
+      const double tall = (kLine + kEntryGap) / kStrips;
+      for (int strip = 0; strip < kStrips; ++strip)
+        out.rectangle({a.x(), a.y() - 15 + strip * tall}, {b.x() - a.x(), tall + 0.5},
+                      paper_scale(from + (to - from) * (strip + 0.5) / kStrips), 1);
+    });
+  }
+}
+
+void MapLegend::add_tears() {
+  const MapPicture& picture = contents_.picture();
+  if (!picture.tears.empty())
+    add(counted_text(picture.tears.size(), "tear"),
+        "here the measured edges contradict each other: by how many standard deviations the picture stretches one",
+        [](Drawing& out, const Vector2& a, const Vector2& b) { draw_tear(out, a, b); });
+  if (picture.strained.empty()) return;
+  add("closures that the picture stretches most", "", no_sample);
+  for (const std::string& line : picture.strained) add("", line, no_sample);
 }
 
 void MapLegend::add_sessions() {
@@ -67,7 +101,9 @@ void MapLegend::add_sessions() {
       break;
     }
     const Colour full = contents_.colour(session), first = contents_.shade(frames.front());
-    const auto line = [full, first](Drawing& out, const Vector2& a, const Vector2& b) {
+    const bool scaled = contents_.picture().scale.has_value();
+    const auto line = [full, first, scaled](Drawing& out, const Vector2& a, const Vector2& b) {
+      if (scaled) return;
       for (int k = 0; k < 10; ++k)
         out.line(a + (b - a) * (k / 10.0), a + (b - a) * ((k + 1) / 10.0),
                  motion_stroke(MapPicture::EdgeKind::kMotion, mix(first, full, k / 9.0)));
@@ -76,7 +112,8 @@ void MapLegend::add_sessions() {
       add(contents_.name(session) + " (" + count_text(frames.size()) + ")", "", line);
     else
       add(contents_.name(session),
-          counted_text(frames.size(), "keyframe") + (single && frames.size() > 1 ? ", light to dark in time" : ""),
+          counted_text(frames.size(), "keyframe") +
+              (single && !scaled && frames.size() > 1 ? ", light to dark in time" : ""),
           line);
   }
   if (sessions.empty()) return;

@@ -25,9 +25,11 @@ class MapLegend {
     Sample sample;
   };
   void add(const std::string& text, const std::string& detail, Sample sample);
+  void add_scale();
   void add_sessions();
   void add_motion();
   void add_closures();
+  void add_tears();
 
   const MapContents& contents_;
   const Drawing& measure_;

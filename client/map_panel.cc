@@ -10,6 +10,7 @@
 
 #include "client/map_colours.h"
 #include "client/text_wrap.h"
+#include "proto/base/number_text.h"
 
 namespace relmap::client {
 
@@ -18,6 +19,7 @@ namespace {
 constexpr Colour kGrid{233, 233, 228}, kBorder{214, 214, 208};
 constexpr double kNarrow = 420;             // points; narrower panels have smaller margins and letters
 constexpr std::size_t kNamedSessions = 12;  // if there are more, they are labelled with their numbers
+constexpr std::size_t kNamedTears = 10;     // further ones are marked only
 constexpr std::ptrdiff_t kCrowd = 2000;     // closures; of more, the ends are not marked
 
 double inset_of(double width) { return width < kNarrow ? 22 : 34; }
@@ -113,6 +115,21 @@ void draw_arrow(Drawing& out, const Vector2& at, const Vector2& direction, Colou
   out.polygon({at + along, at - along + side, at - 0.5 * along, at - along - side}, mix(colour, kInkColour, 0.25), 1);
 }
 
+void draw_tear(Drawing& out, const Vector2& from, const Vector2& to) {
+  const Vector2 middle = (from + to) / 2;
+  const Vector2 along = (to - from).norm() > 1 ? Vector2((to - from).normalized()) : Vector2(1, 0);
+  const Vector2 side = 6.5 * Vector2(-along.y(), along.x()), gap = 3.2 * along, slant = 2 * along;
+  if ((to - from).norm() > 14) {
+    out.line(from, middle - gap, {kQueryColour, 2.2, 1, 0});
+    out.line(middle + gap, to, {kQueryColour, 2.2, 1, 0});
+  }
+  out.polygon({middle - gap - side - slant, middle + gap - side - slant, middle + gap + side + slant,
+               middle - gap + side + slant},
+              kWhiteColour, 1);
+  for (const Vector2& edge : {Vector2(middle - gap), Vector2(middle + gap)})
+    out.line(edge - side - slant, edge + side + slant, {kQueryColour, 2.4, 1, 0});
+}
+
 void draw_label_point(Drawing& out, const Vector2& at) { out.disc(at, 5, kInkColour, 2, kWhiteColour); }
 
 void draw_route_piece(Drawing& out, const std::vector<Vector2>& way) { out.polyline(way, {kRouteColour, 13, 0.75, 0}); }
@@ -149,6 +166,7 @@ class MapPanel::Pen {
     for (const auto& [session, frames] : frames_) trajectory(frames);
     closures();
     for (const auto& [session, frames] : frames_) ends(session, frames);
+    tears();
     texts();
     Vector2 at;
     if (picture_.query && find_query(at)) draw_query(out_, at, 36 * panel_.plan_.heading(query_pose()));
@@ -292,6 +310,12 @@ class MapPanel::Pen {
     }
   }
 
+  void tears() {
+    Vector2 a, b;
+    for (const MapPicture::Tear& tear : picture_.tears)
+      if (find(tear.a, a) && find(tear.b, b)) draw_tear(out_, a, b);
+  }
+
   // Draws where the session began and ended, if that is in this part.
   void ends(SessionNumber session, const std::vector<FrameId>& frames) {
     const std::vector<FrameId>& all = contents_.sessions().at(session);
@@ -313,6 +337,13 @@ class MapPanel::Pen {
       if (!find(label.frame, at)) continue;
       leader(at, label.text, label_style);
       draw_label_point(out_, at);
+    }
+    Vector2 b;
+    std::size_t named = 0;
+    for (const MapPicture::Tear& tear : picture_.tears) {
+      if (!find(tear.a, at) || !find(tear.b, b) || ++named > kNamedTears) continue;
+      leader((at + b) / 2, fixed(tear.sigmas, 1) + " sigmas",
+             {.size = narrow_ ? 13.0 : 15.0, .colour = kQueryColour, .bold = true, .halo = 2});
     }
     const std::size_t sessions = contents_.sessions().size();
     for (const auto& [session, frames] : frames_) {

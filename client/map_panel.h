@@ -26,6 +26,8 @@ void draw_closure(Drawing& out, const ClosureStyle& style, const Vector2& from, 
 void draw_start(Drawing& out, const Vector2& at, Colour colour);
 void draw_end(Drawing& out, const Vector2& at, Colour colour);
 void draw_arrow(Drawing& out, const Vector2& at, const Vector2& direction, Colour colour);
+// A line that is torn in its middle.
+void draw_tear(Drawing& out, const Vector2& from, const Vector2& to);
 void draw_label_point(Drawing& out, const Vector2& at);
 void draw_route_piece(Drawing& out, const std::vector<Vector2>& way);
 void draw_route_begin(Drawing& out, const Vector2& at);

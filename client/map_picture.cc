@@ -1,7 +1,6 @@
 #include "client/map_picture.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <vector>
 
 #include "client/drawing.h"
@@ -172,20 +171,24 @@ Status check(const MapPicture& picture) {
 
 }  // namespace
 
-Status write_map_picture(const MapPicture& picture, const std::string& path) {
-  const std::string ending = std::filesystem::path(path).extension().string();
-  if (ending != ".svg" && ending != ".png")
-    return {Reason::INVALID_ARGUMENT, path + " ends neither in .svg nor in .png"};
+Result<std::string> draw_map_picture(const MapPicture& picture, PictureFormat format) {
   if (Status status = check(picture); !status.ok()) return status;
   const auto page = [&](double width, double height) {
-    return ending == ".svg" ? make_svg_drawing(width, height, kPaper)
-                            : make_png_drawing(width, height, kPaper, picture.png_scale);
+    return make_drawing(format, width, height, kPaper, picture.png_scale);
   };
   const auto measure = page(1, 1);  // letters have the same width on a page of any size
   const Composer composer(picture, *measure);
   const auto drawing = page(picture.width, composer.height());
   composer.draw(*drawing);
-  return drawing->save(path);
+  return drawing->file();
+}
+
+Status write_map_picture(const MapPicture& picture, const std::string& path) {
+  const auto format = picture_format(path);
+  if (!format.ok()) return format.status();
+  const auto bytes = draw_map_picture(picture, *format);
+  if (!bytes.ok()) return bytes.status();
+  return write_file(path, *bytes);
 }
 
 }  // namespace relmap::client

@@ -11,11 +11,13 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <sstream>
 
 #include "client/drawing.h"
 #include "client/label_placement.h"
 #include "client/map_plan.h"
+#include "client/svg_for_test.h"
 
 namespace relmap::client {
 namespace {
@@ -65,12 +67,6 @@ void add_part(MapPicture& picture, SessionNumber session, std::uint32_t frames) 
   picture.session_names[session] = "robot-" + std::to_string(session);
 }
 
-int count(const std::string& text, const std::string& part) {
-  int n = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
-  return n;
-}
-
 TEST_F(MapPictureFile, SvgHoldsAllThatThePictureShows) {
   MapPicture picture = circle();
   picture.title = "Street <A> & B";
@@ -96,7 +92,7 @@ TEST_F(MapPictureFile, MotionIsDrawnOnlyAlongEdges) {
   broken.edges.pop_back();
   ASSERT_TRUE(write_map_picture(whole, path("whole.svg")).ok());
   ASSERT_TRUE(write_map_picture(broken, path("broken.svg")).ok());
-  EXPECT_GT(count(contents(path("whole.svg")), "<polyline"), count(contents(path("broken.svg")), "<polyline"));
+  EXPECT_GT(count_in(contents(path("whole.svg")), "<polyline"), count_in(contents(path("broken.svg")), "<polyline"));
 }
 
 TEST_F(MapPictureFile, PngHasThePagesSizeAndContents) {
@@ -114,33 +110,6 @@ TEST_F(MapPictureFile, PngHasThePagesSizeAndContents) {
   EXPECT_LT(number(20), 1000);
 }
 
-// The texts of an SVG, and an upper bound of where each ends: texts are assumed to be as wide as they were laid out.
-struct Text {
-  double left = 0, right = 0, y = 0;
-  std::string text;
-};
-std::vector<Text> texts_of(const std::string& svg) {
-  const auto measure = make_svg_drawing(1, 1, {255, 255, 255});
-  std::vector<Text> texts;
-  for (std::size_t at = svg.find("<text "); at != std::string::npos; at = svg.find("<text ", at + 1)) {
-    Text text;
-    double size = 0;
-    char anchor[16] = {};
-    EXPECT_EQ(std::sscanf(svg.c_str() + at, R"(<text x="%lf" y="%lf" font-size="%lf" text-anchor="%15[a-z]")",
-                          &text.left, &text.y, &size, anchor),
-              4);
-    const std::size_t begin = svg.find('>', at) + 1;
-    text.text = svg.substr(begin, svg.find("</text>", at) - begin);
-    TextStyle style;
-    style.size = size;
-    style.bold = svg.substr(at, begin - at).find("bold") != std::string::npos;
-    const double width = measure->text_width(text.text, style);
-    if (std::string(anchor) == "end") text.left -= width;
-    text.right = text.left + width;
-    texts.push_back(text);
-  }
-  return texts;
-}
 std::vector<double> numbers_of(const std::string& svg) {
   std::vector<double> numbers;
   for (const char* at = svg.c_str(); *at;) {
@@ -151,26 +120,6 @@ std::vector<double> numbers_of(const std::string& svg) {
   }
   return numbers;
 }
-// All lines of text, joined by spaces.
-std::string said_in(const std::string& svg) {
-  std::string all;
-  for (const Text& text : texts_of(svg)) all += text.text + " ";
-  return all;
-}
-std::pair<double, double> page_of(const std::string& svg) {
-  double width = 0, height = 0;
-  EXPECT_EQ(std::sscanf(svg.c_str() + svg.find(" width="), R"( width="%lf" height="%lf")", &width, &height), 2);
-  return {width, height};
-}
-void expect_nothing_cut_off(const std::string& svg) {
-  const auto [width, height] = page_of(svg);
-  for (const Text& text : texts_of(svg)) {
-    EXPECT_GE(text.left, 0) << text.text;
-    EXPECT_LE(text.right, width) << text.text;
-    EXPECT_LE(text.y, height - 10) << text.text;
-  }
-}
-
 TEST_F(MapPictureFile, UnconnectedPartsAreDrawnApartEachWithItsScale) {
   MapPicture picture = circle();
   add_part(picture, 2, 9);
@@ -183,10 +132,10 @@ TEST_F(MapPictureFile, UnconnectedPartsAreDrawnApartEachWithItsScale) {
                                          "known."));
   for (const char* caption : {"Part 1 of 3", "Part 2 of 3", "Part 3 of 3", "in the frame of 1:0", "in the frame of 2:0",
                               "in the frame of 3:0"})
-    EXPECT_EQ(count(said, caption), 1) << caption;
-  EXPECT_EQ(count(said, "position relative to the other parts unknown"), 3) << "each says so of itself";
+    EXPECT_EQ(count_in(said, caption), 1) << caption;
+  EXPECT_EQ(count_in(said, "position relative to the other parts unknown"), 3) << "each says so of itself";
   int scales = 0;
-  for (const Text& text : texts_of(svg))
+  for (const SvgText& text : texts_of(svg))
     scales += text.text == "5 m" || text.text == "2 m" || text.text == "1 m" || text.text == "50 cm";
   EXPECT_EQ(scales, 3) << "bars";
   EXPECT_THAT(said, ::testing::HasSubstr("1 candidate closure from part to part not drawn"));
@@ -227,10 +176,10 @@ TEST_F(MapPictureFile, DashesAndDotsAreExplained) {
         "1 quarantined closure outvoted: not in force", "1 removed closure taken out by an operator"})
     EXPECT_THAT(said, ::testing::HasSubstr(part));
   // A sample in the legend for each dashed line of the plan.
-  EXPECT_EQ(count(svg, "stroke-dasharray"), 10);
+  EXPECT_EQ(count_in(svg, "stroke-dasharray"), 10);
   MapPicture plain = circle();
   ASSERT_TRUE(write_map_picture(plain, path("plain.svg")).ok());
-  EXPECT_EQ(count(contents(path("plain.svg")), "stroke-dasharray"), 0);
+  EXPECT_EQ(count_in(contents(path("plain.svg")), "stroke-dasharray"), 0);
   EXPECT_THAT(said_in(contents(path("plain.svg"))), ::testing::Not(::testing::HasSubstr("dashes")));
 }
 
@@ -285,8 +234,8 @@ TEST_F(MapPictureFile, SessionsAreNumberedIfThereAreMoreThanColours) {
   }
   ASSERT_TRUE(write_map_picture(picture, path("many.svg")).ok());
   const std::string svg = contents(path("many.svg"));
-  EXPECT_EQ(count(svg, ">17 robot-17 (30)<"), 1) << "in the legend";
-  EXPECT_EQ(count(svg, ">17<"), 1) << "where it begins";
+  EXPECT_EQ(count_in(svg, ">17 robot-17 (30)<"), 1) << "in the legend";
+  EXPECT_EQ(count_in(svg, ">17<"), 1) << "where it begins";
   expect_nothing_cut_off(svg);
 }
 
@@ -312,13 +261,46 @@ TEST_F(MapPictureFile, OfAVastMapOnlyWhatCanBeToldApartIsWritten) {
   ASSERT_TRUE(write_map_picture(picture, path("vast.svg")).ok());
   const std::string svg = contents(path("vast.svg"));
   EXPECT_LT(svg.size(), 2'000'000u) << "all of it takes 13 MB";
-  EXPECT_GT(count(svg, "<polyline"), 500) << "closures all around the circle";
-  EXPECT_LT(count(svg, "<circle"), 20) << "marks at the ends of closures would hide the circle";
+  EXPECT_GT(count_in(svg, "<polyline"), 500) << "closures all around the circle";
+  EXPECT_LT(count_in(svg, "<circle"), 20) << "marks at the ends of closures would hide the circle";
 }
 
 TEST_F(MapPictureFile, ASingleFrameIsFine) {
   ASSERT_TRUE(write_map_picture(circle(1), path("one.svg")).ok());
   expect_nothing_cut_off(contents(path("one.svg")));
+}
+
+TEST_F(MapPictureFile, TearsAreMarkedWithTheirSigmas) {
+  MapPicture picture = circle();
+  picture.edges.push_back({{1, 5}, {1, 40}, MapPicture::EdgeKind::kLoopAccepted});
+  picture.tears = {{{1, 5}, {1, 40}, 17.25}, {{1, 5}, {9, 9}, 9}};
+  picture.strained = {"1:40/1: 17.2 sigmas, 0.80 m"};
+  const std::string torn = draw_map_picture(picture, PictureFormat::kSvg).or_throw();
+  const std::string said = said_in(torn);
+  EXPECT_THAT(said, ::testing::HasSubstr("17.2 sigmas"));
+  EXPECT_THAT(said, ::testing::HasSubstr("2 tears"));
+  EXPECT_THAT(said, ::testing::HasSubstr("closures that the picture stretches most 1:40/1: 17.2 sigmas, 0.80 m"));
+  EXPECT_THAT(said, ::testing::Not(::testing::HasSubstr("9.0 sigmas"))) << "it leads out of the picture";
+  expect_nothing_cut_off(torn);
+  picture.tears.clear();
+  const std::string whole = draw_map_picture(picture, PictureFormat::kSvg).or_throw();
+  EXPECT_GT(count_in(torn, "<polyline"), count_in(whole, "<polyline"));
+  EXPECT_THAT(said_in(whole), ::testing::Not(::testing::HasSubstr("tear")));
+}
+
+TEST_F(MapPictureFile, AScaleColoursFramesByTheirValuesAndIsExplained) {
+  MapPicture picture = circle(40);
+  for (std::size_t k = 0; k < 40; ++k) picture.parts[0].frames[k].value = static_cast<double>(k) / 39;
+  picture.parts[0].frames[20].value = std::numeric_limits<double>::quiet_NaN();
+  picture.scale = MapPicture::Scale{"colour: uncertainty", "0 m", "1.25 m (one sigma)"};
+  const std::string svg = draw_map_picture(picture, PictureFormat::kSvg).or_throw();
+  EXPECT_THAT(said_in(svg), ::testing::HasSubstr("colour: uncertainty 0 m"));
+  EXPECT_THAT(said_in(svg), ::testing::HasSubstr("1.25 m (one sigma)"));
+  std::set<std::string> strokes;
+  for (std::size_t at = svg.find("stroke=\"#"); at != std::string::npos; at = svg.find("stroke=\"#", at + 1))
+    strokes.insert(svg.substr(at + 8, 7));
+  EXPECT_GT(strokes.size(), 30u) << "a colour for each value";
+  expect_nothing_cut_off(svg);
 }
 
 TEST_F(MapPictureFile, BadPicturesAreRefusedWithTheirReason) {

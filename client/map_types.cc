@@ -11,6 +11,17 @@ constexpr std::array<const char*, 4> kKinds = {"unknown", "odometry", "loop", "p
 constexpr std::array<const char*, 7> kVerifications = {"none",     "stereo",     "pnp",       "epipolar",
                                                        "imported", "homography", "compounded"};
 
+constexpr std::array<const char*, 10> kDoubts = {"other doubt",
+                                                 "few inliers",
+                                                 "poor spread",
+                                                 "improbable by appearance",
+                                                 "another place fits as well",
+                                                 "the place differs",
+                                                 "contradicted",
+                                                 "nothing agrees",
+                                                 "under tension",
+                                                 "not seen beyond"};
+
 template <std::size_t N, typename Enum>
 const char* pick(const std::array<const char*, N>& names, Enum value) {
   const auto i = static_cast<std::size_t>(value);
@@ -22,6 +33,11 @@ const char* name_of(EdgeState state) { return pick(kStates, state); }
 const char* name_of(SessionState state) { return pick(kSessionStates, state); }
 const char* name_of(EdgeKind kind) { return pick(kKinds, kind); }
 const char* name_of(Verification verification) { return pick(kVerifications, verification); }
+
+const char* name_of(DoubtKind kind) {
+  const auto i = static_cast<std::size_t>(kind);
+  return kDoubts[i < kDoubts.size() ? i : 0];
+}
 
 std::optional<EdgeState> parse_edge_state(std::string_view text) {
   for (std::size_t i = 1; i < kStates.size(); ++i)

@@ -69,6 +69,10 @@ struct EdgeEvent {
   Reason reason = Reason::OK;
   EdgeId cause;      // the closure whose proposal or edit caused it
   std::string note;  // the operator's note
+  // When the record that caused it was submitted, UTC, and by whom: the name in the caller's credentials, or "relmapd".
+  // 0 and empty: not known, as for all that happened before the map kept them.
+  std::int64_t time_us = 0;
+  std::string author = {};
 };
 
 // How much the place that a closure recognised stands out from all other places.
@@ -81,6 +85,57 @@ struct Uniqueness {
   // Number of cells of the picture in which landmarks of the place should be found, and the number of these in which
   // none was found. 0: not measured.
   std::uint32_t compared = 0, changed = 0;
+};
+
+// What may be wrong with a loop closure.
+enum class DoubtKind : std::uint8_t {
+  kFewInliers = 1,     // few points agree on its transform
+  kPoorSpread = 2,     // these lie in a small part of the picture
+  kImprobable = 3,     // appearance alone would not have recognised the place
+  kRunnerUp = 4,       // another place explains the picture nearly as well
+  kChanged = 5,        // of what should be seen in both, much differs
+  kContradiction = 6,  // other closures, or the robot's own motion, contradict it or once did
+  kLonely = 7,         // no closure, or few, agree with it
+  kTension = 8,        // refinement moved it away from what was measured
+  kUnseen = 9          // going on from it, the robot did not see what the map shows there
+};
+// "few inliers", "another place fits", ...; "other doubt" for one that a newer daemon knows.
+const char* name_of(DoubtKind kind);
+
+struct Doubt {
+  DoubtKind kind = DoubtKind::kFewInliers;
+  double weight = 0;    // its part of the suspicion, 0..1
+  std::string message;  // in words, with the numbers
+};
+
+// How doubtful a loop closure is, as the daemon judges it. It decides nothing: it orders closures for those who look at
+// them.
+struct Suspicion {
+  double value = 0;           // 0: nothing speaks against it; 1: it is wrong as far as the map can tell
+  std::vector<Doubt> doubts;  // the heaviest first
+  // What else to know, in words: what the map does not know of the closure, or that an operator put it into force.
+  std::string remark = {};
+};
+
+// A picture that the map keeps of a frame: of the rectified left camera, grey, possibly reduced.
+struct FramePicture {
+  std::string data;                     // JPEG; empty: there is none
+  std::uint32_t width = 0, height = 0;  // of the picture, pixels
+  double scale = 1;                     // pixels of the picture per pixel of the session's camera
+  Status missing = {};                  // not ok: why there is no picture
+};
+
+// A point that a view and a frame of the map both show.
+struct Correspondence {
+  // In the view: pixels of its left picture as it was sent, or of the camera of features and of frames of the map.
+  Vector2 in_view = Vector2::Zero();
+  // In the frame: pixels of its session's rectified left camera. Measured there or, if `seen_in` is set, where the
+  // landmark projects that this other frame beside it has measured.
+  Vector2 in_frame = Vector2::Zero();
+  bool inlier = false;  // it agrees with the verified transform
+  // Pixels in the view between where it was measured and where the verified transform puts it; absent: without metres.
+  std::optional<double> residual = {};
+  std::optional<FrameId> seen_in = {};
 };
 
 // Consecutive frames of a session along which its robot was carried: loop closures in force contradict its odometry.
@@ -127,6 +182,8 @@ struct Edge {
   std::optional<Uniqueness> uniqueness = {};   // of a closure, if it is known
   std::vector<EdgeId> carried_by = {};         // of motion: closures which show that the robot was carried
   std::optional<CarriedStretch> carried = {};  // of a closure which shows that
+  std::optional<Suspicion> suspicion = {};     // of a closure; absent: the daemon does not judge it
+  std::int64_t time_us = 0;                    // when its newer end was taken, UTC; 0: the daemon does not tell
 };
 
 struct Frame {
@@ -138,7 +195,8 @@ struct Frame {
   SE3 T_odom_frame;
   std::optional<double> mean_error;  // pixels
   std::uint32_t landmarks = 0, observations = 0, appearance = 0;
-  std::string thumbnail;  // JPEG
+  std::string thumbnail;                     // JPEG
+  std::optional<FramePicture> picture = {};  // if it was asked for, and the daemon knows of pictures
 };
 
 // A picture or a stereo pair, as the bytes of JPEG or PNG files, and the camera that took it.
@@ -167,8 +225,9 @@ struct Localisation {
   double probability = 0;  // of the place, by appearance
   double spread = 0;
   double new_place = 0;
-  bool near_prior = false;                       // found around the prior; probability and new_place are not set
-  std::optional<double> estimated_focal_length;  // pixels of the picture; if its camera was unknown
+  bool near_prior = false;                           // found around the prior; probability and new_place are not set
+  std::optional<double> estimated_focal_length;      // pixels of the picture; if its camera was unknown
+  std::vector<Correspondence> correspondences = {};  // with `frame`, if asked for: the inliers first, at most 1024
 };
 
 struct MatchOptions {
@@ -176,6 +235,7 @@ struct MatchOptions {
   std::uint32_t max_verified = 0;  // geometry is tried on this number of places; 0: 10, at most 20
   bool thumbnails = false;
   std::optional<FrameId> near = {};  // a frame supposed to be near; places around it are more likely
+  bool correspondences = false;      // with the points that the view and each place have in common
 };
 
 struct PlaceMatch {
@@ -189,6 +249,8 @@ struct PlaceMatch {
   std::optional<double> estimated_focal_length;  // as in Localisation
   Status unverified;                             // not ok: why geometry has not confirmed it
   std::string thumbnail;                         // JPEG
+  // If asked for, of a place on which geometry was tried: the inliers first, at most 1024.
+  std::vector<Correspondence> correspondences = {};
 };
 struct PlaceMatches {
   std::vector<PlaceMatch> places;  // verified ones by number of inliers, then the others by probability
@@ -226,6 +288,9 @@ struct RouteRequest {
   std::optional<RouteWeights> weights = {};        // instead of `by`
   RouteFilter filter = {};
   bool covariance = false;  // each step has T_start_this and its covariance
+  // So many other routes, at most 5: each at most 1.5 times as dear as the cheapest, with at least a quarter of its
+  // length apart from those before it.
+  std::uint32_t alternatives = 0;
 };
 
 struct RouteStep {
@@ -256,6 +321,9 @@ struct Route {
   bool no_way_by_edges = false;                    // no goal can be reached by edges alone, or none within max_cost
   std::optional<Localisation> from_view, to_view;  // of ends that are views
   std::vector<RouteStep> steps;
+  double shared = 0;  // of an alternative: the share of its length that the routes before it use, too, 0..1
+  // Other routes by cost, if they were asked for; there may be fewer. They have no alternatives themselves.
+  std::vector<Route> alternatives = {};
 };
 
 struct TransformBetween {
@@ -296,11 +364,32 @@ struct GraphPiece {
   std::vector<Loop> loops;
 };
 
+// Frames around a frame, as a search along edges finds them.
+struct Region {
+  FrameId root;
+  std::uint32_t max_edges = 0;  // 0: 30
+  double max_metres = 0;        // along the path; 0: no limit
+};
+
+enum class EdgeOrder : std::uint8_t {
+  kId = 1,
+  kSuspicion = 2,  // loop closures only, the most suspicious first
+  kTime = 3        // loop closures only, the newest first
+};
+
+// What edges are listed. All conditions must hold.
 struct EdgeFilter {
-  std::vector<EdgeState> states;  // empty: all
-  std::vector<EdgeKind> kinds;    // empty: all
-  SessionNumber session = 0;      // 0: any
-  std::optional<FrameId> frame;
+  std::vector<EdgeState> states;      // empty: all
+  std::vector<EdgeKind> kinds;        // empty: all
+  SessionNumber session = 0;          // with an end in this session; 0: any
+  std::optional<FrameId> frame;       // of this frame
+  SessionNumber other_session = 0;    // with `session`: between the two, or within one if they are the same; 0: any
+  std::int64_t from_us = 0;           // of which the newer end was taken at this time or later, UTC; 0: any
+  std::int64_t until_us = 0;          // ... before this time; 0: any
+  double min_suspicion = 0;           // only loop closures at least as suspicious, 0..1; 0: any edges
+  std::optional<Region> region = {};  // with an end there
+  EdgeOrder order = EdgeOrder::kId;
+  std::size_t limit = 0;  // at most so many, the first in this order; 0: all
 };
 
 // What an operator does to a loop closure.

@@ -31,17 +31,6 @@ grpc::ChannelArguments channel_arguments() {
   return arguments;
 }
 
-Status read_route_part(const v1::FindRouteReply& reply, Route& route) {
-  if (reply.has_summary())
-    if (Status status = read_route_summary(reply.summary(), route); !status.ok()) return status;
-  for (const v1::RouteStep& message : reply.steps()) {
-    auto step = read_route_step(message);
-    if (!step.ok()) return step.status();
-    route.steps.push_back(std::move(step).value());
-  }
-  return {};
-}
-
 // Why there is no connection, as gRPC puts it; empty if it does not know yet.
 std::string why_not(v1::Map::Stub& map) {
   grpc::ClientContext context;
@@ -116,8 +105,9 @@ Status Client::wait_idle() {
   return impl_->ask(*impl_->admin, &v1::Admin::Stub::WaitIdle, v1::WaitIdleRequest(), reply, impl_->deadline());
 }
 
-Result<Localisation> Client::localise(const View& view, std::optional<FrameId> prior) {
+Result<Localisation> Client::localise(const View& view, std::optional<FrameId> prior, bool correspondences) {
   v1::LocaliseRequest request;
+  request.set_correspondences(correspondences);
   *request.mutable_view() = view_message(view);
   if (prior) *request.mutable_prior() = to_wire(*prior);
   v1::LocaliseReply reply;
@@ -131,6 +121,7 @@ Result<PlaceMatches> Client::match_image(const View& view, const MatchOptions& o
   request.set_max_places(options.max_places);
   request.set_max_verified(options.max_verified);
   request.set_thumbnails(options.thumbnails);
+  request.set_correspondences(options.correspondences);
   if (options.near) *request.mutable_near() = to_wire(*options.near);
   v1::MatchImageReply reply;
   if (Status status = impl_->ask_map(&MapStub::MatchImage, request, reply); !status.ok()) return status;
@@ -141,7 +132,7 @@ Result<Route> Client::find_route(const RouteRequest& asked) {
   Route route;
   const Status status = impl_->read_stream<v1::FindRouteReply>(
       &MapStub::FindRoute, route_message(asked),
-      [&](const v1::FindRouteReply& reply) { return read_route_part(reply, route); });
+      [&](const v1::FindRouteReply& reply) { return read_route_reply(reply, route); });
   if (!status.ok()) return status;
   return route;
 }
@@ -155,10 +146,11 @@ Result<TransformBetween> Client::transform_between(FrameId a, FrameId b) {
   return read_transform(reply);
 }
 
-Result<Frame> Client::frame(FrameId id, bool with_thumbnail) {
+Result<Frame> Client::frame(FrameId id, bool with_thumbnail, bool with_picture) {
   v1::GetFrameRequest request;
   *request.mutable_frame() = to_wire(id);
   request.set_thumbnail(with_thumbnail);
+  request.set_picture(with_picture);
   v1::GetFrameReply reply;
   if (Status status = impl_->ask_map(&MapStub::GetFrame, request, reply); !status.ok()) return status;
   return read_frame(reply.frame());
@@ -188,23 +180,42 @@ Result<std::vector<RobotStatus>> Client::robots() {
 }
 
 Result<std::vector<Edge>> Client::edges(const EdgeFilter& filter) {
-  v1::ListEdgesRequest request;
-  for (const EdgeState state : filter.states) request.add_states(static_cast<v1::EdgeState>(state));
-  for (const EdgeKind kind : filter.kinds) request.add_kinds(static_cast<v1::EdgeKind>(kind));
-  request.set_session(filter.session);
-  if (filter.frame) *request.mutable_frame() = to_wire(*filter.frame);
   std::vector<Edge> all;
-  const Status status =
-      impl_->list<v1::ListEdgesReply>(&MapStub::ListEdges, request, [&](const v1::ListEdgesReply& page) -> Status {
-        for (const v1::Edge& message : page.edges()) {
-          auto edge = read_edge(message);
-          if (!edge.ok()) return edge.status();
-          all.push_back(std::move(edge).value());
-        }
+  const Status status = impl_->list_until<v1::ListEdgesReply>(*impl_->map, &MapStub::ListEdges, edges_message(filter),
+                                                              [&](const v1::ListEdgesReply& page) -> Result<bool> {
+                                                                for (const v1::Edge& message : page.edges()) {
+                                                                  if (filter.limit > 0 && all.size() == filter.limit)
+                                                                    return false;
+                                                                  auto edge = read_edge(message);
+                                                                  if (!edge.ok()) return edge.status();
+                                                                  all.push_back(std::move(edge).value());
+                                                                }
+                                                                return filter.limit == 0 || all.size() < filter.limit;
+                                                              });
+  if (!status.ok()) return status;
+  return all;
+}
+
+Result<std::vector<ClosureMatrixCell>> Client::closure_matrix(const std::vector<SessionNumber>& sessions) {
+  v1::GetClosureMatrixRequest request;
+  for (const SessionNumber session : sessions) request.add_sessions(session);
+  std::vector<ClosureMatrixCell> cells;
+  const Status status = impl_->list<v1::GetClosureMatrixReply>(
+      &MapStub::GetClosureMatrix, request, [&](const v1::GetClosureMatrixReply& page) -> Status {
+        for (const v1::ClosureMatrixCell& message : page.cells()) cells.push_back(read_cell(message));
         return {};
       });
   if (!status.ok()) return status;
-  return all;
+  return cells;
+}
+
+Result<EdgeExplanation> Client::explain_edge(EdgeId edge, bool with_pictures) {
+  v1::ExplainEdgeRequest request;
+  *request.mutable_edge() = to_wire(edge);
+  request.set_pictures(with_pictures);
+  v1::ExplainEdgeReply reply;
+  if (Status status = impl_->ask_map(&MapStub::ExplainEdge, request, reply); !status.ok()) return status;
+  return read_explanation(reply);
 }
 
 Result<std::vector<LabelledFrames>> Client::labels(const std::string& prefix, const std::string& words) {

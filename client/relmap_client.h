@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "client/admin_types.h"
+#include "client/evidence_types.h"
 #include "client/map_types.h"
 #include "client/watch_types.h"
 
@@ -54,20 +55,26 @@ class Client {
   Status wait_idle();
 
   // `prior`: a frame near the view. Its surroundings are searched first, and the rest of the map only if the view is
-  // not found there.
-  Result<Localisation> localise(const View& view, std::optional<FrameId> prior = {});
+  // not found there. `correspondences`: with the points that the view and the found frame both show.
+  Result<Localisation> localise(const View& view, std::optional<FrameId> prior = {}, bool correspondences = false);
   Result<PlaceMatches> match_image(const View& view, const MatchOptions& options = {});
   // A stream that breaks is resumed with the same map version.
   Result<Route> find_route(const RouteRequest& request);
   Result<TransformBetween> transform_between(FrameId a, FrameId b);
 
-  Result<Frame> frame(FrameId id, bool with_thumbnail = false);
+  // `with_picture`: with the whole picture that the map keeps of the frame, if any.
+  Result<Frame> frame(FrameId id, bool with_thumbnail = false, bool with_picture = false);
   // Sessions heard of in the last minute, by robot and session.
   Result<std::vector<RobotStatus>> robots();
   // Whole lists, all pages from one map version; VIEW_EXPIRED if that version expires meanwhile.
   Result<std::vector<Session>> sessions();
   Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
+  // The loop closures between each two sessions that have any; `sessions`: only pairs with one of these; empty: all.
+  Result<std::vector<ClosureMatrixCell>> closure_matrix(const std::vector<SessionNumber>& sessions = {});
   Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "", const std::string& words = "");
+
+  // What a loop closure is believed for. NO_SUCH_EDGE, ODOMETRY_EDGE.
+  Result<EdgeExplanation> explain_edge(EdgeId edge, bool with_pictures = false);
 
   Result<EdgeEdit> edit_edge(EdgeId edge, EdgeAction action, const EditOptions& options = {});
   // Verifies two frames by geometry and proposes the result as a loop closure, which is judged like any other, or with
@@ -108,6 +115,8 @@ class Client {
   Result<Backup> backup(const std::string& folder, const OnProgress& on_progress);
   Result<Compaction> compact(const OnProgress& on_progress);
   Result<StoreStats> stats();
+  // What operators did and tried, the newest first. UNSUPPORTED: the daemon keeps no audit log.
+  Result<AuditLog> audit(const AuditFilter& filter = {});
   // Changes what the daemon's log tells, until the next change or start, and returns the former level. Empty: only
   // asks. INVALID_ARGUMENT: there is no such level.
   Result<std::string> set_log_level(const std::string& level);

@@ -77,6 +77,23 @@ class FakeMap final : public v1::Map::Service {
                          grpc::ServerWriter<v1::FindRouteReply>* stream) override {
     if (request->to().label() == "nowhere") return refusal(Reason::NO_SUCH_LABEL, "nowhere");
     v1::FindRouteReply reply;
+    if (request->to().label() == "two ways") {
+      EXPECT_EQ(request->alternatives(), 2u);
+      for (const std::uint32_t route : {0u, 1u, 1u, 2u}) {
+        reply.Clear();
+        reply.set_route(route);
+        reply.mutable_summary()->set_distance_m(10 + route);
+        reply.mutable_summary()->set_shared(0.25 * route);
+        *reply.add_steps()->mutable_frame() = to_wire(FrameId{1, route});
+        stream->Write(reply);
+      }
+      return grpc::Status::OK;
+    }
+    if (request->to().label() == "out of order") {
+      reply.set_route(2);
+      stream->Write(reply);
+      return grpc::Status::OK;
+    }
     const bool resumed = request->resume_token() == "2 steps";
     if (!resumed) reply.mutable_summary()->set_distance_m(12.5);
     for (std::uint32_t i = resumed ? 2 : 0; i < 3; ++i) {
@@ -96,6 +113,67 @@ class FakeMap final : public v1::Map::Service {
     stream->Write(reply);
     return grpc::Status::OK;
   }
+  // Pages of two edges, without end.
+  grpc::Status ListEdges(grpc::ServerContext*, const v1::ListEdgesRequest* request,
+                         v1::ListEdgesReply* reply) override {
+    edges_asked = *request;
+    const int page = request->page_token().empty() ? 0 : std::stoi(request->page_token());
+    for (int i = 0; i < 2; ++i) {
+      v1::Edge& edge = *reply->add_edges();
+      *edge.mutable_id() = to_wire(EdgeId{{1, static_cast<std::uint32_t>(2 * page + i)}, 1});
+      *edge.mutable_a_from_b() = to_wire(SE3());
+      edge.set_time_us(5);
+      edge.mutable_suspicion()->set_value(0.5);
+      edge.mutable_suspicion()->set_remark("accepted by an operator");
+      v1::Doubt& doubt = *edge.mutable_suspicion()->add_doubts();
+      doubt.set_kind(v1::DOUBT_KIND_TENSION);
+      doubt.set_weight(0.25);
+      v1::EdgeEvent& event = *edge.add_history();
+      event.set_time_us(77);
+      event.set_author("anna");
+    }
+    reply->set_next_page_token(std::to_string(page + 1));
+    return grpc::Status::OK;
+  }
+  v1::ListEdgesRequest edges_asked;
+
+  grpc::Status ExplainEdge(grpc::ServerContext*, const v1::ExplainEdgeRequest* request,
+                           v1::ExplainEdgeReply* reply) override {
+    if (request->edge().ordinal() == 0) return refusal(Reason::ODOMETRY_EDGE, "the robot's own motion");
+    *reply->mutable_edge()->mutable_id() = request->edge();
+    *reply->mutable_edge()->mutable_a_from_b() = to_wire(SE3());
+    if (request->pictures()) {
+      reply->mutable_picture_a()->set_data("jpeg");
+      reply->mutable_picture_a()->set_width(320);
+      reply->mutable_picture_a()->set_scale(0.5);
+      reply->mutable_picture_b()->set_reason(v1::REASON_UNSUPPORTED);
+      reply->mutable_picture_b()->set_message("dropped");
+    }
+    v1::Correspondence& match = *reply->add_correspondences();
+    match.set_u(1);
+    match.set_frame_v(4);
+    match.set_inlier(true);
+    match.set_residual(0.5);
+    *match.mutable_seen_in() = to_wire(FrameId{1, 3});
+    reply->mutable_motion()->set_verdict(v1::REASON_CONTRADICTS_MOTION);
+    reply->mutable_motion()->set_sigmas_apart(7);
+    reply->add_agreements()->set_agrees(true);
+    return grpc::Status::OK;
+  }
+  // Two pages of one cell each.
+  grpc::Status GetClosureMatrix(grpc::ServerContext*, const v1::GetClosureMatrixRequest* request,
+                                v1::GetClosureMatrixReply* reply) override {
+    v1::ClosureMatrixCell& cell = *reply->add_cells();
+    cell.set_session_a(request->sessions(0));
+    cell.set_session_b(9);
+    cell.set_accepted(4);
+    if (request->page_token().empty()) {
+      *cell.mutable_most_suspicious() = to_wire(EdgeId{{9, 1}, 1});
+      reply->set_next_page_token("more");
+    }
+    return grpc::Status::OK;
+  }
+
   // Breaks after each piece, so that it has to be resumed for each.
   grpc::Status Export(grpc::ServerContext*, const v1::ExportRequest* request,
                       grpc::ServerWriter<v1::ExportReply>* stream) override {
@@ -244,6 +322,79 @@ TEST_F(ClientTest, ReadsMatchesAndTheReasonsOfOthers) {
   EXPECT_TRUE(confirmed.unverified.ok() && matches->nothing_verified.ok());
   EXPECT_EQ(other.unverified.reason(), Reason::POOR_SPREAD);
   EXPECT_FALSE(other.T_frame_view || other.estimated_focal_length);
+}
+
+TEST_F(ClientTest, ListsEdgesByAllFiltersAndStopsAtTheLimit) {
+  EdgeFilter filter;
+  filter.session = 3;
+  filter.other_session = 4;
+  filter.from_us = 10;
+  filter.until_us = 20;
+  filter.min_suspicion = 0.25;
+  filter.region = Region{{1, 7}, 12, 3.5};
+  filter.order = EdgeOrder::kSuspicion;
+  filter.limit = 5;
+  const auto edges = client()->edges(filter);
+  ASSERT_TRUE(edges.ok()) << edges.status().to_string();
+  ASSERT_EQ(edges->size(), 5u) << "though there are more";
+  EXPECT_EQ(edges->back().id, (EdgeId{{1, 4}, 1}));
+  const Edge& edge = edges->front();
+  EXPECT_EQ(edge.time_us, 5);
+  ASSERT_TRUE(edge.suspicion);
+  EXPECT_EQ(edge.suspicion->value, 0.5);
+  EXPECT_EQ(edge.suspicion->remark, "accepted by an operator");
+  EXPECT_EQ(edge.suspicion->doubts.at(0).kind, DoubtKind::kTension);
+  EXPECT_STREQ(name_of(edge.suspicion->doubts.at(0).kind), "under tension");
+  EXPECT_EQ(edge.history.at(0).time_us, 77);
+  EXPECT_EQ(edge.history.at(0).author, "anna");
+  const v1::ListEdgesRequest& asked = map_.edges_asked;
+  EXPECT_EQ(asked.other_session(), 4u);
+  EXPECT_EQ(asked.from_us(), 10);
+  EXPECT_EQ(asked.until_us(), 20);
+  EXPECT_EQ(asked.min_suspicion(), 0.25);
+  EXPECT_EQ(asked.region().max_metres(), 3.5);
+  EXPECT_EQ(asked.order(), v1::EDGE_ORDER_SUSPICION);
+  EXPECT_EQ(asked.page_size(), 5u);
+}
+
+TEST_F(ClientTest, ReadsWhyAClosureIsBelieved) {
+  const auto explained = client()->explain_edge({{2, 5}, 1}, true);
+  ASSERT_TRUE(explained.ok()) << explained.status().to_string();
+  EXPECT_EQ(explained->edge.id, (EdgeId{{2, 5}, 1}));
+  ASSERT_TRUE(explained->picture_a && explained->picture_b);
+  EXPECT_EQ(explained->picture_a->scale, 0.5);
+  EXPECT_TRUE(explained->picture_a->missing.ok());
+  EXPECT_EQ(explained->picture_b->missing.to_string(), "UNSUPPORTED: dropped");
+  const Correspondence& match = explained->correspondences.at(0);
+  EXPECT_EQ(match.in_view.x(), 1);
+  EXPECT_EQ(match.in_frame.y(), 4);
+  EXPECT_TRUE(match.inlier && match.residual == 0.5 && match.seen_in == (FrameId{1, 3}));
+  EXPECT_EQ(explained->motion.verdict, Reason::CONTRADICTS_MOTION);
+  EXPECT_EQ(explained->motion.sigmas_apart, 7);
+  EXPECT_TRUE(explained->agreements.at(0).agrees);
+  EXPECT_FALSE(client()->explain_edge({{2, 5}, 1})->picture_a) << "they were not asked for";
+  EXPECT_EQ(client()->explain_edge({{2, 5}, 0}).reason(), Reason::ODOMETRY_EDGE);
+}
+
+TEST_F(ClientTest, ReadsTheWholeMatrix) {
+  const auto cells = client()->closure_matrix({3});
+  ASSERT_TRUE(cells.ok()) << cells.status().to_string();
+  ASSERT_EQ(cells->size(), 2u);
+  EXPECT_EQ(cells->at(0).most_suspicious, (EdgeId{{9, 1}, 1}));
+  EXPECT_FALSE(cells->at(1).most_suspicious);
+  EXPECT_EQ(cells->at(1).accepted, 4u);
+}
+
+TEST_F(ClientTest, KeepsTheStepsOfAlternativesApart) {
+  const auto route = client()->find_route({.from = FrameId{1, 0}, .to = "two ways", .alternatives = 2});
+  ASSERT_TRUE(route.ok()) << route.status().to_string();
+  EXPECT_EQ(route->steps.size(), 1u);
+  EXPECT_EQ(route->distance_m, 10);
+  ASSERT_EQ(route->alternatives.size(), 2u);
+  EXPECT_EQ(route->alternatives[0].steps.size(), 2u);
+  EXPECT_EQ(route->alternatives[1].distance_m, 12);
+  EXPECT_EQ(route->alternatives[1].shared, 0.5);
+  EXPECT_EQ(client()->find_route({.from = FrameId{1, 0}, .to = "out of order"}).reason(), Reason::CORRUPT);
 }
 
 TEST_F(ClientTest, ReadsStatus) {

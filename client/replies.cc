@@ -1,6 +1,9 @@
 #include "client/replies.h"
 
+#include <algorithm>
+
 #include "proto/wire/convert.h"
+#include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
 
 namespace relmap::client {
@@ -79,6 +82,28 @@ v1::FindRouteRequest route_message(const RouteRequest& asked) {
   filter.set_suppose_candidates(asked.filter.suppose_candidates);
   filter.set_suppose_quarantined(asked.filter.suppose_quarantined);
   request.set_covariance(asked.covariance);
+  request.set_alternatives(asked.alternatives);
+  return request;
+}
+
+v1::ListEdgesRequest edges_message(const EdgeFilter& filter) {
+  constexpr std::size_t kMaxPage = 5000;
+  v1::ListEdgesRequest request;
+  for (const EdgeState state : filter.states) request.add_states(static_cast<v1::EdgeState>(state));
+  for (const EdgeKind kind : filter.kinds) request.add_kinds(static_cast<v1::EdgeKind>(kind));
+  request.set_session(filter.session);
+  if (filter.frame) *request.mutable_frame() = to_wire(*filter.frame);
+  request.set_other_session(filter.other_session);
+  request.set_from_us(filter.from_us);
+  request.set_until_us(filter.until_us);
+  request.set_min_suspicion(filter.min_suspicion);
+  if (filter.region) {
+    *request.mutable_region()->mutable_root() = to_wire(filter.region->root);
+    request.mutable_region()->set_max_edges(filter.region->max_edges);
+    request.mutable_region()->set_max_metres(filter.region->max_metres);
+  }
+  if (filter.order != EdgeOrder::kId) request.set_order(static_cast<v1::EdgeOrder>(filter.order));
+  if (filter.limit > 0) request.set_page_size(static_cast<std::uint32_t>(std::min(filter.limit, kMaxPage)));
   return request;
 }
 
@@ -98,6 +123,36 @@ Unmeasured read_unmeasured(const Way& message) {
     unmeasured.stretches.push_back(
         {read_id(stretch.first()), read_id(stretch.last()), stretch.steps(), stretch.distance_m()});
   return unmeasured;
+}
+
+Suspicion read_suspicion(const v1::Suspicion& message) {
+  Suspicion suspicion{message.value(), {}, message.remark()};
+  for (const v1::Doubt& doubt : message.doubts())
+    suspicion.doubts.push_back({static_cast<DoubtKind>(doubt.kind()), doubt.weight(), doubt.message()});
+  return suspicion;
+}
+
+FramePicture read_picture(const v1::FramePicture& message) {
+  FramePicture picture{message.data(), message.width(), message.height(), message.scale(), {}};
+  if (!(picture.scale > 0)) picture.scale = 1;
+  if (message.reason() != v1::REASON_OK || message.data().empty())
+    picture.missing = {message.reason() == v1::REASON_OK ? Reason::UNSUPPORTED : reason_from_wire(message.reason()),
+                       message.message().empty() ? "the map keeps no picture of it" : message.message()};
+  return picture;
+}
+
+template <typename Messages>
+std::vector<Correspondence> read_correspondences(const Messages& messages) {
+  std::vector<Correspondence> points;
+  for (const v1::Correspondence& message : messages) {
+    Correspondence& point = points.emplace_back();
+    point.in_view = {message.u(), message.v()};
+    point.in_frame = {message.frame_u(), message.frame_v()};
+    point.inlier = message.inlier();
+    if (message.has_residual()) point.residual = message.residual();
+    if (message.has_seen_in()) point.seen_in = read_id(message.seen_in());
+  }
+  return points;
 }
 
 }  // namespace
@@ -129,9 +184,12 @@ Result<Edge> read_edge(const v1::Edge& message) {
   for (const v1::EdgeId& id : message.consistent_with()) edge.consistent_with.push_back(read_id(id));
   for (const v1::EdgeEvent& event : message.history())
     edge.history.push_back({event.journal_sequence(), static_cast<EdgeState>(event.state()),
-                            reason_from_wire(event.reason()), read_id(event.cause()), event.note()});
+                            reason_from_wire(event.reason()), read_id(event.cause()), event.note(), event.time_us(),
+                            event.author()});
   for (const v1::EdgeId& id : message.carried_by()) edge.carried_by.push_back(read_id(id));
   if (message.has_carried()) edge.carried = read_carried(message.carried());
+  if (message.has_suspicion()) edge.suspicion = read_suspicion(message.suspicion());
+  edge.time_us = message.time_us();
   if (!message.has_uniqueness()) return edge;
   const v1::Uniqueness& found = message.uniqueness();
   Uniqueness& uniqueness = edge.uniqueness.emplace();
@@ -143,6 +201,71 @@ Result<Edge> read_edge(const v1::Edge& message) {
   uniqueness.compared = found.compared();
   uniqueness.changed = found.changed();
   return edge;
+}
+
+namespace {
+
+Result<MotionVerdict> read_verdict(const v1::MotionVerdict& message) {
+  const auto T = from_wire(message.a_from_b());
+  // Without a way between the ends there is no transform.
+  if (!T.ok() && message.has_a_from_b()) return ill_formed("verdict", T.status());
+  MotionVerdict verdict;
+  verdict.verdict = reason_from_wire(message.verdict());
+  verdict.message = message.message();
+  verdict.edges = message.edges();
+  verdict.distance_m = message.distance_m();
+  if (T.ok()) verdict.T_ab = *T;
+  verdict.covariance = read_covariance(message.covariance());
+  verdict.metres_apart = message.metres_apart();
+  verdict.radians_apart = message.radians_apart();
+  verdict.sigmas_apart = message.sigmas_apart();
+  return verdict;
+}
+
+}  // namespace
+
+Result<EdgeExplanation> read_explanation(const v1::ExplainEdgeReply& message) {
+  EdgeExplanation explained;
+  auto edge = read_edge(message.edge());
+  if (!edge.ok()) return edge.status();
+  explained.edge = std::move(edge).value();
+  if (message.has_picture_a()) explained.picture_a = read_picture(message.picture_a());
+  if (message.has_picture_b()) explained.picture_b = read_picture(message.picture_b());
+  if (message.has_runner_up()) explained.runner_up = read_picture(message.runner_up());
+  explained.correspondences = read_correspondences(message.correspondences());
+  if (message.correspondences_reason() != v1::REASON_OK)
+    explained.correspondences_missing = {reason_from_wire(message.correspondences_reason()),
+                                         message.correspondences_message()};
+  if (message.has_motion()) {
+    auto verdict = read_verdict(message.motion());
+    if (!verdict.ok()) return verdict.status();
+    explained.motion = std::move(verdict).value();
+  }
+  for (const v1::Agreement& agreement : message.agreements())
+    explained.agreements.push_back({read_id(agreement.edge()), read_id(agreement.a()), read_id(agreement.b()),
+                                    static_cast<EdgeState>(agreement.state()), agreement.agrees()});
+  return explained;
+}
+
+ClosureMatrixCell read_cell(const v1::ClosureMatrixCell& message) {
+  ClosureMatrixCell cell{message.session_a(),
+                         message.session_b(),
+                         message.candidate(),
+                         message.accepted(),
+                         message.quarantined(),
+                         message.removed(),
+                         {},
+                         message.suspicion()};
+  if (message.has_most_suspicious()) cell.most_suspicious = read_id(message.most_suspicious());
+  return cell;
+}
+
+AuditEntry read_audit(const v1::AuditEntry& message) {
+  AuditEntry entry{message.time_us(), message.who(),     message.role(),       message.from(),
+                   message.method(),  message.request(), message.request_id(), {},
+                   message.seconds(), message.trace_id()};
+  if (message.outcome() != v1::REASON_OK) entry.outcome = {reason_from_wire(message.outcome()), message.message()};
+  return entry;
 }
 
 EditEffect read_effect(const v1::EditEffect& message) {
@@ -190,6 +313,7 @@ Result<Frame> read_frame(const v1::Frame& message) {
   frame.observations = message.observation_count();
   frame.appearance = message.appearance_count();
   frame.thumbnail = message.thumbnail();
+  if (message.has_picture()) frame.picture = read_picture(message.picture());
   return frame;
 }
 
@@ -234,6 +358,7 @@ Result<Localisation> read_localisation(const v1::LocaliseReply& message) {
   found.new_place = message.new_place();
   found.near_prior = message.near_prior();
   if (message.estimated_focal_length() > 0) found.estimated_focal_length = message.estimated_focal_length();
+  found.correspondences = read_correspondences(message.correspondences());
   return found;
 }
 
@@ -250,6 +375,7 @@ Result<PlaceMatches> read_matches(const v1::MatchImageReply& message) {
     match.spread = place.spread();
     match.unverified = {reason_from_wire(place.reason()), place.message()};
     match.thumbnail = place.thumbnail();
+    match.correspondences = read_correspondences(place.correspondences());
     if (place.estimated_focal_length() > 0) match.estimated_focal_length = place.estimated_focal_length();
     if (!place.has_frame_from_view()) continue;
     const auto T = from_wire(place.frame_from_view());
@@ -259,6 +385,8 @@ Result<PlaceMatches> read_matches(const v1::MatchImageReply& message) {
   }
   return matches;
 }
+
+namespace {
 
 Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.from = read_id(message.from());
@@ -272,6 +400,7 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.frame_by_frame = message.frame_by_frame();
   route.bound_closures = message.bound_closures();
   route.no_way_by_edges = message.no_way_by_edges();
+  route.shared = message.shared();
   if (message.has_from_view()) {
     auto found = read_localisation(message.from_view());
     if (!found.ok()) return found.status();
@@ -307,6 +436,25 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message) {
   step.carried = message.carried();
   step.unmeasured = message.unmeasured();
   return step;
+}
+
+}  // namespace
+
+Status read_route_reply(const v1::FindRouteReply& message, Route& route) {
+  const std::size_t others = route.alternatives.size();
+  if (message.route() > others + 1)
+    return ill_formed("route", {Reason::BAD_SIZE, "alternative " + std::to_string(message.route()) + " follows " +
+                                                      std::to_string(others) + " others"});
+  if (message.route() == others + 1) route.alternatives.emplace_back();
+  Route& part = message.route() == 0 ? route : route.alternatives[message.route() - 1];
+  if (message.has_summary())
+    if (Status status = read_route_summary(message.summary(), part); !status.ok()) return status;
+  for (const v1::RouteStep& step : message.steps()) {
+    auto read = read_route_step(step);
+    if (!read.ok()) return read.status();
+    part.steps.push_back(std::move(read).value());
+  }
+  return {};
 }
 
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message) {

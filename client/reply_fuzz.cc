@@ -8,6 +8,7 @@
 #include "client/replies.h"
 #include "proto/base/testing/fuzzing.h"
 #include "proto/base/utf8.h"
+#include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
 #include "relmap/v1/watch.pb.h"
@@ -78,6 +79,7 @@ void ask(ByteReader in) {
   if ((how & 1u) != 0) asked.weights = RouteWeights{in.get<double>(), in.get<double>(), 0, 0};
   if ((how & 2u) != 0) asked.or_from = {end_of(in)};
   if ((how & 4u) != 0) asked.or_to = {end_of(in)};
+  asked.alternatives = how % 6;
   asked.filter = {{how}, {FrameId{how, 1}}, {"hall"}, how, (how & 8u) != 0, (how & 16u) != 0, (how & 32u) != 0};
   const auto is_text = [](const RouteEnd& end) {
     const auto* label = std::get_if<std::string>(&end);
@@ -92,6 +94,21 @@ void ask(ByteReader in) {
   must(read.or_from_size() == static_cast<int>(asked.or_from.size()) &&
        read.has_weights() == asked.weights.has_value());
   must(read.filter().no_long_loops() != asked.filter.long_loops);
+  must(read.alternatives() == asked.alternatives);
+}
+
+void list(ByteReader in) {
+  EdgeFilter filter;
+  const auto how = in.get<std::uint8_t>();
+  if ((how & 1u) != 0) filter.region = Region{{how, in.get<std::uint32_t>()}, how, in.get<double>()};
+  filter.order = static_cast<EdgeOrder>(1 + how % 3);
+  filter.from_us = in.get<std::int64_t>();
+  filter.limit = in.get<std::uint32_t>();
+  filter.min_suspicion = in.get<double>();
+  v1::ListEdgesRequest read;
+  must(read.ParseFromString(edges_message(filter).SerializeAsString()));
+  must(read.has_region() == filter.region.has_value() && read.from_us() == filter.from_us);
+  must(read.page_size() <= 5000);
 }
 
 }  // namespace
@@ -99,7 +116,7 @@ void ask(ByteReader in) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const ByteSpan bytes(data + 1, size - 1);
-  switch (data[0] % 14) {
+  switch (data[0] % 17) {
     case 0:
       read_as(bytes, read_edge);
       break;
@@ -122,15 +139,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       read_as(bytes, read_matches);
       break;
     case 7: {
-      v1::RouteSummary message;
+      v1::FindRouteReply message;
       Route route;
       if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) break;
-      const Status read = read_route_summary(message, route);
+      const Status read = read_route_reply(message, route);
       must(read.ok() || read.reason() == Reason::CORRUPT);
+      must(route.alternatives.size() <= 1);
       break;
     }
     case 8:
-      read_as(bytes, read_route_step);
+      read_as(bytes, read_explanation);
       break;
     case 9:
       read_as(bytes, read_transform);
@@ -142,6 +160,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       read_as(bytes, read_robot);
       break;
     case 12:
+      read_as(bytes, read_cell);
+      break;
+    case 13:
+      read_as(bytes, read_audit);
+      break;
+    case 14:
+      list(ByteReader(bytes));
+      break;
+    case 15:
       ask(ByteReader(bytes));
       break;
     default:

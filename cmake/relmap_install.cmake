@@ -2,6 +2,7 @@
 #   server    relmapd, the vocabulary, its unit, user, folders and kernel settings, a sample of its configuration
 #   frontend  relmap-frontend and relmap-camera, who may open cameras, the unit of a robot
 #   tools     relmap, relmap-admin, relmap-vocab, relmap-sim
+#   python    the Python client
 #   dev       the C++ client: a static library, its headers, a CMake package, a pkg-config file; the .proto and .lcm files
 # relmap-bench is for those who work on relmap, and is not installed. `ninja relmap_installed` builds what is needed.
 include(CMakePackageConfigHelpers)
@@ -75,6 +76,19 @@ install(FILES ${lcm_types} DESTINATION share/relmap/lcm COMPONENT dev)
 relmap_install_documents(dev client/README.md docs/protocol.md)
 install(FILES ${CMAKE_SOURCE_DIR}/tests/installed/where_am_i.cc ${CMAKE_SOURCE_DIR}/tests/installed/CMakeLists.txt
         DESTINATION share/doc/relmap/examples COMPONENT dev)
+
+install(DIRECTORY client/python/relmap DESTINATION lib/python3/dist-packages COMPONENT python
+        FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN py.typed PATTERN __pycache__ EXCLUDE)
+configure_file(client/python/METADATA.in ${CMAKE_BINARY_DIR}/installed/METADATA @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/installed/METADATA DESTINATION lib/python3/dist-packages/relmap-${PROJECT_VERSION}.dist-info
+        COMPONENT python)
+relmap_install_documents(python docs/python.md)
+foreach(file report_of_a_day judge_closures map_from_nothing)
+  install(FILES ${CMAKE_SOURCE_DIR}/client/python/notebooks/${file}.ipynb
+          DESTINATION share/doc/python3-relmap/examples COMPONENT python)
+endforeach()
+install(FILES ${CMAKE_SOURCE_DIR}/client/python/notebooks/points_world.py
+        DESTINATION share/doc/python3-relmap/examples COMPONENT python)
 
 add_custom_target(relmap_installed DEPENDS relmapd relmap-frontend relmap-camera relmap-camera-1394 relmap relmap-admin
                   relmap-vocab relmap-sim relmap_client_archive)

@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
 #include "server/map/derived.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
@@ -62,6 +66,10 @@ class Operator : public ::testing::Test {
     for (const client::Edge& closure : daemon_->client()->edges(filter).or_throw())
       ids.push_back(closure.id.to_string());
     return ids;
+  }
+  static std::string contents(const std::string& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
   }
   std::string explain(const std::string& id) const { return relmap({"edges", "--explain", id}).standard_output; }
 
@@ -255,6 +263,99 @@ TEST_F(Operator, IsAskedWhichSessionOfANameIsMeant) {
   // One that is deleted is not meant.
   ASSERT_EQ(relmap({"session", "delete", "1", "--yes"}).exit_code, 0);
   EXPECT_THAT(relmap({"session", "thaw", name}).standard_output, HasSubstr("session 2 is thawed"));
+}
+
+TEST_F(Operator, SeesWhatSpeaksForAClosureAndAgainstIt) {
+  std::vector<std::string> ids;
+  for (const int at : {5, 8, 11}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
+  edge({"accept", ids[0], "--note", "I was there"});
+
+  const Finished said = relmap({"edges", "--explain", ids[0], "--out", folder_ / "pair.svg"});
+  ASSERT_EQ(said.exit_code, 0) << said.standard_error;
+  for (const char* part : {"  evidence  verified by stereo: ", "  suspicion 0.", "  today     geometry finds ",
+                           "  motion    agrees with it", "  agree     2 closures of other frames", "I was there"})
+    EXPECT_THAT(said.standard_output, HasSubstr(part));
+  const std::string pair = contents(folder_ / "pair.svg");
+  for (const char* part : {"<svg ", "1:5<", "1:85<", "no picture: ", " matches agree", "suspicion 0."})
+    EXPECT_THAT(pair, HasSubstr(part)) << "points of a simulation come without pictures";
+  EXPECT_GT(std::count(pair.begin(), pair.end(), '\n'), 30) << "the points are drawn all the same";
+  const Finished json = relmap({"--json", "edges", "--explain", ids[0], "--out", folder_ / "pair.png"});
+  EXPECT_EQ(std::count(json.standard_output.begin(), json.standard_output.end(), '\n'), 1) << "one document";
+  for (const char* key : {"\"edge\":", "\"suspicion\":", "\"correspondences\":", "\"motion\":", "\"agreements\":"})
+    EXPECT_THAT(json.standard_output, HasSubstr(key));
+  EXPECT_THAT(contents(folder_ / "pair.png"), ::testing::StartsWith("\x89PNG"));
+
+  // Of the robot's own motion there is no pair of pictures.
+  EXPECT_THAT(explain("1:5/0"), HasSubstr("odometry 1:4 -> 1:5"));
+  EXPECT_THAT(relmap({"edges", "--explain", "1:5/0", "--out", folder_ / "motion.svg"}).standard_error,
+              HasSubstr("ODOMETRY_EDGE"));
+  EXPECT_THAT(relmap({"edges", "--explain", ids[0], "--out", folder_ / "pair.gif"}).standard_error,
+              HasSubstr("INVALID_ARGUMENT: " + folder_ / "pair.gif" + " ends neither in .svg nor in .png"));
+  EXPECT_THAT(relmap({"edges", "--explain", "1:5/7"}).standard_error, HasSubstr("NO_SUCH_EDGE"));
+}
+
+TEST_F(Operator, ListsTheMostSuspiciousClosuresAndSeesThemOnASheet) {
+  std::vector<std::string> ids;
+  for (const int at : {5, 8, 11, 14}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
+  const Finished listed = relmap({"edges", "--suspicion", "--limit", "3"});
+  ASSERT_EQ(listed.exit_code, 0) << listed.standard_error;
+  EXPECT_THAT(listed.standard_output, HasSubstr("suspicion"));
+  EXPECT_EQ(std::count(listed.standard_output.begin(), listed.standard_output.end(), '\n'), 4)
+      << "heads and 3 closures";
+  EXPECT_THAT(relmap({"edges", "--loops", "--near", "1:5", "--within", "1"}).standard_output, HasSubstr(ids[0]));
+  EXPECT_THAT(relmap({"edges", "--loops", "--session", "1,1"}).standard_output, HasSubstr(ids[3]));
+  EXPECT_THAT(relmap({"edges", "--loops", "--until", "1970-01-02"}).standard_output, Not(HasSubstr(ids[0])));
+  EXPECT_THAT(relmap({"edges", "--loops", "--since", "tomorrow"}).standard_error, HasSubstr("INVALID_ARGUMENT"));
+  EXPECT_THAT(relmap({"edges", "--session", "1,nobody"}).standard_error, HasSubstr("NO_SUCH_SESSION"));
+
+  const Finished drawn = relmap({"edges", "--by", "suspicion", "--limit", "2", "--out", folder_ / "sheet.svg"});
+  ASSERT_EQ(drawn.exit_code, 0) << drawn.standard_error;
+  const std::string sheet = contents(folder_ / "sheet.svg");
+  for (const char* part : {">2 loop closures, the most suspicious first<", ">1. ", ">2. ", "no picture: "})
+    EXPECT_THAT(sheet, HasSubstr(part));
+  EXPECT_THAT(sheet, Not(HasSubstr(">3. ")));
+  EXPECT_THAT(relmap({"edges", "--state", "removed", "--out", folder_ / "none.svg"}).standard_error,
+              HasSubstr("EMPTY_MAP: there is no such loop closure to draw"));
+}
+
+TEST_F(Operator, DrawsRoutesAndMaps) {
+  for (const int at : {5, 8, 11}) propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at));
+  ASSERT_EQ(relmap({"label", "1:40", "<b>dock</b>"}).exit_code, 0);
+  const Finished route = relmap({"route", "--from", "1:0", "--to", "1:60", "--alternatives", "2", "--out",
+                                 folder_ / "strip.svg", "--stops", "5"});
+  ASSERT_EQ(route.exit_code, 0) << route.standard_error;
+  const std::string strip = contents(folder_ / "strip.svg");
+  for (const char* part : {"From 1:0 to 1:60", "standard deviation of the position", "&lt;b&gt;dock&lt;/b&gt;"})
+    EXPECT_THAT(strip, HasSubstr(part));
+  EXPECT_THAT(strip, Not(HasSubstr("<b>")));
+
+  const Finished map = relmap({"map", "--tears", "--colour", "uncertainty", "--out", folder_ / "map.svg"});
+  ASSERT_EQ(map.exit_code, 0) << map.standard_error;
+  EXPECT_THAT(contents(folder_ / "map.svg"), HasSubstr("(one sigma)"));
+  EXPECT_THAT(map.standard_error, HasSubstr("stretched closure: "));
+  const Finished times = relmap({"map", "--colour", "time", "--out", folder_ / "map.svg"});
+  ASSERT_EQ(times.exit_code, 0) << times.standard_error;
+  EXPECT_THAT(contents(folder_ / "map.svg"), HasSubstr("colour: when it was"));
+  EXPECT_EQ(relmap({"map", "--colour", "loudness", "--out", folder_ / "map.svg"}).exit_code, 2);
+}
+
+TEST_F(Operator, ReportsOnTheMap) {
+  for (const int at : {5, 8, 11}) propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at));
+  ASSERT_EQ(relmap({"label", "1:40", "<script>alert(1)</script>"}).exit_code, 0);
+  const Finished done = relmap({"report", "--out", folder_ / "report.html", "--suspicious", "2"});
+  ASSERT_EQ(done.exit_code, 0) << done.standard_error;
+  const std::string page = contents(folder_ / "report.html");
+  for (const char* part : {"<!DOCTYPE html>", "Loop closures", "3 in force", "Who edited what", "<svg "})
+    EXPECT_THAT(page, HasSubstr(part));
+  EXPECT_THAT(page, HasSubstr("Mean reprojection error of "));
+  EXPECT_THAT(page, HasSubstr("&lt;script&gt;"));
+  EXPECT_THAT(page, Not(HasSubstr("<script")));
+  EXPECT_THAT(page, Not(HasSubstr("nan")));
+  const Finished json = relmap({"--json", "report", "--out", folder_ / "report.html"});
+  EXPECT_THAT(json.standard_output, ::testing::StartsWith("{\"out\":"));
+  for (const char* key : {"\"bytes\":", "\"findings\":[", "\"tears\":", "\"suspicious\":"})
+    EXPECT_THAT(json.standard_output, HasSubstr(key));
+  EXPECT_EQ(relmap({"report", "--out", "-"}).standard_output.substr(0, 15), "<!DOCTYPE html>");
 }
 
 TEST_F(Operator, IsToldThatAnAnswerCannotBeWritten) {

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -224,6 +226,22 @@ TEST_F(PictureQuestions, ARefusalIsAJsonObject) {
   const Finished missing = relmap({"--json", "localise", file("none.png")});
   EXPECT_EQ(missing.exit_code, 1);
   EXPECT_THAT(missing.standard_output, StartsWith(R"({"error":{"reason":"NO_SUCH_FILE","message":")"));
+}
+
+// The picture that was asked about stands beside each place, and what both show is joined.
+TEST_F(PictureQuestions, MatchesAreDrawn) {
+  take_in({drive()});
+  const Finished done = relmap({"match", picture(kAsked), "--max", "2", "--out", file("match.svg")});
+  ASSERT_EQ(done.exit_code, 0) << done.standard_error;
+  std::ifstream in(file("match.svg"));
+  const std::string svg{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_THAT(svg, HasSubstr("Where " + picture_name(kAsked) + " could be"));
+  EXPECT_THAT(svg, HasSubstr("matches agree"));
+  EXPECT_THAT(svg, HasSubstr("Geometry confirms it"));
+  std::size_t pictures = 0;
+  for (std::size_t at = svg.find("<image "); at != std::string::npos; at = svg.find("<image ", at + 1)) ++pictures;
+  EXPECT_EQ(pictures, 4u) << "two places, each beside the picture";
+  EXPECT_EQ(relmap({"match", picture(kAsked), "--out", file("match.jpg")}).exit_code, 1) << "neither .png nor .svg";
 }
 
 }  // namespace

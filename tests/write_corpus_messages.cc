@@ -12,6 +12,7 @@
 #include "proto/base/crc32c.h"
 #include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/lcm_messages.h"
+#include "relmap/v1/admin.pb.h"
 #include "relmap/v1/ingest.pb.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
@@ -376,19 +377,22 @@ void write_replies(const std::string& root) {
   add_message<v1::Session>(replies, 4);
   add_message<v1::LocaliseReply>(replies, 5);
   add_message<v1::MatchImageReply>(replies, 6);
-  add_message<v1::RouteSummary>(replies, 7);
-  add_message<v1::RouteStep>(replies, 8);
+  add_message<v1::FindRouteReply>(replies, 7);
+  add_message<v1::ExplainEdgeReply>(replies, 8);
   add_message<v1::TransformBetweenReply>(replies, 9);
   add_message<v1::GetStatusReply>(replies, 10);
   add_message<v1::Robot>(replies, 11);
-  add_message<v1::MapEvent>(replies, 13);
+  add_message<v1::MapEvent>(replies, 16);
   const pb::OneofDescriptor& events = *v1::MapEvent::descriptor()->FindOneofByName("event");
   for (int i = 0; i < events.field_count(); ++i) {
     v1::MapEvent event;
     fill(*event.GetReflection()->MutableMessage(&event, events.field(i)));
-    replies.add("event_" + events.field(i)->name(), {13}, as_bytes(event.SerializeAsString()));
+    replies.add("event_" + events.field(i)->name(), {16}, as_bytes(event.SerializeAsString()));
   }
-  constexpr int kAsk = 12, kFrame = 0, kLabel = 1, kView = 2, kRobot = 3;
+  add_message<v1::ClosureMatrixCell>(replies, 12);
+  add_message<v1::AuditEntry>(replies, 13);
+  replies.add("list_edges", {14, 3, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x40, 5, 0, 0, 0, 0, 0, 0, 0, 9});
+  constexpr int kAsk = 15, kFrame = 0, kLabel = 1, kView = 2, kRobot = 3;
   replies.add("ask_frames", {kAsk, kFrame, 1, 0, 0, 0, 2, 0, 0, 0, kFrame, 1, 0, 0, 0, 9, 0, 0, 0, 0});
   replies.add("ask_label_and_robot", {kAsk, kLabel, 'h', 'a', 'l', 'l', '1', kRobot, 2 + 4, kRobot, kRobot});
   for (int camera = 0; camera < 5; ++camera)

@@ -155,6 +155,11 @@ void add_routes(const Corpus& corpus) {
       route(0, 48, [](v1::FindRouteRequest& r) { *r.mutable_from()->mutable_view()->mutable_frame() = frame(1, 45); }));
   add("from_nowhere", route(0, 48, [](v1::FindRouteRequest& r) { r.clear_from(); }));
   add("with_bad_token", route(0, 48, [](v1::FindRouteRequest& r) { r.set_resume_token("x"); }));
+  add("with_alternatives", route(0, 25, [](v1::FindRouteRequest& r) {
+        r.set_alternatives(5);
+        r.set_covariance(true);
+      }));
+  add("with_too_many_alternatives", route(0, 25, [](v1::FindRouteRequest& r) { r.set_alternatives(6); }));
   const auto label = with<v1::SetLabelRequest>([](v1::SetLabelRequest& r) {
     *r.mutable_frame() = frame(1, 30);
     r.set_label("hall");
@@ -216,12 +221,72 @@ void add_lists(const Corpus& corpus) {
                        }))
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { *r.mutable_frame() = frame(1, 45); }))
                  .bytes());
+  corpus.add("list_edges_filtered", {},
+             Calls()
+                 .call("ListEdges", edges([](v1::ListEdgesRequest& r) {
+                         r.set_session(1);
+                         r.set_other_session(3);
+                         r.set_from_us(1);
+                         r.set_until_us(std::int64_t{1} << 60);
+                       }))
+                 .call("ListEdges", edges([](v1::ListEdgesRequest& r) {
+                         *r.mutable_region()->mutable_root() = frame(1, 20);
+                         r.mutable_region()->set_max_edges(4);
+                         r.mutable_region()->set_max_metres(3);
+                       }))
+                 .call("ListEdges", edges([](v1::ListEdgesRequest& r) { r.set_min_suspicion(0.1); }))
+                 .bytes());
+  for (const auto order : {v1::EDGE_ORDER_SUSPICION, v1::EDGE_ORDER_TIME})
+    corpus.add("list_edges_in_order_" + std::to_string(order), {},
+               Calls()
+                   .call("ListEdges", edges([&](v1::ListEdgesRequest& r) {
+                           r.set_order(order);
+                           r.set_page_size(1);
+                         }))
+                   .call("ListEdges", edges([&](v1::ListEdgesRequest& r) {
+                           r.set_order(order);
+                           r.set_page_token(kHeard);
+                         }))
+                   .call("ListEdges", edges([&](v1::ListEdgesRequest& r) {
+                           r.set_order(v1::EDGE_ORDER_ID);
+                           r.set_page_token(kHeard);
+                         }))
+                   .bytes());
+  const auto matrix = [](std::uint32_t session, std::uint32_t size, const char* token) {
+    return with<v1::GetClosureMatrixRequest>([&](v1::GetClosureMatrixRequest& r) {
+      if (session != 0) r.add_sessions(session);
+      r.set_page_size(size);
+      r.set_page_token(token);
+    });
+  };
+  corpus.add("closure_matrix", {},
+             Calls()
+                 .call("GetClosureMatrix", matrix(0, 1, ""))
+                 .call("GetClosureMatrix", matrix(0, 0, kHeard))
+                 .call("GetClosureMatrix", matrix(3, 0, ""))
+                 .call("GetClosureMatrix", matrix(9, 0, "x"))
+                 .bytes());
+  corpus.add("list_audit", {}, Calls().call("ListAudit", v1::ListAuditRequest()).bytes());
   corpus.add("list_edges_of_nothing", {},
              Calls()
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { r.add_states(static_cast<v1::EdgeState>(9)); }))
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { r.set_session(9); }))
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { *r.mutable_frame() = frame(9, 45); }))
                  .call("ListEdges", edges([](v1::ListEdgesRequest& r) { r.set_page_token("x"); }))
+                 .bytes());
+  const auto explained = [](std::uint32_t index, std::uint32_t ordinal, bool pictures) {
+    return with<v1::ExplainEdgeRequest>([&](v1::ExplainEdgeRequest& r) {
+      *r.mutable_edge()->mutable_frame() = frame(1, index);
+      r.mutable_edge()->set_ordinal(ordinal);
+      r.set_pictures(pictures);
+    });
+  };
+  corpus.add("explain_edge", {},
+             Calls()
+                 .call("ExplainEdge", explained(45, 1, true))
+                 .call("ExplainEdge", explained(45, 0, false))
+                 .call("ExplainEdge", explained(9, 7, false))
+                 .call("ExplainEdge", v1::ExplainEdgeRequest())
                  .bytes());
   const auto label = [](std::uint32_t index, const char* text, bool remove) {
     return with<v1::SetLabelRequest>([&](v1::SetLabelRequest& r) {

@@ -8,6 +8,7 @@
 #include "proto/keyframe/extension_codec.h"
 #include "storage/events/event_block.h"
 #include "storage/format/chunk_codec.h"
+#include "storage/format/digest_codec.h"
 #include "storage/format/extension_tags.h"
 #include "storage/format/frame_codec.h"
 #include "storage/format/sealed.h"
@@ -131,7 +132,40 @@ void write_journal_records(const std::string& root) {
 }
 
 // Frames for which the fuzzer writes containers: how far its slot is behind the one before, length, body.
+namespace {
+
+void write_digests(const std::string& root) {
+  constexpr ChunkId kChunk{3, 9};
+  const Corpus corpus(root, "digest_fuzz");
+  RandomFrames random(1);
+  DigestWriter writer(kChunk, 1'700'000'000'000'000);
+  for (std::uint32_t slot = 0; slot < 6; ++slot) {
+    const FrameId id = frame_in(kChunk, slot);
+    FrameHot hot = random.hot(id);
+    if (slot > 0) hot.edges.insert(hot.edges.begin(), random.edge(id, 0));
+    const FrameDigest digest = digest_of(id, hot);
+    writer.add(digest);
+    DigestWriter one(kChunk, 0);
+    one.add(digest);
+    const Bytes record = one.finish();
+    const ByteSpan entry = unpack_digests(record, kChunk).or_throw().entries[slot];
+    corpus.add("entry_" + std::to_string(slot), {}, Bytes(entry.begin(), entry.end()));
+  }
+  const Bytes record = writer.finish();
+  constexpr std::size_t kBefore = 8, kBehind = 4;  // the seal
+  corpus.add("record", {}, record);
+  corpus.add("body", {}, Bytes(record.begin() + kBefore, record.end() - kBehind));
+  corpus.add("body_cut", {}, Bytes(record.begin() + kBefore, record.end() - kBehind - 3));
+  Bytes other(record.begin() + kBefore, record.end() - kBehind);
+  other[0] ^= 1;
+  corpus.add("body_of_another_chunk", {}, other);
+  corpus.add("no_frames", {}, DigestWriter(kChunk, 0).finish());
+}
+
+}  // namespace
+
 void write_chunks(const std::string& root) {
+  write_digests(root);
   constexpr ChunkId kChunk{3, 9};
   constexpr std::size_t kBody = 3000;
   const Corpus corpus(root, "chunk_fuzz");

@@ -38,6 +38,15 @@ Eigen::Matrix3Xd directions(const cv::Matx33d& K, const cv::Vec<double, 5>& D, c
 
 }  // namespace
 
+Vector2 RawPixels::of(const Vector2& rectified) const {
+  const Vector3 ray = R_rectified_raw_.transpose() * Vector3((rectified.x() - rectified_.cx) / rectified_.f,
+                                                             (rectified.y() - rectified_.cy) / rectified_.f, 1);
+  const double x = ray.x() / ray.z(), y = ray.y() / ray.z(), r2 = x * x + y * y;
+  const double g = 1 + r2 * (lens_.k1 + r2 * (lens_.k2 + r2 * lens_.k3));
+  return {lens_.fx * (g * x + 2 * lens_.p1 * x * y + lens_.p2 * (r2 + 2 * x * x)) + lens_.cx,
+          lens_.fy * (g * y + lens_.p1 * (r2 + 2 * y * y) + 2 * lens_.p2 * x * y) + lens_.cy};
+}
+
 Result<Rectifier> Rectifier::make(const StereoCalibration& given, int width, int height) {
   StereoCalibration calibration = given;
   if (calibration.width == 0 && calibration.height == 0) {
@@ -52,6 +61,7 @@ Result<Rectifier> Rectifier::make(const StereoCalibration& given, int width, int
   Rectifier rectifier;
   if (calibration.rectified) {
     rectifier.camera_ = calibration.rectified_camera();
+    rectifier.left_pixels_ = RawPixels(rectifier.camera_);
   } else {
     try {
       const cv::Size size(width, height);
@@ -81,6 +91,7 @@ Result<Rectifier> Rectifier::make(const StereoCalibration& given, int width, int
         rectifier.eye_turn_ = so3_log(turn.topLeftCorner<3, 3>());
       }
       rectifier.maps_ = std::move(maps);
+      rectifier.left_pixels_ = RawPixels(rectifier.camera_, calibration.left, rectifier.left_rotation_);
     } catch (const cv::Exception& error) {
       return {Reason::IMPLAUSIBLE_CALIBRATION, error.what()};
     }

@@ -147,5 +147,18 @@ TEST(Rectifier, RefusesOtherSizesAndBadCalibrations) {
   EXPECT_EQ(Rectifier::make(mad, kRawWidth, kRawHeight).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
+TEST(Rectifier, TellsWhereTheRawPictureShowsARectifiedPixel) {
+  StereoCalibration calibration = rig();
+  for (const bool mono : {false, true}) {
+    if (mono) calibration.right = {};
+    const auto rectifier = Rectifier::make(calibration, kRawWidth, kRawHeight);
+    ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
+    for (const Vector3& p : {Vector3(0, 0, 2), Vector3(0.5, -0.3, 2), Vector3(-0.8, 0.4, 3), Vector3(1.0, 0.6, 4)}) {
+      const Vector2 rectified = rectifier->camera().project(rectifier->left_rotation() * p).head<2>();
+      EXPECT_LT((rectifier->left_pixels().of(rectified) - project(calibration.left, p)).norm(), 1e-6);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace relmap::vision

@@ -268,6 +268,10 @@ EdgeId store_candidate(storage::EditableGraph& map, const storage::ClosurePropos
   return edge.id;
 }
 
+void count_opponents(storage::Edge& edge, std::size_t more) {
+  edge.tests.opposing = static_cast<std::uint16_t>(std::min<std::size_t>(edge.tests.opposing + more, 0xffff));
+}
+
 bool is_accepted(const storage::Graph& graph, EdgeId id) {
   return storage::find_edge(graph, id)->state == storage::EdgeState::kAccepted;
 }
@@ -480,6 +484,7 @@ class Judgement {
     if (contradicts) map_.edit_hot(id_.frame).edge(id_)->reason = Reason::CONTRADICTS_MOTION;
     near_ = test_consistency(map_, edge(), rules_);
     remember_agreement(map_, id_, near_.agreeing);
+    remember_tests();
     // Otherwise a wrong place that an operator has taken out would be back with the robot's next two keyframes.
     if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
     return contradicts ? judge_ride() : judge_with_odometry();
@@ -492,6 +497,18 @@ class Judgement {
     set_state(*map_.edit_hot(id_.frame).edge(id_), storage::EdgeState::kCandidate, reason,
               {cause_.sequence, by, {}, cause_.submitted});
     return {};
+  }
+
+  // Stores what was found out with the closures that it is about, for those who look at them (suspicion.h).
+  void remember_tests() {
+    const std::set<EdgeId> opposing = opponents(map_, id_, near_.conflicting, rules_);
+    for (const EdgeId other : opposing) count_opponents(*map_.edit_hot(other.frame).edge(other), 1);
+    storage::Edge& edge = *map_.edit_hot(id_.frame).edge(id_);
+    count_opponents(edge, opposing.size());
+    if (motion_.verdict == MotionVerdict::kUntested) return;
+    edge.tests.motion = motion_.verdict == MotionVerdict::kContradicts ? storage::MotionSays::kContradicts
+                                                                       : storage::MotionSays::kAgrees;
+    edge.tests.motion_sigma = static_cast<float>(motion_.sigma);
   }
 
   std::set<EdgeId> opponents_of(const storage::Graph& graph, EdgeId id) const {

@@ -67,6 +67,8 @@ MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure
                                });
   test.carriers.assign(carriers.begin(), carriers.end());
   const Uncertain T_from_query(own->T, own->covariance);
+  if (const auto& way = as_measured ? as_measured : as_sensed)
+    test.sigma = std::sqrt(std::max(0.0, Uncertain(*way, drift).covariance.topLeftCorner<3, 3>().trace()));
   const auto agrees = [&](const std::optional<place::PlacedFrame>& from) {
     return from && returns_home(T_from_query * Uncertain(*from, drift), rules);
   };

@@ -46,6 +46,8 @@ struct MotionTest {
   MotionVerdict verdict = MotionVerdict::kUntested;
   std::vector<storage::FrameRange> carried;  // carried stretches between the closure's ends, the newest first
   std::vector<EdgeId> carriers;              // the closures that say so, ascending
+  // How well the motion tells where the closure's ends lie, one standard deviation, metres; 0: it says nothing.
+  double sigma = 0;
 };
 MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure, const ConsistencyRules& rules = {});
 

@@ -239,6 +239,9 @@ Word word_on(const storage::Graph& graph, EdgeId id) {
 ClosureChange accept(storage::EditableGraph& map, EdgeId id, const Cause& cause, std::uint32_t spacing) {
   Word word = word_on(map, id);
   remember_agreement(map, id, word.agreeing);
+  // Some may have come into force since the closure was judged.
+  std::uint16_t& opposing = map.edit_hot(id.frame).edge(id)->tests.opposing;
+  opposing = std::max(opposing, static_cast<std::uint16_t>(std::min<std::size_t>(word.against.size(), 0xffff)));
   add_left_alone(map, {id}, word.against);
   std::vector<StateChange> changes;
   for (const EdgeId other : word.against)

@@ -117,9 +117,14 @@ std::uint64_t ransac_seed(const storage::Graph& view, FrameId frame) {
 
 }  // namespace
 
+place::PlaceTrial try_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,
+                            FrameId match) {
+  return place::try_place(view, query, match, ransac_seed(view, frame));
+}
+
 Result<place::VerifiedPlace> verify_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,
                                           FrameId match) {
-  return place::verify_place(view, query, match, ransac_seed(view, frame));
+  return try_frame(view, query, frame, match).verified;
 }
 
 storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::PictureCache& pictures,

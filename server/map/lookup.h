@@ -52,7 +52,9 @@ using LaterFrames = std::function<std::vector<storage::FrameRange>()>;
 Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
                FrameId frame, const LaterFrames& later = {}, const RouteMap& newest = {});
 
-// verify_place() for what `frame` saw, with a random seed that depends on the frame alone.
+// try_place() for what `frame` saw, with a random seed that depends on the frame alone.
+place::PlaceTrial try_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame, FrameId match);
+// What it verifies.
 Result<place::VerifiedPlace> verify_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,
                                           FrameId match);
 

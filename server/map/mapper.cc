@@ -63,6 +63,7 @@ struct Mapper::Impl {
   DeterministicDriver::Hooks driver_hooks();
 
   Status load();
+  void make_digests();
   void give_identity();
   void recover();
   void start();
@@ -238,6 +239,7 @@ Status Mapper::Impl::load() {
   auto opened = storage::Map::open(engine, epoch, budget, options.events);
   if (!opened.ok()) return opened.status();
   map = *std::move(opened);
+  if (read_only.ok() && !map->digests_hold()) make_digests();
   commits.open(*map);
   map->watch_edits(
       [this](std::uint64_t version, std::span<const storage::ChunkId> chunks) { edits.edited(version, chunks); });
@@ -256,6 +258,27 @@ Status Mapper::Impl::load() {
   give_identity();
   recover();
   return {};
+}
+
+// Makes the digests of a map that a version without them wrote to last. Without them pictures of the map take longer.
+void Mapper::Impl::make_digests() {
+  using std::chrono::duration;
+  const Clock::time_point begun = Clock::now();
+  Clock::time_point told = begun;
+  const std::uint64_t frames = map->state().keyframes;
+  spdlog::info("the map has no digests of its {} frames, or they are of an earlier commit: they are made now", frames);
+  const Status made = map->rebuild_digests([&](std::uint64_t done, std::uint64_t total) {
+    if (const Clock::time_point now = Clock::now(); now - told > std::chrono::seconds(5)) {
+      told = now;
+      spdlog::info("digests: {} of {} frames", done, total);
+    }
+    return true;
+  });
+  if (made.ok())
+    spdlog::info("digests of {} frames were made in {:.1f} s", frames, duration<double>(Clock::now() - begun).count());
+  else
+    spdlog::warn("no digests were made, so pictures of the map take longer, until the next start: {}",
+                 made.to_string());
 }
 
 // Gives a new map its identity. It is told only once it is durable, so that a crash cannot take it back.

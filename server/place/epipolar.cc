@@ -108,12 +108,24 @@ class Views {
   std::vector<const Descriptor*> descriptors_;
 };
 
+// What looks alike by descriptors alone, and what agrees with the geometry.
+std::vector<FeaturePair> all_pairs(const std::vector<DescriptorMatch>& alike,
+                                   const std::vector<DescriptorMatch>& inliers) {
+  std::vector<FeaturePair> pairs;
+  for (const DescriptorMatch& match : inliers) pairs.push_back({match.feature, match.point, true});
+  for (const DescriptorMatch& match : alike)
+    if (std::none_of(inliers.begin(), inliers.end(), [&](const auto& in) { return in.feature == match.feature; }))
+      pairs.push_back({match.feature, match.point, false});
+  return pairs;
+}
+
 }  // namespace
 
 Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map,
-                                  int min_inliers) {
+                                  int min_inliers, std::vector<FeaturePair>* pairs) {
   const Views views(query, map);
   const auto matches = views.match();
+  if (pairs) *pairs = all_pairs(matches, {});
   if (matches.size() < kToBegin)
     return Status(Reason::TOO_FEW_INLIERS, std::to_string(matches.size()) + " matches, of which at least " +
                                                std::to_string(min_inliers) + " must agree on one geometry");
@@ -121,6 +133,7 @@ Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std:
   if (best.inliers.size() >= kToBegin)
     if (auto near = views.geometry_of(views.match_near(best.inliers)); near.inliers.size() > best.inliers.size())
       best = std::move(near);
+  if (pairs) *pairs = all_pairs(matches, best.inliers);
   if (best.inliers.size() < static_cast<std::size_t>(min_inliers))
     return Status(Reason::TOO_FEW_INLIERS,
                   std::to_string(best.inliers.size()) + " of " + std::to_string(matches.size()) +

@@ -104,8 +104,12 @@ class Search {
   std::optional<Localisation> best() const {
     const auto best = trials_.best();
     if (!best) return std::nullopt;
-    return Localisation{*trials_.all()[*best].verified, trials_.candidate(*best).probability, 1, false,
-                        static_cast<std::uint32_t>(trials_.tried())};
+    return Localisation{*trials_.all()[*best].verified,
+                        trials_.candidate(*best).probability,
+                        1,
+                        false,
+                        static_cast<std::uint32_t>(trials_.tried()),
+                        trials_.all()[*best].matches};
   }
   // The refusal of the first candidate; NOT_STEREO, if any candidate has that, takes precedence.
   Status refusal() const {
@@ -176,7 +180,7 @@ Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& quest
   if (Status status = contradiction_of(trials.all()); !status.ok()) matches.nothing_verified = std::move(status);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const PlaceTrial& trial = trials.all()[i];
-    PlaceMatch match{trials.candidate(i).frame, trials.candidate(i).probability, {}, {}, {}};
+    PlaceMatch match{trials.candidate(i).frame, trials.candidate(i).probability, {}, {}, {}, trial.matches};
     if (!trial.verified.ok()) {
       match.unverified = trial.verified.status();
       if (i >= asked) continue;

@@ -31,9 +31,11 @@ struct PlaceQuestion {
   bool pair = false;  // QueryPicture::pair
   CameraKnown known = CameraKnown::kMeasuredWith;
   Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
+  bool keep_matches = false;           // QueryPicture::keep_matches
 
   QueryPicture picture() const {
-    return {features, *camera, masked, {}, {std::numeric_limits<std::uint64_t>::max()}, pair, known, eye_turn};
+    return {features, *camera, masked,   {},          {std::numeric_limits<std::uint64_t>::max()},
+            pair,     known,   eye_turn, keep_matches};
   }  // needs a camera
 };
 
@@ -43,6 +45,7 @@ struct Localisation {
   double new_place = 1;                   // probability, by appearance, that the map does not hold the place
   bool near_prior = false;                // found around the prior; both probabilities are unknown then
   std::uint32_t verified_candidates = 0;  // candidates on which geometry was tried
+  std::vector<PointMatch> matches = {};   // PlaceTrial::matches, if they are kept; in pixels of place.match
 };
 
 // Returns the pose of the question's picture. Tries the frames around the prior first, and the rest of the map only if
@@ -65,6 +68,8 @@ struct PlaceMatch {
   // Why the place is not verified: geometry's refusals, NO_CALIBRATION, OUT_OF_REACH (geometry was not tried),
   // AMBIGUOUS_PLACE (doubted).
   Status unverified;
+  // PlaceTrial::matches, if they are kept, in pixels of shown(); none if geometry was not tried.
+  std::vector<PointMatch> matches = {};
 
   // The frame in which geometry confirmed the place, or else the most probable frame of the place.
   FrameId shown() const { return verified ? verified->match : doubted ? doubted->match : frame; }

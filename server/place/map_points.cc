@@ -153,6 +153,8 @@ void add_points(const storage::Graph& graph, std::size_t begin, std::size_t end,
     for (std::size_t f = 0; f < cold->appearance.size(); ++f)
       if (auto point = frame.point_of(cold->appearance[f], *warm)) {
         point->placed = static_cast<std::uint32_t>(i);
+        point->u = cold->appearance[f].u;
+        point->v = cold->appearance[f].v;
         if (f < cold->words.size()) point->word = cold->words[f];
         map.points.push_back(*point);
       }

@@ -56,6 +56,7 @@ struct MapPoint {
   const Descriptor* descriptor = nullptr;  // owned by MapPoints::held
   std::uint32_t placed = 0;                // index into MapPoints::frames
   std::uint32_t word = kNoWord;
+  float u = 0, v = 0;  // pixels of its feature, in the frame that it is from
 };
 
 struct MapPoints {

@@ -115,6 +115,7 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
 
   DescribedPicture result;
   result.scale = static_cast<double>(width) / size->width;
+  result.sent = {std::nullopt, result.scale, static_cast<double>(height) / size->height};
   result.camera = {0, 0.5 * (width - 1), 0.5 * (height - 1), 0, width, height};
   if (const auto* camera = std::get_if<StereoCamera>(&question.calibration)) {
     result.camera = vision::reduced(*camera, width, height);
@@ -125,6 +126,7 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
     if (!rectifier.ok()) return rectifier.status();
     result.camera = rectifier->camera();
     result.eye_turn = rectifier->eye_turn();
+    result.sent.raw = rectifier->left_pixels();
     auto rectified = rectifier->left(left_grey);
     if (!rectified.ok()) return rectified.status();
     left_grey = std::move(rectified).value();

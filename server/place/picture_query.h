@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "frontend/vision/rectify.h"
 #include "proto/base/bytes.h"
 #include "proto/base/status.h"
 #include "proto/calibration/calibration.h"
@@ -31,6 +32,18 @@ struct PictureQuestion {
   PictureCalibration calibration;
 };
 
+// Tells where the picture as it was given shows what its features show: undoes rectification and reduction.
+struct SentPixels {
+  std::optional<vision::RawPixels> raw = {};  // nullopt: the picture was not rectified here
+  double columns = 1, rows = 1;               // pixels of the reduced picture per pixel of the given one
+
+  // Pixel (0, 0) is the centre of the top left pixel, of either picture.
+  Vector2 of(const Vector2& pixel) const {
+    const Vector2 reduced = raw ? raw->of(pixel) : pixel;
+    return {(reduced.x() + 0.5) / columns - 0.5, (reduced.y() + 0.5) / rows - 0.5};
+  }
+};
+
 struct DescribedPicture {
   std::vector<AppearanceFeature> features;  // in pixels of `camera`; with disparities if there is a right picture
   // The camera of the rectified and reduced picture. The baseline is 0 without a right picture or if that shows
@@ -38,6 +51,7 @@ struct DescribedPicture {
   StereoCamera camera;
   double scale = 1;                    // pixels of `camera` per pixel of the given picture
   Vector3 eye_turn = Vector3::Zero();  // Rectifier::eye_turn() if the picture was rectified here
+  SentPixels sent = {};                // for pixels of the left picture
 };
 
 // Describes a picture or a stereo pair. Needs up to 120 MB while it runs, so the caller must let in one at a time.

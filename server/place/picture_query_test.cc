@@ -161,5 +161,63 @@ TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
   EXPECT_NEAR(described->scale * 4 * kWidth, described->camera.width, 1e-6);
 }
 
+// The centres of the bright blobs of a picture.
+std::vector<Vector2> blobs_of(const vision::Image& picture) {
+  const cv::Mat pixels(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
+  cv::Mat labels;
+  const int count = cv::connectedComponents(pixels > 90, labels);
+  std::vector<Vector2> sums(static_cast<std::size_t>(count), Vector2::Zero());
+  std::vector<double> weights(static_cast<std::size_t>(count), 0);
+  for (int y = 0; y < pixels.rows; ++y)
+    for (int x = 0; x < pixels.cols; ++x) {
+      const auto label = static_cast<std::size_t>(labels.at<int>(y, x));
+      if (label == 0) continue;
+      const double weight = pixels.at<std::uint8_t>(y, x) - 90.0;
+      sums[label] += weight * Vector2(x, y);
+      weights[label] += weight;
+    }
+  std::vector<Vector2> centres;
+  for (std::size_t label = 1; label < sums.size(); ++label) centres.push_back(sums[label] / weights[label]);
+  return centres;
+}
+
+// A picture that is too large to be described as it is, with and without a lens that distorts.
+TEST_F(PictureQuery, TellsWhereThePictureThatWasSentShowsWhatItsFeaturesShow) {
+  constexpr int kLargeWidth = 2400, kLargeHeight = 1800;
+  cv::Mat picture(kLargeHeight, kLargeWidth, CV_8U, cv::Scalar(60));
+  std::vector<Vector2> blobs;
+  for (int row = 1; row < 6; ++row)
+    for (int column = 1; column < 8; ++column) {
+      const Vector2 at(300.0 * column + 3.3 * row, 300.0 * row - 2.7 * column);
+      blobs.push_back(at);
+      for (int y = static_cast<int>(at.y()) - 60; y <= at.y() + 60; ++y)
+        for (int x = static_cast<int>(at.x()) - 60; x <= at.x() + 60; ++x)
+          picture.at<std::uint8_t>(y, x) =
+              static_cast<std::uint8_t>(60 + 180 * std::exp(-(Vector2(x, y) - at).squaredNorm() / (2.0 * 16 * 16)));
+    }
+  const Bytes file = png(picture);
+  StereoCalibration lens;
+  lens.left = {1800, 1800, 1200, 900, -0.2, 0.04, 0.0004, -0.0003, 0};
+  lens.width = kLargeWidth;
+  lens.height = kLargeHeight;
+  const vision::Image reduced = std::move(vision::decode_picture(file)->grey);
+  const auto rectifier = vision::Rectifier::make(vision::reduced(lens, reduced.width(), reduced.height()),
+                                                 reduced.width(), reduced.height());
+  ASSERT_TRUE(rectifier.ok());
+  const vision::Image rectified = rectifier->left(reduced).or_throw();
+  for (const bool distorted : {false, true}) {
+    const auto described = describe_picture({file, {}, distorted ? PictureCalibration(lens) : PictureCalibration()});
+    ASSERT_TRUE(described.ok()) << described.status().to_string();
+    ASSERT_LT(described->scale, 1);
+    const std::vector<Vector2> seen = blobs_of(distorted ? rectified : reduced);
+    ASSERT_GE(seen.size(), 30u);
+    for (const Vector2& pixel : seen) {
+      double nearest = 1e9;
+      for (const Vector2& blob : blobs) nearest = std::min(nearest, (described->sent.of(pixel) - blob).norm());
+      EXPECT_LT(nearest, 0.5) << pixel.transpose();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace relmap::place

@@ -89,12 +89,26 @@ Matrix6 covariance_of_way(const MapPoints& map, const std::vector<std::uint32_t>
 struct FittingView {
   FrameId frame;
   EpipolarMatch match;
+  std::vector<PointMatch> matches = {};  // if they are kept
 };
 
-std::optional<FittingView> fitting_view(const storage::Graph& graph, const QueryPicture& query, FrameId frame) {
+std::vector<PointMatch> matches_of(const std::vector<FeaturePair>& pairs,
+                                   const std::vector<AppearanceFeature>& features) {
+  std::vector<PointMatch> matches;
+  for (const FeaturePair& pair : pairs)
+    matches.push_back({pair.query, {features[pair.map].u, features[pair.map].v}, {}, pair.inlier, std::nullopt});
+  sort_matches(matches);
+  return matches;
+}
+
+// `matches`, if given, receives what looks alike, also if it does not fit.
+std::optional<FittingView> fitting_view(const storage::Graph& graph, const QueryPicture& query, FrameId frame,
+                                        std::vector<PointMatch>* matches) {
   const auto cold = graph.cold(frame);
   if (!cold || storage::within(frame, query.masked)) return std::nullopt;
-  auto match = match_views(query.features, cold->appearance, kMinOfAView);
+  std::vector<FeaturePair> pairs;
+  auto match = match_views(query.features, cold->appearance, kMinOfAView, matches ? &pairs : nullptr);
+  if (matches) *matches = matches_of(pairs, cold->appearance);
   if (!match.ok()) return std::nullopt;
   return FittingView{frame, std::move(match).value()};
 }
@@ -102,9 +116,16 @@ std::optional<FittingView> fitting_view(const storage::Graph& graph, const Query
 // Also tries the frames beside the candidate, which show the same place, perhaps from nearer to the query's viewpoint.
 PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, FrameId candidate) {
   std::vector<FittingView> views;
+  std::vector<PointMatch> with_candidate;
   const auto add = [&](std::optional<FrameId> frame) {
-    if (frame && std::none_of(views.begin(), views.end(), [&](const FittingView& v) { return v.frame == *frame; }))
-      if (auto view = fitting_view(graph, query, *frame)) views.push_back(std::move(*view));
+    if (!frame || std::any_of(views.begin(), views.end(), [&](const FittingView& v) { return v.frame == *frame; }))
+      return;
+    std::vector<PointMatch> matches;
+    auto view = fitting_view(graph, query, *frame, query.keep_matches ? &matches : nullptr);
+    if (*frame == candidate) with_candidate = matches;
+    if (!view) return;
+    view->matches = std::move(matches);
+    views.push_back(std::move(*view));
   };
   const auto best = [&] {
     return std::max_element(views.begin(), views.end(), [](const FittingView& l, const FittingView& r) {
@@ -122,8 +143,9 @@ PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, 
     return {candidate,
             {},
             Status(Reason::TOO_FEW_INLIERS, "fewer than " + std::to_string(kMinOfAView) +
-                                                " matches agree on one geometry with that frame or one beside it")};
-  const auto& [frame, match] = *best();
+                                                " matches agree on one geometry with that frame or one beside it"),
+            std::move(with_candidate)};
+  const auto& [frame, match, matches] = *best();
   VerifiedPlace place;
   place.match = frame;
   place.covariance = Matrix6::Identity() * 1e6;
@@ -143,9 +165,10 @@ PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, 
     return {frame, std::move(features),
             Status(Reason::TOO_FEW_INLIERS, std::to_string(place.inliers) +
                                                 " features agree with that frame and those beside it; at least " +
-                                                std::to_string(kMinEpipolarInliers) + " must")};
-  if (place.spread < kMinSpread) return {frame, std::move(features), poor_spread(place)};
-  return {frame, std::move(features), std::move(place)};
+                                                std::to_string(kMinEpipolarInliers) + " must"),
+            std::move(with_candidate)};
+  if (place.spread < kMinSpread) return {frame, std::move(features), poor_spread(place), std::move(with_candidate)};
+  return {frame, std::move(features), std::move(place), matches};
 }
 
 // How many inliers come from each frame of `map`.
@@ -191,6 +214,80 @@ Result<vision::MotionAndLens> estimate_pose(const std::vector<vision::Correspond
   if (!motion.ok()) return motion.status();
   return vision::MotionAndLens{std::move(*motion), {camera.f, camera.cx, camera.cy}, 0};
 }
+
+// Keeps the matches of one verification, if they are wanted.
+class Record {
+ public:
+  explicit Record(const QueryPicture& query) : query_(query) {}
+
+  // What looks alike, before a pose is known.
+  void add_alike(const StereoCamera& camera, const MapPoints& map, std::span<const DescriptorMatch> alike) {
+    if (!query_.keep_matches) return;
+    kept_.clear();
+    for (const DescriptorMatch& match : alike) add(camera, map, match, false);
+  }
+  // What was matched where a pose was found, and which of it (indices, ascending) agrees with the pose; what looked
+  // alike before remains as what does not.
+  void add_fit(const StereoCamera& camera, const MapPoints& map, std::span<const DescriptorMatch> matches,
+               std::span<const std::uint32_t> inliers) {
+    if (!query_.keep_matches) return;
+    const std::vector<Kept> alike = std::exchange(kept_, {});
+    for (std::uint32_t i = 0; i < matches.size(); ++i)
+      add(camera, map, matches[i], std::binary_search(inliers.begin(), inliers.end(), i));
+    add_new(alike);
+  }
+  // What does not agree by an earlier verification, whose frame is placed at T_frame_earlier in this one's `frame`.
+  void add_outliers(const Record& earlier, const StereoCamera& camera, FrameId frame, const SE3& T_frame_earlier) {
+    std::vector<Kept> outliers;
+    for (Kept kept : earlier.kept_)
+      if (!kept.match.inlier && place_in(camera, frame, T_frame_earlier * *kept.match.point, kept))
+        outliers.push_back(std::move(kept));
+    add_new(outliers);
+  }
+  // `found`, if given, is the pose of the query in the frame, with the camera that took it.
+  std::vector<PointMatch> take(const SE3* T_frame_query = nullptr, double focal_length = 0) const {
+    std::vector<PointMatch> matches;
+    for (const Kept& kept : kept_) matches.push_back(kept.match);
+    StereoCamera camera = query_.camera;
+    if (camera.f == 0) camera.f = focal_length;
+    if (T_frame_query && camera.f > 0) set_residuals(query_.features, camera, *T_frame_query, matches);
+    sort_matches(matches);
+    return matches;
+  }
+
+ private:
+  struct Kept {
+    PointMatch match;
+    FrameId measured_in;
+    Vector2 measured;  // there, pixels
+  };
+
+  // Sets where the point lies in the frame; false if the frame cannot see it.
+  static bool place_in(const StereoCamera& camera, FrameId frame, const Vector3& point, Kept& kept) {
+    kept.match.point = point;
+    kept.match.seen_in = kept.measured_in == frame ? FrameId() : kept.measured_in;
+    kept.match.pixel = kept.measured;
+    if (kept.measured_in == frame) return true;
+    if (!(point.z() > 0)) return false;
+    kept.match.pixel = camera.project(point).head<2>();
+    return true;
+  }
+  void add(const StereoCamera& camera, const MapPoints& map, const DescriptorMatch& match, bool inlier) {
+    const MapPoint& point = map.points[match.point];
+    Kept kept{{match.feature, {}, {}, inlier, {}}, map.frames[point.placed].frame, {point.u, point.v}};
+    if (place_in(camera, map.frames.front().frame, point.point, kept)) kept_.push_back(std::move(kept));
+  }
+  // Adds what is of features that are not kept yet.
+  void add_new(const std::vector<Kept>& more) {
+    std::vector<bool> known(query_.features.size());
+    for (const Kept& kept : kept_) known[kept.match.feature] = true;
+    for (const Kept& kept : more)
+      if (!known[kept.match.feature]) kept_.push_back(kept);
+  }
+
+  const QueryPicture& query_;
+  std::vector<Kept> kept_;
+};
 
 // A pose of the query among the points around a candidate.
 struct Fit {
@@ -248,11 +345,13 @@ Result<Fit> fit(const QueryPicture& query, const MapPoints& map, std::vector<Des
 // known, most candidates that do not show the place are told by the centre alone, and most that do by the centre and
 // the words; only the rest needs all pairs of features and points.
 Result<Fit> fit_around(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed,
-                       MapPoints& map) {
+                       MapPoints& map, Record& record) {
+  const StereoCamera camera = graph.session(candidate.session)->header.camera;
   map = gather_centre(graph, candidate, kViewReach);
   std::vector<DescriptorMatch> at_centre;
   if (!query.words.empty()) {
     at_centre = match_points(query.features, map.points);
+    record.add_alike(camera, map, at_centre);
     if (at_centre.size() < kMinAlike)
       return Status(Reason::TOO_FEW_INLIERS, std::to_string(at_centre.size()) + " features look like that frame's");
   }
@@ -262,10 +361,14 @@ Result<Fit> fit_around(const storage::Graph& graph, const QueryPicture& query, F
   if (!query.words.empty()) {
     std::vector<DescriptorMatch> alike = match_points_by_word(query.features, query.words, map.points);
     alike.insert(alike.end(), at_centre.begin(), at_centre.end());
-    auto found = fit(query, map, nearest_of_all(std::move(alike), map.points), kGrown, kQuickTrials, seed);
+    alike = nearest_of_all(std::move(alike), map.points);
+    record.add_alike(camera, map, alike);
+    auto found = fit(query, map, std::move(alike), kGrown, kQuickTrials, seed);
     if (found.ok() || at_centre.size() < static_cast<std::size_t>(kMinToGrow)) return found;
   }
-  return fit(query, map, match_points(query.features, map.points), kMinInliers, kTrials, seed);
+  std::vector<DescriptorMatch> alike = match_points(query.features, map.points);
+  record.add_alike(camera, map, alike);
+  return fit(query, map, std::move(alike), kMinInliers, kTrials, seed);
 }
 
 struct StereoPlace {
@@ -278,8 +381,10 @@ struct StereoPlace {
 };
 
 // What a pose that was found among the points around the candidate tells. POOR_SPREAD.
-Result<StereoPlace> judge(const QueryPicture& query, FrameId candidate, const MapPoints& map, Fit found) {
+Result<StereoPlace> judge(const StereoCamera& map_camera, const QueryPicture& query, FrameId candidate,
+                          const MapPoints& map, Fit found, Record& record) {
   const vision::Motion& motion = found.pose.motion;
+  record.add_fit(map_camera, map, found.matches, motion.inliers);
 
   VerifiedPlace place;
   place.match = candidate;
@@ -313,17 +418,17 @@ Result<StereoPlace> judge(const QueryPicture& query, FrameId candidate, const Ma
 }
 
 Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
-                                  std::uint64_t seed) {
+                                  std::uint64_t seed, Record& record) {
   MapPoints map;
-  auto found = fit_around(graph, query, candidate, seed, map);
+  auto found = fit_around(graph, query, candidate, seed, map, record);
   if (!found.ok()) return found.status();
-  return judge(query, candidate, map, *std::move(found));
+  return judge(graph.session(candidate.session)->header.camera, query, candidate, map, *std::move(found), record);
 }
 
 // The same in the frame that saw most of the inliers. Where the query stands in it is known already, so features are
 // matched only near where that predicts them.
 Result<StereoPlace> verify_in_main_frame(const storage::Graph& graph, const QueryPicture& query,
-                                         const StereoPlace& found, std::uint64_t seed) {
+                                         const StereoPlace& found, std::uint64_t seed, Record& record) {
   const MapPoints map = gather_points(graph, found.main_frame, kViewReach);
   vision::MotionOptions options;
   options.seed = seed;
@@ -331,7 +436,8 @@ Result<StereoPlace> verify_in_main_frame(const storage::Graph& graph, const Quer
   options.min_inliers = kMinInliers;  // that it is the place is known
   auto again = fit_near(query, map, found.T_main_query, options);
   if (!again.ok()) return again.status();
-  return judge(query, found.main_frame, map, *std::move(again));
+  return judge(graph.session(found.main_frame.session)->header.camera, query, found.main_frame, map, *std::move(again),
+               record);
 }
 
 // NOT_STEREO if the right picture does not show what it should of the points in the left one. In good pairs it showed
@@ -432,8 +538,9 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
     return {candidate, {}, Status(Reason::TOO_FEW_FEATURES, std::to_string(query.features.size()) + " features")};
   if (!session->header.camera.is_stereo()) return try_epipolar(graph, query, candidate);
 
-  auto found = verify_stereo(graph, query, candidate, seed);
-  if (!found.ok()) return {candidate, {}, found.status()};
+  Record record(query);
+  auto found = verify_stereo(graph, query, candidate, seed, record);
+  if (!found.ok()) return {candidate, {}, found.status(), record.take()};
   const bool is_other = query.known == CameraKnown::kSupposed ||
                         (query.known == CameraKnown::kNamed && !is_same_lens(query.camera, session->header.camera));
   // What tells a lens that is not the one that was named is far from where that lens predicts it, and no lens is known
@@ -441,22 +548,40 @@ PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, Fra
   // are checked by what was matched before.
   const bool is_own = query.camera.f > 0 && !is_other;
   Status camera = is_own ? check_place(*found, query, session->header.camera) : Status();
+  // For what is kept of a refusal.
+  struct Pose {
+    SE3 T_match_query;
+    double focal_length;
+  };
+  const Pose first{found->place.T_match_query, found->place.focal_length};
+  Record record_nearer(query);
+  bool is_nearer = false;
   // The pose is expressed in the frame that saw most of the inliers, since the transform between the two frames may be
   // uncertain or wrong.
   if (camera.ok() && found->main_frame != candidate && may_answer(graph, query, found->main_frame))
-    if (auto nearer = is_own ? verify_in_main_frame(graph, query, *found, seed)
-                             : verify_stereo(graph, query, found->main_frame, seed);
-        nearer.ok())
+    if (auto nearer = is_own ? verify_in_main_frame(graph, query, *found, seed, record_nearer)
+                             : verify_stereo(graph, query, found->main_frame, seed, record_nearer);
+        nearer.ok()) {
+      record_nearer.add_outliers(record, session->header.camera, nearer->place.match,
+                                 found->T_main_query * first.T_match_query.inverse());
       found = std::move(nearer);
+      is_nearer = true;
+    }
+  const auto refused = [&](Status status) -> PlaceTrial {
+    return {found->place.match, std::move(found->place.features), std::move(status),
+            record.take(&first.T_match_query, first.focal_length)};
+  };
   if (!is_own) camera = check_place(*found, query, session->header.camera);
-  if (!camera.ok()) return {found->place.match, std::move(found->place.features), std::move(camera)};
+  if (!camera.ok()) return refused(std::move(camera));
   if (is_other && query.camera.f > 0)
     if (Status status = allow_for_calibration(query, session->header.camera, &*found); !status.ok())
-      return {found->place.match, std::move(found->place.features), std::move(status)};
+      return refused(std::move(status));
   if (!query.eye_turn.isZero())
     if (Status status = allow_for_other_eye(query.eye_turn, found->place); !status.ok())
-      return {found->place.match, std::move(found->place.features), std::move(status)};
-  return {found->place.match, found->place.features, std::move(found->place)};
+      return refused(std::move(status));
+  std::vector<PointMatch> matches =
+      (is_nearer ? record_nearer : record).take(&found->place.T_match_query, found->place.focal_length);
+  return {found->place.match, found->place.features, std::move(found->place), std::move(matches)};
 }
 
 Result<VerifiedPlace> verify_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,

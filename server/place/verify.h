@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/geometry/camera.h"
+#include "server/place/point_match.h"
 #include "storage/graph/frame_range.h"
 #include "storage/graph/graph.h"
 #include "storage/journal/journal_record.h"
@@ -36,6 +37,7 @@ struct QueryPicture {
   // Not zero if the picture, taken for the left eye's, may as likely be the right eye's: the rotation between the eyes
   // (rotation vector, radians), for which the covariance of the pose allows.
   Vector3 eye_turn = Vector3::Zero();
+  bool keep_matches = false;  // PlaceTrial::matches are wanted, for people to look at
 };
 
 // The question with what a frame of the map saw.
@@ -80,6 +82,10 @@ struct PlaceTrial {
   FrameId frame;                        // `match`, or the candidate
   std::vector<std::uint32_t> features;  // features of the query that fit, ascending
   Result<VerifiedPlace> verified;
+  // With QueryPicture::keep_matches: what was matched, the inliers first, in pixels of the verified frame or, if the
+  // place is refused, of the candidate. Then the inliers are those that agreed with the best transform, if any. Points
+  // behind the camera of that frame, which only frames beside it saw, are left out.
+  std::vector<PointMatch> matches = {};
 };
 PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
 

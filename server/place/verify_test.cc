@@ -399,5 +399,88 @@ TEST(VerifyPlace, AViewBesideTheCandidateMayConfirmIt) {
   EXPECT_EQ(verify_place(mono, as_query(features, false), {5, 0}, 7).reason(), Reason::TOO_FEW_INLIERS);
 }
 
+// Where the trial's frame sees a point of the street.
+Vector2 seen_at(const SyntheticStreet& street, FrameId frame, std::size_t point) {
+  return kStreetCamera.project(street.pose(frame.index).inverse() * street.point(point)).head<2>();
+}
+
+TEST(KeptMatches, LieWhereTheirPointsAre) {
+  SyntheticStreet street(1, 12, 0);
+  std::vector<std::size_t> points;
+  std::vector<AppearanceFeature> features = street.picture(street.pose(6) * kView, true, points);
+  // Some features look like others' points.
+  constexpr std::size_t kExchanged = 24;
+  for (std::size_t f = 0; f + 1 < kExchanged; f += 2) std::swap(features[f].descriptor, features[f + 1].descriptor);
+  QueryPicture query = as_query(features);
+  EXPECT_TRUE(try_place(street.graph, query, kStreetFrame, 7).matches.empty()) << "nobody asked for them";
+
+  query.keep_matches = true;
+  const PlaceTrial trial = try_place(street.graph, query, kStreetFrame, 7);
+  ASSERT_TRUE(trial.verified.ok()) << trial.verified.status().to_string();
+  std::size_t inliers = 0, outliers = 0, beside = 0;
+  for (const PointMatch& match : trial.matches) {
+    inliers += match.inlier;
+    outliers += !match.inlier;
+    beside += match.seen_in.valid();
+    ASSERT_TRUE(match.residual);
+    const double off = (match.pixel - seen_at(street, trial.frame, points[match.feature])).norm();
+    if (match.inlier) {
+      EXPECT_LT(off, 1);
+      EXPECT_LT(*match.residual, 1);
+      EXPECT_EQ(outliers, 0u) << "the inliers come first";
+    } else {
+      EXPECT_LT(match.feature, kExchanged);
+      EXPECT_GT(*match.residual, 3);
+    }
+  }
+  EXPECT_EQ(inliers, trial.verified->inliers);
+  EXPECT_GT(outliers, 5u);
+  EXPECT_GT(beside, 0u) << "frames beside it have seen points, too";
+}
+
+TEST(KeptMatches, TellWhatARefusedPlaceHad) {
+  SyntheticStreet street(1, 12, 0), other(2, 12, 0);
+  std::vector<std::size_t> points;
+  std::vector<AppearanceFeature> features = other.picture(other.pose(6), true, points);
+  // Another place in which a few things look the same.
+  std::vector<std::size_t> here;
+  const auto alike = street.picture(street.pose(6), true, here);
+  for (std::size_t f = 0; f < 12; ++f) features[f].descriptor = alike[5 * f].descriptor;
+  QueryPicture query = as_query(features);
+  query.keep_matches = true;
+  const PlaceTrial trial = try_place(street.graph, query, kStreetFrame, 7);
+  EXPECT_EQ(trial.verified.reason(), Reason::TOO_FEW_INLIERS);
+  EXPECT_GE(trial.matches.size(), 8u);
+  for (const PointMatch& match : trial.matches) {
+    EXPECT_FALSE(match.inlier);
+    EXPECT_FALSE(match.residual) << "no transform was found";
+  }
+}
+
+TEST(KeptMatches, OfAMonoSessionHaveNoMetres) {
+  SyntheticStreet street(1, 12, 0);
+  street.graph.edit_session(1).header.camera.baseline = 0;
+  std::vector<std::size_t> points;
+  std::vector<AppearanceFeature> features = street.picture(street.pose(6) * kView, false, points);
+  constexpr std::size_t kExchanged = 24;
+  for (std::size_t f = 0; f + 1 < kExchanged; f += 2) std::swap(features[f].descriptor, features[f + 1].descriptor);
+  QueryPicture query = as_query(features, false);
+  query.keep_matches = true;
+  const PlaceTrial trial = try_place(street.graph, query, kStreetFrame, 7);
+  ASSERT_TRUE(trial.verified.ok()) << trial.verified.status().to_string();
+  ASSERT_EQ(trial.verified->verification, storage::Verification::kEpipolar);
+  std::size_t inliers = 0, wrong = 0;
+  for (const PointMatch& match : trial.matches) {
+    EXPECT_FALSE(match.seen_in.valid());
+    EXPECT_FALSE(match.residual);
+    if (!match.inlier) continue;
+    ++inliers;
+    wrong += (match.pixel - seen_at(street, trial.frame, points[match.feature])).norm() > 1;
+  }
+  EXPECT_GE(inliers, 30u);
+  EXPECT_LE(wrong, inliers / 20) << "a wrong match may lie on its epipolar line by chance";
+  EXPECT_LT(inliers, trial.matches.size());
+}
+
 }  // namespace
 }  // namespace relmap::place

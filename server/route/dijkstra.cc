@@ -69,7 +69,8 @@ void Search::expand(const Offer& best, const std::shared_ptr<const storage::Fram
   for (const storage::Neighbour& step : steps) {
     if (trail_.contains(step.frame)) continue;
     const EdgeRef edge(graph_, best.frame, hot, step);
-    if (passage_.open(*edge, step.forward)) offer(step.frame, best.cost + options_.weights(*edge), step.edge);
+    if (passage_.open(*edge, step.forward))
+      offer(step.frame, best.cost + options_.weights(*edge) * options_.penalty(best.frame, step.frame), step.edge);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/route/passage.h"
+#include "server/route/penalty.h"
 #include "server/route/stretches.h"
 #include "server/route/trail.h"
 #include "server/route/weight.h"
@@ -22,6 +23,7 @@ struct RouteOptions {
   double max_cost = std::numeric_limits<double>::infinity();  // in the unit that `weights` define
   RouteFilter filter = {};
   bool count_standing = false;  // count standing times in Route::time_s even if they have no weight
+  Penalty penalty = {};         // the search and max_cost include it, the figures of the route do not
 };
 
 struct RouteStep {

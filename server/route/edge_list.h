@@ -15,11 +15,18 @@ struct EdgeFilter {
   std::set<storage::EdgeKind> kinds;     // empty: all
   std::optional<SessionNumber> session;  // edges with an end in this session
   std::optional<FrameId> frame;          // edges with this frame as an end
+  // With `session`: edges between the two, or within one if they are the same.
+  std::optional<SessionNumber> other_session = {};
 
   bool matches(const storage::Edge& edge) const {
     return (states.empty() || states.contains(edge.state)) && (kinds.empty() || kinds.contains(edge.kind)) &&
-           (!session || edge.a.session == *session || edge.b.session == *session) &&
-           (!frame || edge.a == *frame || edge.b == *frame);
+           joins(edge.a, edge.b);
+  }
+  bool joins(FrameId a, FrameId b) const {
+    const auto is_between = [&](SessionNumber s, SessionNumber t) { return s == *session && t == *other_session; };
+    return (!session || a.session == *session || b.session == *session) &&
+           (!session || !other_session || is_between(a.session, b.session) || is_between(b.session, a.session)) &&
+           (!frame || a == *frame || b == *frame);
   }
 };
 

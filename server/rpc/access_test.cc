@@ -23,6 +23,7 @@
 #include "server/rpc/server.h"
 #include "server/rpc/testing/fleet_credentials.h"
 #include "server/rpc/testing/served_map.h"
+#include "storage/testing/event_follower.h"
 
 namespace relmap::rpc {
 namespace {
@@ -40,6 +41,7 @@ class AccessTest : public testing::Test {
     gatekeeper_ = std::make_unique<Gatekeeper>(fleet_.file("access"));
     ASSERT_TRUE(gatekeeper_->reload().ok());
     ServerOptions options{fleet_.file("socket"), "", "127.0.0.1", 0, fleet_.tls(), limits};
+    options.audit = audit_.get();
     server_ = RpcServer::start(*map_.core, *gatekeeper_, options).or_throw();
   }
   ~AccessTest() override {
@@ -102,6 +104,7 @@ class AccessTest : public testing::Test {
   std::unique_ptr<ingest::MapperSink> sink_;
   std::unique_ptr<intake::IngestServer> intake_;
   std::unique_ptr<Gatekeeper> gatekeeper_;
+  std::unique_ptr<AuditLog> audit_;  // null: none
   std::unique_ptr<RpcServer> server_;
 };
 
@@ -131,9 +134,10 @@ std::vector<Method> all_methods() {
 // Written out here, so that a method that is opened to others by mistake is found.
 Role expected_role(const std::string& method) {
   static const std::set<std::string> readers{
-      "Map.Localise",   "Map.MatchImage",   "Map.FindRoute", "Map.GetNeighbourhood", "Map.TransformBetween",
-      "Map.GetFrame",   "Map.ListSessions", "Map.ListEdges", "Map.FindLabels",       "Map.WatchMap",
-      "Map.ListRobots", "Map.GetStatus",    "Map.Export"};
+      "Map.Localise",         "Map.MatchImage",       "Map.FindRoute",    "Map.GetNeighbourhood",
+      "Map.TransformBetween", "Map.GetFrame",         "Map.ListSessions", "Map.ListEdges",
+      "Map.ExplainEdge",      "Map.GetClosureMatrix", "Map.GetSkeleton",  "Map.FindLabels",
+      "Map.WatchMap",         "Map.ListRobots",       "Map.GetStatus",    "Map.Export"};
   if (readers.contains(method)) return Role::kReader;
   return method.starts_with("Ingest.") ? Role::kRobot : Role::kOperator;
 }
@@ -167,6 +171,29 @@ TEST_F(AccessTest, EachRoleMayCallWhatIsForItAndNothingElse) {
       }
     }
   }
+}
+
+TEST_F(AccessTest, AnEditIsOfTheCallerWhomTheCredentialsName) {
+  const auto boss = fleet_.certificate(Role::kOperator, "boss");
+  const auto ann = fleet_.token(Role::kOperator, "ann");
+  start();
+  const auto label = [&](const std::shared_ptr<grpc::Channel>& by) {
+    v1::SetLabelRequest request;
+    *request.mutable_frame() = to_wire(FrameId{1, 7});
+    request.set_label("by " + std::to_string(map_.mapper->stats().durable_sequence));
+    const grpc::Status status = call(by, "/relmap.v1.Map/SetLabel", request.SerializeAsString());
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    (void)map_.mapper->commit(Deadline().at).or_throw();
+    const auto snapshot = map_.mapper->view()->committed();
+    storage::EventFollower follower;
+    follower.follow(*snapshot, std::size_t{1} << 20);
+    for (auto event = follower.events().rbegin(); event != follower.events().rend(); ++event)
+      if (std::holds_alternative<storage::LabelsEvent>(event->content)) return event->submitted.author;
+    return std::string("nobody");
+  };
+  EXPECT_EQ(label(channel(boss)), "boss");
+  EXPECT_EQ(label(channel(ann)), "ann");
+  EXPECT_NE(label(open(socket(), grpc::InsecureChannelCredentials())), "") << "whoever can open it has a name too";
 }
 
 TEST_F(AccessTest, WithoutCredentialsThereIsNothingButHealth) {
@@ -467,6 +494,42 @@ TEST_F(AccessTest, NoTlsBefore1_2IsSpoken) {
   };
   EXPECT_TRUE(is_answered(3));
   for (const char minor : {'\2', '\1', '\0'}) EXPECT_FALSE(is_answered(minor)) << "TLS 1." << minor - 1;
+}
+
+// Reading the audit log must not fill it: of a list of many pages, it has the call for the first one.
+TEST_F(AccessTest, PagesOfTheAuditLogDoNotFillIt) {
+  const storage::TemporaryFolder folder;
+  audit_ = AuditLog::open(folder / "audit.jsonl").or_throw();
+  for (int i = 0; i < 10; ++i) audit_->write({"anna", "operator", "", "Admin.Commit", "", "", Status()});
+  const access::Credentials boss = fleet_.certificate(Role::kOperator, "boss"),
+                            reader = fleet_.certificate(Role::kReader, "reader");
+  start();
+  const auto stub = v1::Admin::NewStub(channel(boss));
+  const auto list = [&](v1::Admin::Stub& by, const std::string& token, v1::ListAuditReply& reply) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(5));
+    v1::ListAuditRequest request;
+    request.set_page_size(3);
+    request.set_page_token(token);
+    return by.ListAudit(&context, request, &reply);
+  };
+  std::vector<std::string> methods;
+  std::string token;
+  do {
+    v1::ListAuditReply reply;
+    ASSERT_TRUE(list(*stub, token, reply).ok());
+    for (const v1::AuditEntry& entry : reply.entries()) methods.push_back(entry.method());
+    token = reply.next_page_token();
+  } while (!token.empty());
+  EXPECT_EQ(methods, std::vector<std::string>(10, "Admin.Commit"));
+
+  v1::ListAuditReply reply;
+  EXPECT_EQ(list(*stub, "no token", reply).error_code(), StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(list(*v1::Admin::NewStub(channel(reader)), "", reply).error_code(), StatusCode::PERMISSION_DENIED);
+  std::vector<std::string> told;
+  for (const AuditRead& entry : audit_->read({}, [] { return Status(); })->entries)
+    if (entry.method == "Admin.ListAudit") told.push_back(entry.who + " " + std::string(reason_name(entry.outcome)));
+  EXPECT_THAT(told, testing::ElementsAre("reader NOT_ALLOWED", "boss INVALID_ARGUMENT", "boss OK"));
 }
 
 }  // namespace

@@ -1,9 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "relmap/v1/admin.pb.h"
+#include "server/rpc/audit_log.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/testing/served_map.h"
+#include "storage/testing/temporary_folder.h"
 
 namespace relmap::rpc {
 namespace {
@@ -114,6 +120,49 @@ TEST_F(AdminHandlers, CommitLeavesNothingInTheJournal) {
   EXPECT_EQ(stats->status().frames(), ServedMap::kFrames + ServedMap::kElsewhere);
   EXPECT_EQ(stats->disk_bytes(), stats->map_bytes() + stats->journal_bytes());
   EXPECT_GT(stats->map_bytes(), stats->status().frames() * 1000);
+}
+
+TEST_F(AdminHandlers, TheAuditLogIsListed) {
+  v1::ListAuditRequest request;
+  const auto without = call(*map_.core, list_audit, request, deadline_);
+  EXPECT_EQ(without.reason(), Reason::UNSUPPORTED);
+  EXPECT_THAT(without.status().message(), HasSubstr("audit"));
+
+  const storage::TemporaryFolder folder;
+  const auto log = AuditLog::open(folder / "audit.jsonl").or_throw();
+  map_.core->audit.log = log.get();
+  for (int i = 0; i < 250; ++i)  // what is queued is told, too
+    log->write({"anna", "operator", "", "Admin.Commit", std::to_string(i), "", Status(), {}, "trace"});
+  std::vector<int> numbers;
+  int pages = 0;
+  do {
+    const auto page = call(*map_.core, list_audit, request, deadline_).or_throw();
+    for (const v1::AuditEntry& entry : page.entries()) {
+      numbers.push_back(std::stoi(entry.request()));
+      EXPECT_EQ(entry.who(), "anna");
+      EXPECT_EQ(entry.trace_id(), "trace");
+      EXPECT_EQ(entry.outcome(), v1::REASON_OK);
+    }
+    request.set_page_token(page.next_page_token());
+    ++pages;
+  } while (!request.page_token().empty());
+  EXPECT_EQ(numbers.size(), 250u);
+  EXPECT_EQ(numbers.front(), 249);
+  EXPECT_TRUE(std::is_sorted(numbers.rbegin(), numbers.rend()));
+  EXPECT_EQ(pages, 3) << "of 100 entries";
+
+  request.Clear();
+  request.set_failed(true);
+  EXPECT_EQ(call(*map_.core, list_audit, request, deadline_)->entries_size(), 0);
+  request.set_from_us(5);
+  request.set_until_us(5);
+  EXPECT_EQ(call(*map_.core, list_audit, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  request.set_from_us(-1);
+  EXPECT_EQ(call(*map_.core, list_audit, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  request.Clear();
+  request.set_page_token("not one");
+  EXPECT_EQ(call(*map_.core, list_audit, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(map_.mapper->budget().used(storage::Share::kReplies), 0u);
 }
 
 }  // namespace

@@ -44,6 +44,10 @@ class AdminService final : public v1::Admin::CallbackService {
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
     return stream<v1::Progress>(context, "Admin.DeleteSession", request, delete_session, Lane::kEdits);
   }
+  // Reads files, so it holds up no question.
+  Unary* ListAudit(Context* context, const v1::ListAuditRequest* request, v1::ListAuditReply* reply) override {
+    return unary(context, "Admin.ListAudit", request, reply, list_audit, Lane::kMaintenance);
+  }
 
  private:
   template <typename Request, typename Reply, typename... Parts>

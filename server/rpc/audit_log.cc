@@ -73,22 +73,26 @@ AuditLog::~AuditLog() {
 
 Status AuditLog::reopen() {
   if (descriptor_ >= 0) ::close(descriptor_);
-  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
+  descriptor_ = ::open(file_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
   struct stat facts {};
   if (descriptor_ < 0 || ::fstat(descriptor_, &facts) != 0)
     return {Reason::IO_ERROR, "cannot write " + file_ + ": " + std::strerror(errno)};
   written_ = static_cast<std::uint64_t>(facts.st_size);
+  char last = '\n';
+  if (written_ > 0 && ::pread(descriptor_, &last, 1, facts.st_size - 1) != 1)
+    return {Reason::IO_ERROR, "cannot read " + file_ + ": " + std::strerror(errno)};
+  torn_ = last != '\n';  // by a kill or a full disk
   return {};
 }
 
 // Moves the files on by one number, up to the first that is free, so that nothing is lost where it is done again
 // because it failed half way.
 void AuditLog::rotate() {
-  const auto old = [this](int number) { return file_ + "." + std::to_string(number); };
   int free = 1;
-  while (free < kOldFiles && ::access(old(free).c_str(), F_OK) == 0) ++free;
-  for (int number = free - 1; number > 0; --number) (void)std::rename(old(number).c_str(), old(number + 1).c_str());
-  (void)std::rename(file_.c_str(), old(1).c_str());
+  while (free < kOldFiles && ::access(old_file(free).c_str(), F_OK) == 0) ++free;
+  for (int number = free - 1; number > 0; --number)
+    (void)std::rename(old_file(number).c_str(), old_file(number + 1).c_str());
+  (void)std::rename(file_.c_str(), old_file(1).c_str());
 }
 
 void AuditLog::write(const Entry& entry) {
@@ -97,9 +101,25 @@ void AuditLog::write(const Entry& entry) {
   if (lists(entry)) queue(line_of(entry));
 }
 
-void AuditLog::flush() {
-  MutexLock lock(mutex_);
-  changed_.wait(mutex_, [this]() RELMAP_REQUIRES(mutex_) { return lines_.empty() && !writing_; });
+bool AuditLog::flush(Clock::time_point until) {
+  const MutexLock lock(mutex_);
+  return changed_.wait_until(mutex_, until, [this]() RELMAP_REQUIRES(mutex_) { return lines_.empty() && !writing_; });
+}
+
+Result<AuditPage> AuditLog::read(const AuditQuery& query, const std::function<Status()>& proceed) {
+  constexpr std::chrono::seconds kFlush{1};  // a disk that takes longer does not keep the rest from being read
+  (void)flush(Clock::now() + kFlush);
+  std::vector<std::unique_ptr<storage::ReadFile>> files;
+  {
+    const auto disk = storage::posix_file_system();
+    const MutexLock lock(files_);
+    for (int number = 0; number <= kOldFiles; ++number) {
+      auto file = disk->open_read(number == 0 ? file_ : old_file(number));
+      if (!file.ok() && file.reason() != Reason::NO_SUCH_FILE) return file.status();
+      if (file.ok() && (*file)->size() > 0) files.push_back(*std::move(file));
+    }
+  }
+  return read_audit(files, query, proceed);
 }
 
 // Whether the call has a line of its own.
@@ -169,13 +189,19 @@ void AuditLog::run() {
 void AuditLog::put(const std::string& line) {
   Status status;
   if (descriptor_ < 0 || written_ >= file_bytes_) {
+    const MutexLock lock(files_);
     if (written_ >= file_bytes_) rotate();
     written_ = 0;  // also where it cannot be opened now
     status = reopen();
   }
-  if (status.ok() && !write_all(descriptor_, line))
-    status = {Reason::IO_ERROR, "cannot write " + file_ + ": " + std::strerror(errno)};
-  if (status.ok()) written_ += line.size();
+  if (status.ok()) {
+    const std::string text = torn_ ? "\n" + line : line;
+    torn_ = !write_all(descriptor_, text);
+    if (torn_)
+      status = {Reason::IO_ERROR, "cannot write " + file_ + ": " + std::strerror(errno)};
+    else
+      written_ += text.size();
+  }
   if (!status.ok() && !failing_) spdlog::error("the audit log is incomplete: {}", status.to_string());
   failing_ = !status.ok();
 }

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "proto/base/mutex.h"
 #include "proto/base/status.h"
+#include "server/rpc/audit_reader.h"
 
 namespace google::protobuf {
 class Message;
@@ -49,8 +51,12 @@ class AuditLog {
   // message, seconds, and trace_id if there is one. Returns at once. A failure to write is logged; where the disk takes
   // too little for too long, lines are lost, and their number is written.
   void write(const Entry& entry);
-  // Waits until everything is written.
-  void flush();
+  // Waits until everything is written, or until this time. False: something is not written yet.
+  bool flush(std::chrono::steady_clock::time_point until = std::chrono::steady_clock::time_point::max());
+
+  // Reads a page of what is written (audit_reader.h), after a flush() of a second at most. The files are not moved on
+  // while they are opened, and a page holds on to those that it has.
+  Result<AuditPage> read(const AuditQuery& query, const std::function<Status()>& proceed);
 
   // The request in protobuf's text format on one line, cut off at kMaxRequest; of a large one only its size.
   static std::string text_of(const google::protobuf::Message& request);
@@ -73,14 +79,17 @@ class AuditLog {
   // Of the thread, but for the first reopen().
   void put(const std::string& line);
   Status reopen();
-  void rotate();
+  void rotate() RELMAP_REQUIRES(files_);
+  std::string old_file(int number) const { return file_ + "." + std::to_string(number); }
 
   const std::string file_;
   const std::uint64_t file_bytes_;
   int descriptor_ = -1;
   std::uint64_t written_ = 0;
   bool failing_ = false;  // told once
+  bool torn_ = false;     // the last line was not written to its end
 
+  Mutex files_;  // held while files are moved on, or opened to be read
   Mutex mutex_;
   ConditionVariable changed_;
   std::map<std::string, Failures> failures_ RELMAP_GUARDED_BY(mutex_);  // by caller

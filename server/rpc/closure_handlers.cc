@@ -39,7 +39,7 @@ Result<v1::ProposeEdgeReply> propose_dry(map::Mapper& mapper, const RpcLimits& l
     if (Status status = run.edit(map::edit_record(id, map::EdgeAction::kAccept, request.note())); !status.ok())
       return status;
   v1::ProposeEdgeReply reply;
-  *reply.mutable_edge() = edge_message(run.edge(id));
+  *reply.mutable_edge() = edge_message(*view, run.edge(id));
   *reply.mutable_effect() = effect_message(run.changes());
   reply.set_map_version(view->version());
   return reply;
@@ -68,7 +68,7 @@ Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& requ
     map::DryRun run(*view, view->state(), work.limit().proceed);
     reply.set_shown(run.removal(record));
     if (Status status = run.edit(record); !status.ok()) return status;
-    *reply.mutable_edge() = edge_message(run.edge(*id));
+    *reply.mutable_edge() = edge_message(*view, run.edge(*id));
     add_effect(*id, run.changes(), reply);
     reply.set_map_version(view->version());
     return reply;
@@ -89,7 +89,7 @@ Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& requ
   const auto changes = map::changes_of_edit(mapper, sequence);
   if (!changes.ok()) return changes.status();
   if (*changes) add_effect(*id, **changes, reply);
-  *reply.mutable_edge() = edge_message(*edge);
+  *reply.mutable_edge() = edge_message(*view, *edge);
   reply.set_journal_sequence(sequence);
   reply.set_map_version(view->version());
   return reply;
@@ -119,7 +119,7 @@ Result<v1::ProposeEdgeReply> propose_edge(const v1::ProposeEdgeRequest& request,
   const auto edge = map::closure_of_record(*view, *a, *b, *written);
   if (!edge) return map::overtaken();
   v1::ProposeEdgeReply reply;
-  *reply.mutable_edge() = edge_message(*edge);
+  *reply.mutable_edge() = edge_message(*view, *edge);
   if (const auto changes = map::changes_of_proposal(mapper, *edge, *written))
     *reply.mutable_effect() = effect_message(*changes);
   reply.set_journal_sequence(*written);

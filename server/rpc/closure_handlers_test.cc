@@ -1,9 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "proto/base/clock.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/request_context.h"
 #include "server/rpc/testing/served_map.h"
 
 namespace relmap::rpc {
@@ -95,6 +97,31 @@ TEST_F(ClosureHandlers, AClosureFoundByGeometryIsProposedAndJudged) {
   ASSERT_EQ(second.effect().closures_size(), 2) << "it confirms the first";
   EXPECT_EQ(second.effect().closures(0).before(), v1::EDGE_STATE_CANDIDATE);
   EXPECT_EQ(second.effect().closures(1).before(), v1::EDGE_STATE_UNSPECIFIED);
+}
+
+TEST_F(ClosureHandlers, TheHistorySaysWhenAndByWhom) {
+  const std::int64_t before = now_us();
+  const auto found = [&] {
+    const RequestContext ann{"1", "", "ann"};
+    const RequestScope scope(ann);
+    v1::ProposeEdgeRequest request = between(kEarly, kLate);
+    request.set_accept(true);
+    return propose(request).or_throw().edge();
+  }();
+  ASSERT_EQ(found.history_size(), 2);
+  for (const v1::EdgeEvent& event : found.history()) {
+    EXPECT_EQ(event.author(), "ann");
+    EXPECT_GE(event.time_us(), before);
+    EXPECT_LE(event.time_us(), now_us());
+  }
+  const auto removed = [&] {
+    const RequestContext long_name{"2", "", std::string(1000, 'x')};
+    const RequestScope scope(long_name);
+    return set(edit(found.id(), v1::EDGE_STATE_REMOVED)).edge();
+  }();
+  EXPECT_EQ(removed.history(2).author(), std::string(storage::kMaxAuthorBytes, 'x'));
+  const auto restored = set(edit(found.id(), v1::EDGE_STATE_ACCEPTED)).edge();
+  EXPECT_EQ(restored.history(3).author(), "relmapd") << "no caller did it";
 }
 
 TEST_F(ClosureHandlers, AProposalMayBePutIntoForceAtOnce) {

@@ -101,16 +101,25 @@ struct Intake {
   std::function<IngestFacts()> facts;      // empty if nothing is counted
 };
 
-// A route that is being streamed; it is kept as long as its stream may be resumed.
+// A route that is being streamed, with its alternatives; it is kept as long as its stream may be resumed.
 struct FoundRoute {
   FoundRoute(storage::Budget& budget, std::uint64_t n) : number(n), charge(budget, storage::Share::kReplies) {}
 
   const std::uint64_t number;  // counts the routes of this run of the daemon
   std::shared_ptr<const storage::MapView> view;
   route::RouteAnswer answer;
+  std::vector<route::Alternative> alternatives;
   std::uint32_t fingerprint = 0;  // of the request without its ends
   std::uint32_t ends_fingerprint = 0;
   Charge charge;
+
+  std::size_t routes() const { return 1 + alternatives.size(); }
+  const route::Route& route(std::size_t n) const { return n == 0 ? answer.route : alternatives[n - 1].route; }
+  std::size_t memory_bytes() const {
+    std::size_t bytes = 0;
+    for (std::size_t n = 0; n < routes(); ++n) bytes += route(n).path.memory_bytes();
+    return bytes;
+  }
 };
 inline bool is_cut_off(const FoundRoute& found) { return found.view->expired(); }
 
@@ -134,6 +143,13 @@ struct PictureTurn {
   Mutex mutex;
 };
 
+class AuditLog;
+
+// Where edits and calls of operators are written down; null: nowhere, or no server runs.
+struct Audit {
+  AuditLog* log = nullptr;
+};
+
 // Owns what the handlers work on. A handler does not see it: it declares the parts that it uses as its last parameters,
 // and call() passes them.
 struct Core {
@@ -148,7 +164,7 @@ struct Core {
 
   auto parts() {
     return std::tie(mapper, facts, limits, intake, process, transport, health, routes, metrics, views, edits, imports,
-                    pictures, maintenance, feed);
+                    pictures, maintenance, feed, audit);
   }
 
   map::Mapper& mapper;
@@ -165,6 +181,7 @@ struct Core {
   ImportTurn imports;
   PictureTurn pictures;
   MaintenanceTurn maintenance;
+  Audit audit;
   WatchFeed feed;
 };
 

@@ -106,7 +106,7 @@ class ExportStream {
     const std::string line = trajectory_line(*contents_.file, pose);
     reply.mutable_data()->append(line);
     if (!pose.doubtful_step) return line.size();
-    *reply.add_unmeasured() = edge_message(*pose.doubtful_step);
+    *reply.add_unmeasured() = edge_message(*view_, *pose.doubtful_step);
     return line.size() + reply.unmeasured(reply.unmeasured_size() - 1).ByteSizeLong();
   }
   std::size_t add_frame(const route::TrajectoryPose& pose, v1::ExportReply& reply) const {

@@ -1,5 +1,7 @@
 #include "server/rpc/gateway.h"
 
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -373,7 +375,10 @@ Status Call::check_caller() const {
 void Call::post(std::function<void()> task) { gateway_.threads_of(lane_).post(std::move(task)); }
 
 void Call::asks(const google::protobuf::Message& request) {
-  if (gateway_.audit_ && is_audited(method_)) asked_ = AuditLog::text_of(request);
+  if (!gateway_.audit_ || !is_audited(method_)) return;
+  asked_ = AuditLog::text_of(request);
+  const google::protobuf::FieldDescriptor* token = request.GetDescriptor()->FindFieldByName("page_token");
+  goes_on_ = token && !request.GetReflection()->GetString(request, token).empty();
 }
 
 grpc::Status Call::end(const Status& status) {
@@ -390,7 +395,8 @@ grpc::Status Call::end(const Status& status) {
     spdlog::warn("{} from {}: {}", method_, context_->peer(), status.to_string());
   else
     spdlog::debug("{} from {}: {} in {} us", method_, context_->peer(), status.to_string(), took.count());
-  if (gateway_.audit_ && is_audited(method_)) {
+  // Of a list that is read page by page, the first page is told, so that reading the audit log does not fill it.
+  if (gateway_.audit_ && is_audited(method_) && !(goes_on_ && status.ok())) {
     AuditLog::Entry entry;
     entry.who = caller_.name;
     entry.role = std::string(access::role_name(caller_.role));

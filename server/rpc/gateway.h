@@ -194,7 +194,8 @@ class Call {
   std::string known_peer_;  // over whose connection a known caller calls; empty: the caller is not known
   std::string entered_as_;  // whose calls it is counted among
   std::size_t entered_bytes_ = 0;
-  std::string asked_;  // the request, for the audit log
+  std::string asked_;     // the request, for the audit log
+  bool goes_on_ = false;  // it asks for another page of a list
   std::optional<Charge> charge_;
 };
 

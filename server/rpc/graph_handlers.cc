@@ -84,7 +84,7 @@ Result<v1::GetNeighbourhoodReply> get_neighbourhood(const v1::GetNeighbourhoodRe
       return {Reason::BUDGET_EXCEEDED, "more landmarks than one answer holds; ask for fewer frames"};
   }
   for (const EdgeId id : found->edges)
-    if (const auto edge = storage::find_edge(*view, id)) *reply.add_edges() = edge_message(*edge);
+    if (const auto edge = storage::find_edge(*view, id)) *reply.add_edges() = edge_message(*view, *edge);
   if (reply.ByteSizeLong() > kMaxReplyBytes)
     return {Reason::BUDGET_EXCEEDED,
             "an answer of " + std::to_string(reply.ByteSizeLong()) + " bytes; ask for fewer frames"};
@@ -95,8 +95,9 @@ Result<v1::GetFrameReply> get_frame(const v1::GetFrameRequest& request, const De
   const auto view = mapper.view();
   const auto id = existing_frame(*view, request.has_frame(), request.frame(), "frame");
   if (!id.ok()) return id.status();
-  auto frame = frame_message(*view, *id,
-                             {request.landmarks(), request.observations(), request.appearance(), request.thumbnail()});
+  auto frame = frame_message(
+      *view, *id,
+      {request.landmarks(), request.observations(), request.appearance(), request.thumbnail(), request.picture()});
   if (!frame.ok()) return frame.status();
   v1::GetFrameReply reply;
   *reply.mutable_frame() = std::move(frame).value();

@@ -25,6 +25,8 @@ class ListSessionsRequest;
 class ListSessionsReply;
 class ListEdgesRequest;
 class ListEdgesReply;
+class ExplainEdgeRequest;
+class ExplainEdgeReply;
 class SetEdgeStateRequest;
 class SetEdgeStateReply;
 class ProposeEdgeRequest;
@@ -63,6 +65,10 @@ class GetStatsRequest;
 class GetStatsReply;
 class CommitRequest;
 class CommitReply;
+class ListAuditRequest;
+class ListAuditReply;
+class GetClosureMatrixRequest;
+class GetClosureMatrixReply;
 }  // namespace relmap::v1
 
 namespace relmap::rpc {
@@ -88,6 +94,11 @@ Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& reque
                                             map::Mapper& mapper, ViewKeeper& views);
 Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const Deadline& deadline,
                                       map::Mapper& mapper, ViewKeeper& views, const RpcLimits& limits);
+Result<v1::GetClosureMatrixReply> get_closure_matrix(const v1::GetClosureMatrixRequest& request,
+                                                     const Deadline& deadline, map::Mapper& mapper, ViewKeeper& views);
+// Verifies at most two pairs of frames, from the features that are kept: no picture is decoded.
+Result<v1::ExplainEdgeReply> explain_edge(const v1::ExplainEdgeRequest& request, const Deadline& deadline,
+                                          map::Mapper& mapper, const RpcLimits& limits);
 Result<v1::SetEdgeStateReply> set_edge_state(const v1::SetEdgeStateRequest& request, const Deadline& deadline,
                                              map::Mapper& mapper, EditLog& edits, const RpcLimits& limits);
 // Takes the pictures' reserve for a moment, and waits for the disk without it.
@@ -135,6 +146,8 @@ Result<v1::GetStatsReply> get_stats(const v1::GetStatsRequest& request, const De
                                     const ProcessProbe& process, const Transport& transport, const HealthProbe& health,
                                     const Metrics& metrics);
 Result<v1::SetLogLevelReply> change_log_level(const v1::SetLogLevelRequest& request, const Deadline& deadline);
+Result<v1::ListAuditReply> list_audit(const v1::ListAuditRequest& request, const Deadline& deadline,
+                                      map::Mapper& mapper, const Audit& audit);
 Result<v1::CommitReply> commit(const v1::CommitRequest& request, const Deadline& deadline, map::Mapper& mapper);
 
 }  // namespace relmap::rpc

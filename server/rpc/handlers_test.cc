@@ -445,7 +445,7 @@ TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
 
   const std::string token = request.resume_token();
   const std::size_t position = token.rfind('-');
-  for (const char* wrong : {"4711,1", "5", "0,1", "5,", "x,1"}) {
+  for (const char* wrong : {"0,4711,1", "0,5", "5", "0,0,1", "0,5,", "0,x,1", "1,5,1", "x,5,1", "0,5,1,1"}) {
     request.set_resume_token(token.substr(0, position + 1) + wrong);
     EXPECT_EQ(call(core, find_route, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << wrong;
   }
@@ -809,12 +809,12 @@ TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
 
 TEST_F(Handlers, AnEdgeTellsWhetherItIsMeasured) {
   storage::Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
-  EXPECT_FALSE(edge_message(step).unmeasured());
+  EXPECT_FALSE(edge_message(step, 0).unmeasured());
   step.kind = storage::EdgeKind::kPrior;
   step.support = storage::kMinSupport;
-  EXPECT_FALSE(edge_message(step).unmeasured()) << "landmarks on both sides tell it";
+  EXPECT_FALSE(edge_message(step, 0).unmeasured()) << "landmarks on both sides tell it";
   step.support = storage::kMinSupport - 1;
-  EXPECT_TRUE(edge_message(step).unmeasured());
+  EXPECT_TRUE(edge_message(step, 0).unmeasured());
 }
 
 TEST_F(Handlers, AMonoSessionHasNeitherEdgesNorATrajectory) {

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -161,6 +162,71 @@ TEST_F(ImportGraph, RoutesAndTransformsListUnmeasuredSteps) {
   ASSERT_EQ(near.frames_size(), 7);
   for (const v1::NeighbourhoodFrame& frame : near.frames())
     EXPECT_EQ(frame.unmeasured_steps(), frame.frame().index() < kDark ? 1u : 0u);
+}
+
+// The other way around the circuit is longer, but not by half.
+TEST_F(ImportGraph, AlternativesFollowTheRouteInItsStream) {
+  auto request = piece(0, kFrames);
+  for (const std::uint32_t query : {45, 50, 55}) add_loop(request, query, query - kLap, SE3());
+  ASSERT_TRUE(import(request).ok());
+  v1::FindRouteRequest way;
+  *way.mutable_from()->mutable_frame() = to_wire(FrameId{1, 10});
+  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, 10 + kLap * 9 / 20});
+  way.set_alternatives(3);
+  way.set_covariance(true);
+  Core by_cells(*mapper_, core_.facts, {.near_route_steps = 0, .route_steps_per_message = 7});
+  make_cells(by_cells);
+  Core by_frames(*mapper_, core_.facts, {.route_steps_per_message = 7});
+  for (Core* core : {&by_cells, &by_frames}) {
+    std::vector<v1::FindRouteReply> messages;
+    auto stream = call(*core, find_route, way, {}).or_throw();
+    for (auto message = stream().or_throw(); message; message = stream().or_throw()) messages.push_back(*message);
+    std::vector<v1::RouteSummary> summaries;
+    std::vector<std::vector<std::uint32_t>> frames;
+    for (const v1::FindRouteReply& message : messages) {
+      EXPECT_EQ(message.has_summary(), message.route() == summaries.size());
+      if (message.has_summary()) {
+        summaries.push_back(message.summary());
+        frames.emplace_back();
+      }
+      ASSERT_EQ(message.route() + 1, summaries.size());
+      for (const v1::RouteStep& step : message.steps()) frames.back().push_back(step.frame().index());
+      EXPECT_EQ(message.resume_token().empty(), &message == &messages.back());
+    }
+    ASSERT_EQ(summaries.size(), 2u);
+    EXPECT_EQ(summaries[0].shared(), 0);
+    EXPECT_LE(summaries[1].shared(), 0.75);
+    EXPECT_GT(summaries[1].cost(), summaries[0].cost());
+    EXPECT_LE(summaries[1].cost(), 1.5 * summaries[0].cost());
+    for (std::size_t i = 0; i < 2; ++i) {
+      ASSERT_EQ(frames[i].size(), summaries[i].steps());
+      EXPECT_EQ(frames[i].front(), way.from().frame().index());
+      EXPECT_EQ(frames[i].back(), way.to().frame().index());
+    }
+    EXPECT_THAT(frames[0], testing::Contains(20u));
+    EXPECT_THAT(frames[1], testing::Not(testing::Contains(20u))) << "the other way around";
+
+    // Each message's token leads on with the next one.
+    for (std::size_t i = 0; i + 1 < messages.size(); ++i) {
+      v1::FindRouteRequest again = way;
+      again.set_resume_token(messages[i].resume_token());
+      auto rest = call(*core, find_route, again, {}).or_throw();
+      for (std::size_t j = i + 1; j < messages.size(); ++j)
+        EXPECT_EQ(rest().or_throw().value().SerializeAsString(), messages[j].SerializeAsString());
+      EXPECT_FALSE(rest().or_throw().has_value());
+    }
+    v1::FindRouteRequest none = way;
+    none.clear_alternatives();
+    std::size_t alone = 0;
+    auto cheapest = call(*core, find_route, none, {}).or_throw();
+    for (auto message = cheapest().or_throw(); message; message = cheapest().or_throw()) {
+      EXPECT_EQ(message->route(), 0u);
+      alone += static_cast<std::size_t>(message->steps_size());
+    }
+    EXPECT_EQ(alone, frames[0].size());
+    none.set_alternatives(6);
+    EXPECT_EQ(call(*core, find_route, none, {}).reason(), Reason::INVALID_ARGUMENT);
+  }
 }
 
 TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {

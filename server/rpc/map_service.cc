@@ -37,6 +37,13 @@ class MapService final : public v1::Map::CallbackService {
   Unary* ListEdges(Context* context, const v1::ListEdgesRequest* request, v1::ListEdgesReply* reply) override {
     return unary(context, "Map.ListEdges", request, reply, list_edges);
   }
+  Unary* ExplainEdge(Context* context, const v1::ExplainEdgeRequest* request, v1::ExplainEdgeReply* reply) override {
+    return unary(context, "Map.ExplainEdge", request, reply, explain_edge);
+  }
+  Unary* GetClosureMatrix(Context* context, const v1::GetClosureMatrixRequest* request,
+                          v1::GetClosureMatrixReply* reply) override {
+    return unary(context, "Map.GetClosureMatrix", request, reply, get_closure_matrix);
+  }
   Unary* SetEdgeState(Context* context, const v1::SetEdgeStateRequest* request, v1::SetEdgeStateReply* reply) override {
     return unary(context, "Map.SetEdgeState", request, reply, set_edge_state, Lane::kEdits);
   }

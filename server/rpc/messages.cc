@@ -2,6 +2,7 @@
 
 #include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
+#include "server/rpc/evidence_messages.h"
 #include "storage/graph/binding.h"
 #include "storage/graph/frame.h"
 
@@ -73,7 +74,12 @@ v1::Uniqueness uniqueness_message(const storage::Uniqueness& uniqueness) {
 
 }  // namespace
 
-v1::Edge edge_message(const storage::Edge& edge) {
+v1::Edge edge_message(const storage::Graph& graph, const storage::Edge& edge) {
+  const auto hot = graph.hot(edge.b);
+  return edge_message(edge, hot ? hot->time_us : 0);
+}
+
+v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us) {
   v1::Edge message;
   *message.mutable_id() = to_wire(edge.id);
   *message.mutable_a() = to_wire(edge.a);
@@ -113,6 +119,8 @@ v1::Edge edge_message(const storage::Edge& edge) {
     added.set_time_us(event.time_us);
     added.set_author(event.author.empty() ? "relmapd" : event.author);  // what no operator did, the daemon did
   }
+  tell_suspicion(edge, message);
+  message.set_time_us(time_us);
   return message;
 }
 
@@ -215,7 +223,9 @@ Result<v1::Frame> frame_message(const storage::Graph& graph, FrameId id, const F
   *message.mutable_id() = to_wire(id);
   message.set_time_us(hot->time_us);
   for (const std::string& label : hot->labels) message.add_labels(label);
-  for (const storage::Edge& edge : hot->edges) *message.add_edges() = edge_message(edge);
+  // Only what is derived (a bridge of a deletion) may be stored with another frame than its newer end.
+  for (const storage::Edge& edge : hot->edges)
+    *message.add_edges() = edge.b == id ? edge_message(edge, hot->time_us) : edge_message(graph, edge);
   for (const EdgeId edge : hot->incoming) *message.add_incoming() = to_wire(edge);
   *message.mutable_odometry_from_frame() = to_wire(hot->T_odom_frame);
   if (hot->mean_error >= 0) message.set_mean_error(hot->mean_error);
@@ -227,6 +237,7 @@ Result<v1::Frame> frame_message(const storage::Graph& graph, FrameId id, const F
     if (parts.observations) add_observations(graph, *warm, message);
   }
   if (parts.landmarks) add_landmarks(id, *hot, message);
+  if (parts.picture) *message.mutable_picture() = picture_message(graph, id);
   if (!parts.appearance && !parts.thumbnail) return message;
   if (const auto cold = graph.cold(id)) {
     if (parts.appearance) *message.mutable_appearance() = to_wire(cold->appearance);

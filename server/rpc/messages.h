@@ -13,7 +13,9 @@
 
 namespace relmap::rpc {
 
-v1::Edge edge_message(const storage::Edge& edge);
+// `time_us` is that of the edge's newer end; the second reads it.
+v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us);
+v1::Edge edge_message(const storage::Graph& graph, const storage::Edge& edge);
 v1::Session session_message(const storage::Session& session);
 v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);
@@ -45,7 +47,7 @@ void tell_unmeasured(const route::UnmeasuredStretches& stretches, Message& messa
 void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reason reason, std::uint64_t count);
 
 struct FrameParts {
-  bool landmarks = false, observations = false, appearance = false, thumbnail = false;
+  bool landmarks = false, observations = false, appearance = false, thumbnail = false, picture = false;
 };
 // NO_SUCH_FRAME.
 Result<v1::Frame> frame_message(const storage::Graph& graph, FrameId id, const FrameParts& parts);

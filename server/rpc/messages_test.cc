@@ -93,14 +93,14 @@ TEST(EditEffect, NamesTheStretchesAlongWhichTheRobotCountsAsCarried) {
 
 TEST(EdgeMessage, HoldsUniquenessAndCarryingClosures) {
   storage::Edge edge;
-  EXPECT_FALSE(edge_message(edge).has_uniqueness()) << "it is not known";
+  EXPECT_FALSE(edge_message(edge, 0).has_uniqueness()) << "it is not known";
   edge.uniqueness.known = true;
-  EXPECT_TRUE(edge_message(edge).has_uniqueness());
-  EXPECT_FALSE(edge_message(edge).uniqueness().has_runner_up());
-  EXPECT_FALSE(edge_message(edge).uniqueness().has_differs());
+  EXPECT_TRUE(edge_message(edge, 0).has_uniqueness());
+  EXPECT_FALSE(edge_message(edge, 0).uniqueness().has_runner_up());
+  EXPECT_FALSE(edge_message(edge, 0).uniqueness().has_differs());
   edge.uniqueness = {true, {2, 3}, 21, 0.25f, 2, 0.5f, 30, 4};
   edge.carried_by = {kClosure, kOther};
-  const v1::Edge message = edge_message(edge);
+  const v1::Edge message = edge_message(edge, 0);
   EXPECT_EQ(message.uniqueness().runner_up().index(), 3u);
   EXPECT_EQ(message.uniqueness().runner_up_inliers(), 21u);
   EXPECT_EQ(message.uniqueness().runner_up_probability(), 0.25);

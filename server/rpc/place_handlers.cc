@@ -1,6 +1,7 @@
 #include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
 #include "server/place/supposed_camera.h"
+#include "server/rpc/evidence_messages.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/place_messages.h"
@@ -18,20 +19,27 @@ v1::Verification verification_of(const place::VerifiedPlace& place) {
   return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
 }
 
-place::PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> prior) {
-  return {seen.features, seen.camera, seen.masked, prior, seen.pair, seen.known, seen.eye_turn};
+// How a view is asked about, beside what it shows.
+struct Asked {
+  std::optional<FrameId> prior;
+  bool correspondences = false;
+};
+
+place::PlaceQuestion question_of(const SeenView& seen, const Asked& asked) {
+  return {seen.features, seen.camera, seen.masked,   asked.prior,
+          seen.pair,     seen.known,  seen.eye_turn, asked.correspondences};
 }
 
 // Sees a single picture again with an unknown camera, and replaces `seen` by that. Empty for a pair or features, which
 // cannot be seen without their camera.
-place::DescribeWithoutCamera see_again(const v1::View& asked, const storage::MapView& view,
-                                       std::optional<FrameId> prior, SeenView& seen) {
-  if (!asked.has_left() || asked.has_right()) return {};
-  return [&asked, &view, prior, &seen]() -> Result<place::PlaceQuestion> {
-    auto other = see(without_camera(asked), view);
+place::DescribeWithoutCamera see_again(const v1::View& shown, const storage::MapView& view, const Asked& asked,
+                                       SeenView& seen) {
+  if (!shown.has_left() || shown.has_right()) return {};
+  return [&shown, &view, asked, &seen]() -> Result<place::PlaceQuestion> {
+    auto other = see(without_camera(shown), view);
     if (!other.ok()) return other.status();
     seen = std::move(other).value();
-    return question_of(seen, prior);
+    return question_of(seen, asked);
   };
 }
 
@@ -45,6 +53,7 @@ v1::PlaceMatch match_message(const storage::MapView& view, const SeenView& seen,
   v1::PlaceMatch message;
   *message.mutable_frame() = to_wire(match.shown());
   message.set_probability(match.probability);
+  add_correspondences(match.matches, seen.features, seen.sent, *message.mutable_correspondences());
   if (thumbnail)
     if (const auto cold = view.cold(match.shown())) {
       const Bytes small = vision::thumbnail_of(cold->picture);
@@ -80,12 +89,13 @@ Result<std::optional<FrameId>> frame_if_given(const storage::Graph& graph, bool 
 
 }  // namespace
 
-Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& asked,
-                                        std::optional<FrameId> prior, const Deadline& deadline) {
-  auto seen = see(asked, view);
+Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& shown,
+                                        std::optional<FrameId> prior, const Deadline& deadline, bool correspondences) {
+  auto seen = see(shown, view);
   if (!seen.ok()) return seen.status();
   const place::PlaceKnowledge map{view, mapper.places(), mapper.vocabulary()};
-  const auto found = place::localise_features(map, question_of(*seen, prior), see_again(asked, view, prior, *seen),
+  const Asked asked{prior, correspondences};
+  const auto found = place::localise_features(map, question_of(*seen, asked), see_again(shown, view, asked, *seen),
                                               [&] { return deadline.check(); });
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
@@ -102,6 +112,7 @@ Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapV
   reply.set_spread(found->place.spread);
   reply.set_estimated_focal_length(estimated_focal_length(*seen, found->place));
   reply.set_candidates(found->verified_candidates);
+  add_correspondences(found->matches, seen->features, seen->sent, *reply.mutable_correspondences());
   reply.set_map_version(view.version());
   return reply;
 }
@@ -110,7 +121,7 @@ Result<v1::LocaliseReply> localise(const v1::LocaliseRequest& request, const Dea
   const auto view = mapper.view();
   const auto prior = frame_if_given(*view, request.has_prior(), request.prior(), "prior");
   if (!prior.ok()) return prior.status();
-  return localise_view(mapper, *view, request.view(), *prior, deadline);
+  return localise_view(mapper, *view, request.view(), *prior, deadline, request.correspondences());
 }
 
 Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, const Deadline& deadline,
@@ -124,8 +135,9 @@ Result<v1::MatchImageReply> match_image(const v1::MatchImageRequest& request, co
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const place::PlaceKnowledge map{*view, mapper.places(), mapper.vocabulary()};
+  const Asked asked{*near, request.correspondences()};
   const auto found =
-      place::match_features(map, question_of(*seen, *near), see_again(request.view(), *view, *near, *seen), verified,
+      place::match_features(map, question_of(*seen, asked), see_again(request.view(), *view, asked, *seen), verified,
                             [&] { return deadline.check(); });
   if (!found.ok()) return found.status();
   v1::MatchImageReply reply;

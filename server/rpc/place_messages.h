@@ -10,7 +10,8 @@
 namespace relmap::rpc {
 
 // The reasons are those of Map.Localise.
-Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& asked,
-                                        std::optional<FrameId> prior, const Deadline& deadline);
+Result<v1::LocaliseReply> localise_view(map::Mapper& mapper, const storage::MapView& view, const v1::View& shown,
+                                        std::optional<FrameId> prior, const Deadline& deadline,
+                                        bool correspondences = false);
 
 }  // namespace relmap::rpc

@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "proto/wire/convert.h"
 #include "server/route/overlay/route_search.h"
@@ -37,21 +40,26 @@ v1::RouteStep step_message(const route::RouteStep& step, bool covariance) {
   return message;
 }
 
-// The step at which a stream broke, and the fingerprint of its request.
+// The route and the step at which a stream broke, and the fingerprint of its request.
 struct RoutePosition {
-  std::size_t step = 0;
+  std::size_t route = 0, step = 0;
   std::uint32_t fingerprint = 0;
 
-  std::string to_string() const { return std::to_string(step) + "," + std::to_string(fingerprint); }
+  std::string to_string() const {
+    return std::to_string(route) + "," + std::to_string(step) + "," + std::to_string(fingerprint);
+  }
   static std::optional<RoutePosition> parse(const std::string& text) {
-    const std::size_t comma = text.find(',');
-    if (comma == std::string::npos) return std::nullopt;
     RoutePosition position;
-    const auto read = [&](std::size_t begin, std::size_t end, auto& number) {
-      const auto [rest, error] = std::from_chars(text.data() + begin, text.data() + end, number);
-      return error == std::errc{} && rest == text.data() + end;
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    const auto read = [&](auto& number, bool last) {
+      const auto [rest, error] = std::from_chars(at, end, number);
+      if (error != std::errc{} || (last ? rest != end : rest == end || *rest != ',')) return false;
+      at = rest + 1;
+      return true;
     };
-    if (!read(0, comma, position.step) || !read(comma + 1, text.size(), position.fingerprint)) return std::nullopt;
+    if (!read(position.route, false) || !read(position.step, false) || !read(position.fingerprint, true))
+      return std::nullopt;
     return position;
   }
 };
@@ -59,90 +67,105 @@ struct RoutePosition {
 // Charges the memory of a route; drops the least recently used ones to make room.
 Status charge_for(TokenKeeper<FoundRoute>& others, FoundRoute& found) {
   for (;;) {
-    Status charged = found.charge.grow_to(found.answer.route.path.memory_bytes());
+    Status charged = found.charge.grow_to(found.memory_bytes());
     if (charged.ok() || !others.drop_oldest()) return charged;
   }
 }
 
-// Streams a route; the steps are read from the view as the caller takes them.
+// Streams a route, then its alternatives; the steps are read from the view as the caller takes them.
 class RouteStream {
  public:
   RouteStream(Routes& routes, const RpcLimits& limits, std::shared_ptr<const FoundRoute> found, bool covariance,
               const Deadline& deadline)
       : routes_(routes),
         found_(std::move(found)),
-        route_(found_->answer.route),
         deadline_(deadline),
         covariance_(covariance),
         steps_per_message_(covariance ? std::min(limits.route_steps_per_message, kStepsWithCovariancePerMessage)
-                                      : limits.route_steps_per_message),
-        walk_(*found_->view, route_, covariance_) {}
+                                      : limits.route_steps_per_message) {
+    begin(0);
+  }
 
-  // Skips the summary and the steps that an earlier stream has sent.
-  Status skip(std::size_t steps) {
+  // Skips what an earlier stream has sent: all before this step, which is not the first, of this route.
+  Status skip(std::size_t route, std::size_t steps) {
+    begin(route);
     summarised_ = true;
     for (; next_ < steps; ++next_) {
       if (next_ % route::kWorkStride == 0)
         if (Status status = deadline_.check(); !status.ok()) return status;
-      walk_.next();
+      walk_->next();
     }
     return {};
   }
 
   Result<std::optional<v1::FindRouteReply>> take() {
-    if (summarised_ && next_ >= route_.steps()) {
-      routes_.found.end(found_->number);  // with its view, which holds memory for as long as the route is kept
-      return std::optional<v1::FindRouteReply>();
+    if (summarised_ && next_ >= route().steps()) {
+      if (number_ + 1 == found_->routes()) {
+        routes_.found.end(found_->number);  // with its view, which holds memory for as long as the route is kept
+        return std::optional<v1::FindRouteReply>();
+      }
+      begin(number_ + 1);
     }
     v1::FindRouteReply reply;
+    reply.set_route(static_cast<std::uint32_t>(number_));
     if (!summarised_) *reply.mutable_summary() = summary();
     summarised_ = true;
     std::size_t label_bytes = 0;
     while (static_cast<std::size_t>(reply.steps_size()) < steps_per_message_ && label_bytes < kMaxLabelBytes) {
-      const auto step = walk_.next();
+      const auto step = walk_->next();
       if (!step) break;
       for (const std::string& label : step->labels) label_bytes += label.size() + 2;
       *reply.add_steps() = step_message(*step, covariance_);
       ++next_;
     }
-    if (next_ < route_.steps())
+    if (next_ < route().steps() || number_ + 1 < found_->routes())
       reply.set_resume_token(
-          routes_.found.token(found_->number, found_, RoutePosition{next_, found_->fingerprint}.to_string()));
+          routes_.found.token(found_->number, found_, RoutePosition{number_, next_, found_->fingerprint}.to_string()));
     return std::optional(std::move(reply));
   }
 
-  std::optional<v1::LocaliseReply> from_view, to_view;
+  // How the ends were localised that are views.
+  RouteEnds from, to;
 
  private:
+  const route::Route& route() const { return found_->route(number_); }
+  void begin(std::size_t number) {
+    number_ = number;
+    next_ = 0;
+    summarised_ = false;
+    walk_.emplace(*found_->view, route(), covariance_);
+  }
+
   v1::RouteSummary summary() const {
+    const route::Route& route = this->route();
     v1::RouteSummary message;
-    *message.mutable_from() = to_wire(route_.path.from);
-    *message.mutable_to() = to_wire(route_.path.to);
-    message.set_cost(route_.cost);
-    message.set_distance_m(route_.distance_m);
-    message.set_time_s(route_.time_s);
-    message.set_steps(static_cast<std::uint32_t>(route_.steps()));
-    message.set_long_loops(route_.long_loops);
-    for (const route::CarriedStretch& stretch : route_.carried.list())
-      *message.add_carried() = carried_message(stretch);
-    tell_unmeasured(route_.unmeasured, message);
-    message.set_frames_touched(route_.frames_touched);
+    *message.mutable_from() = to_wire(route.path.from);
+    *message.mutable_to() = to_wire(route.path.to);
+    message.set_cost(route.cost);
+    message.set_distance_m(route.distance_m);
+    message.set_time_s(route.time_s);
+    message.set_steps(static_cast<std::uint32_t>(route.steps()));
+    message.set_long_loops(route.long_loops);
+    for (const route::CarriedStretch& stretch : route.carried.list()) *message.add_carried() = carried_message(stretch);
+    tell_unmeasured(route.unmeasured, message);
+    message.set_frames_touched(route.frames_touched);
     message.set_map_version(found_->view->version());
     message.set_frame_by_frame(found_->answer.frame_by_frame);
     message.set_bound_closures(found_->answer.near || !found_->answer.frame_by_frame.empty());
     message.set_no_way_by_edges(found_->answer.no_way_by_edges);
-    if (from_view) *message.mutable_from_view() = *from_view;
-    if (to_view) *message.mutable_to_view() = *to_view;
+    if (number_ > 0) message.set_shared(found_->alternatives[number_ - 1].shared);
+    if (const auto view = from.view_at(route.path.from)) *message.mutable_from_view() = *view;
+    if (const auto view = to.view_at(route.path.to)) *message.mutable_to_view() = *view;
     return message;
   }
 
   Routes& routes_;
   const std::shared_ptr<const FoundRoute> found_;
-  const route::Route& route_;
   const Deadline& deadline_;
   const bool covariance_;
   const std::size_t steps_per_message_;
-  route::RouteWalk walk_;
+  std::size_t number_ = 0;  // of the route that is being sent
+  std::optional<route::RouteWalk> walk_;
   std::size_t next_ = 0;
   bool summarised_ = false;
 };
@@ -152,8 +175,13 @@ Result<Producer<v1::FindRouteReply>> resume(Routes& routes, const RpcLimits& lim
   const auto opened = routes.found.open(request.resume_token());
   if (!opened.ok()) return opened.status();
   const auto position = RoutePosition::parse(opened->position);
-  if (!position || position->step == 0 || position->step >= opened->kept->answer.route.steps())
-    return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
+  const auto is_sent_then = [&] {
+    const FoundRoute& found = *opened->kept;
+    if (position->route >= found.routes() || position->step == 0) return false;
+    const std::size_t steps = found.route(position->route).steps();
+    return position->step < steps || (position->step == steps && position->route + 1 < found.routes());
+  };
+  if (!position || !is_sent_then()) return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
   // The ends may be left out, since the route is known.
   const bool has_ends =
       request.has_from() || request.has_to() || !request.or_from().empty() || !request.or_to().empty();
@@ -161,8 +189,21 @@ Result<Producer<v1::FindRouteReply>> resume(Routes& routes, const RpcLimits& lim
       (has_ends && opened->kept->ends_fingerprint != route_ends_fingerprint(request)))
     return {Reason::INVALID_ARGUMENT, "the resume token is of a request for another route"};
   const auto stream = std::make_shared<RouteStream>(routes, limits, opened->kept, request.covariance(), deadline);
-  if (Status status = stream->skip(position->step); !status.ok()) return status;
+  if (Status status = stream->skip(position->route, position->step); !status.ok()) return status;
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
+}
+
+// Searching for alternatives ends by half of the time that is left, so that what has been found can be told.
+std::vector<route::Alternative> alternatives(const route::RouteIndex::Snapshot& map, const std::vector<FrameId>& from,
+                                             const std::vector<FrameId>& to, const route::RouteOptions& options,
+                                             const route::RouteAnswer& cheapest, std::uint32_t count,
+                                             const Deadline& deadline, storage::Budget& budget,
+                                             const RpcLimits& limits) {
+  const auto now = std::chrono::steady_clock::now();
+  Deadline earlier = deadline;
+  if (deadline.at > now) earlier.at = now + (deadline.at - now) / 2;
+  SearchWork work(budget, limits.max_search_frames, earlier);
+  return route::search_alternatives(map, from, to, options, limits.near_route_steps, cheapest, count, work.limit());
 }
 
 }  // namespace
@@ -198,10 +239,18 @@ Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& requ
   }();
   if (!answer.ok()) return answer.status();
   found->answer = std::move(answer).value();
-  if (Status status = charge_for(routes.found, *found); !status.ok()) return status;
+  if (request.alternatives() > 0) {
+    found->alternatives = alternatives(map, from->frames, to->frames, *options, found->answer, request.alternatives(),
+                                       deadline, mapper.budget(), limits);
+    if (Status status = deadline.check(); !status.ok()) return status;
+  }
+  for (Status status = charge_for(routes.found, *found); !status.ok(); status = charge_for(routes.found, *found)) {
+    if (found->alternatives.empty()) return status;
+    found->alternatives.pop_back();
+  }
   const auto stream = std::make_shared<RouteStream>(routes, limits, found, request.covariance(), deadline);
-  stream->from_view = from->view_at(found->answer.route.path.from);
-  stream->to_view = to->view_at(found->answer.route.path.to);
+  stream->from.seen = from->seen;
+  stream->to.seen = to->seen;
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
 }
 

@@ -6,6 +6,7 @@
 #include "proto/base/bytes.h"
 #include "proto/base/crc32c.h"
 #include "proto/wire/convert.h"
+#include "server/route/alternatives.h"
 #include "server/route/newest_frame.h"
 #include "server/route/refusal.h"
 #include "server/rpc/handlers.h"
@@ -163,6 +164,7 @@ Result<route::RouteOptions> route_options(const storage::Graph& map, const v1::F
   auto filter = filter_of(map, request.filter(), deadline);
   if (!filter.ok()) return filter.status();
   options.filter = std::move(filter).value();
+  if (request.alternatives() > route::kMaxAlternatives) return too_many("alternatives", route::kMaxAlternatives);
   if (!std::isfinite(request.max_cost()) || request.max_cost() < 0)
     return {Reason::INVALID_ARGUMENT, "max_cost must be 0 (no limit) or more"};
   if (request.max_cost() > 0) options.max_cost = request.max_cost();

@@ -79,13 +79,19 @@ struct RpcServer::Impl {
   // The mapper's budget outlives the server: the core holds both.
   Impl(Core& core, const Gatekeeper& gatekeeper, const ServerOptions& options)
       : transport(core.transport),
+        audit(core.audit),
         connections(options.connections),
         gateway(core.limits, core.mapper.budget(), core.metrics, gatekeeper, connections, options.audit) {
     transport = {&connections, &gatekeeper, options.tls_watch, &gateway};
+    audit = {options.audit};
   }
-  ~Impl() { transport = {}; }
+  ~Impl() {
+    transport = {};
+    audit = {};
+  }
 
   Transport& transport;
+  Audit& audit;
   Connections connections;
   Gateway gateway;
   std::vector<std::unique_ptr<grpc::Service>> services;

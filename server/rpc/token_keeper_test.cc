@@ -27,14 +27,14 @@ TEST(TokenKeeper, LetsGoOfWhatWasSentToItsEnd) {
 
 // Whoever never comes back for the rest of a list must not keep the memory of the map's old versions.
 TEST(TokenKeeper, LetsAViewThatWasCutOffGo) {
-  constexpr std::uint32_t kFrames = 100;
+  constexpr std::uint32_t kStored = 100;
   const auto engine = storage::make_memory_engine();
   const auto budget = std::make_shared<storage::Budget>(std::size_t{2} << 20);
   const auto map = storage::Map::open(engine, engine->acquire().value(), budget).value();
   storage::Session session;
   session.number = 1;
   map->add_session(session);
-  for (std::uint32_t i = 0; i < kFrames; ++i) {
+  for (std::uint32_t i = 0; i < kStored; ++i) {
     storage::FrameHot hot;
     hot.present = true;
     hot.landmarks.resize(10);
@@ -47,7 +47,7 @@ TEST(TokenKeeper, LetsAViewThatWasCutOffGo) {
   EXPECT_EQ(keeper.open(token, nullptr).or_throw().position, "position");
   std::vector<std::shared_ptr<const storage::MapView>> others;  // of readers that came later
   while (budget->used(storage::Share::kViews) <= budget->allowance(storage::Share::kViews)) {
-    for (std::uint32_t i = 0; i < kFrames; ++i) map->edit_hot({1, i}).mean_error = static_cast<float>(others.size());
+    for (std::uint32_t i = 0; i < kStored; ++i) map->edit_hot({1, i}).mean_error = static_cast<float>(others.size());
     others.push_back(map->publish());
   }
   EXPECT_EQ(keeper.open(token, nullptr).reason(), Reason::VIEW_EXPIRED);

@@ -86,6 +86,7 @@ Result<SeenView> see(const v1::View& view, const storage::Graph& graph) {
       const bool pair = described->camera.is_stereo();
       SeenView seen{std::move(described->features), described->camera, described->scale, {}, pair, how_known(view)};
       if (view.either_eye() && !view.has_right()) seen.eye_turn = described->eye_turn;
+      seen.sent = described->sent;
       return seen;
     }
     case v1::View::kFrame:

@@ -8,6 +8,7 @@
 #include "proto/geometry/camera.h"
 #include "proto/keyframe/keyframe.h"
 #include "relmap/v1/common.pb.h"
+#include "server/place/picture_query.h"
 #include "server/place/verify.h"
 #include "storage/graph/frame_range.h"
 #include "storage/graph/graph.h"
@@ -22,6 +23,7 @@ struct SeenView {
   bool pair = false;                        // both pictures of a pair were given, and the right one shows something
   place::CameraKnown known = place::CameraKnown::kMeasuredWith;
   Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
+  place::SentPixels sent = {};         // turns pixels of `camera` into those of the given picture
 };
 
 // Decodes and describes pictures, and checks features. INVALID_ARGUMENT (an empty view, a frame with a camera, options

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -83,7 +86,7 @@ class EventLog : public ::testing::Test {
  protected:
   void open(EventLimits limits = {}) {
     writer_ = std::make_unique<EventWriter>(limits);
-    ASSERT_TRUE(writer_->open(*engine_->snapshot()).ok());
+    ASSERT_TRUE(writer_->open(*engine_->snapshot(), last_).ok());
   }
   void SetUp() override { open(); }
 
@@ -270,6 +273,14 @@ TEST_F(EventLog, AFailedCommitLosesNothing) {
   EXPECT_EQ(read({3, kMovedOrdinal}).events.size(), 2u) << "now it did";
 }
 
+TEST_F(EventLog, ACommitThatIsGivenUpLosesNothing) {
+  record(1);
+  begin();
+  record(2);
+  commit();
+  EXPECT_EQ(sequences(), (std::vector<std::uint64_t>{1, 2}));
+}
+
 TEST_F(EventLog, DamageIsAGapOnce) {
   for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
     record(sequence);
@@ -321,6 +332,27 @@ TEST_F(EventLog, ALostHeadIsFoundAgain) {
   commit();
   EXPECT_EQ(sequences(), (std::vector<std::uint64_t>{1, 2, 3, 4}));
   EXPECT_FALSE(read({1, 0}).gap);
+}
+
+// A map is served whatever is wrong with its log.
+TEST_F(EventLog, ThatCannotBeReadBeginsAnew) {
+  record(1);
+  commit();
+  class Unreadable final : public EngineSnapshot {
+   public:
+    std::uint64_t commit_number() const override { return 1; }
+    Result<std::optional<Bytes>> get(std::string_view) const override { return Status(reason, ""); }
+    Status scan_from(std::string_view, std::string_view, const Visit&) const override { return Status(reason, ""); }
+    Reason reason = Reason::DATA_LOSS;
+  } unreadable;
+  writer_ = std::make_unique<EventWriter>(EventLimits());
+  ASSERT_TRUE(writer_->open(unreadable, 1).ok());
+  record(2);
+  commit();
+  EXPECT_TRUE(read({1, 0}).gap) << "what is not known to be there counts as lost";
+  EXPECT_EQ(sequences({1, 0}), std::vector<std::uint64_t>{2});
+  unreadable.reason = Reason::IO_ERROR;
+  EXPECT_EQ(EventWriter({}).open(unreadable, 1).reason(), Reason::IO_ERROR);
 }
 
 }  // namespace

@@ -17,35 +17,39 @@ std::string behind(EventPosition last) { return key_of(last) + '\0'; }
 
 }  // namespace
 
-Status EventWriter::open(const EngineSnapshot& snapshot) {
-  const auto bytes = snapshot.get(keys::all_events());
-  if (bytes.reason() == Reason::IO_ERROR) return bytes.status();
-  if (bytes.ok() && *bytes)
-    if (const auto head = decode_event_head(**bytes); head.ok()) {
+Status EventWriter::open(const EngineSnapshot& snapshot, std::uint64_t applied_sequence) {
+  Status read = [&]() -> Status {
+    const auto bytes = snapshot.get(keys::all_events());
+    if (!bytes.ok()) return bytes.status();
+    const auto head = *bytes ? decode_event_head(**bytes) : Result<EventLogHead>(Status(Reason::DATA_LOSS, ""));
+    if (head.ok())
       head_ = *head;
-      has_head_ = true;
-      const auto oldest = first_behind(snapshot, key_of(head_.oldest));
-      if (!oldest.ok()) return oldest.status();
-      oldest_ = *oldest;
-      return {};
-    }
-  // Without a head there are no blocks either, unless the head was lost.
-  Status scanned = snapshot.scan_from(keys::all_events(), key_of({}), [&](std::string_view key, ByteSpan value) {
+    else if (Status found = find_head(snapshot); !found.ok())
+      return found;
+    has_head_ = head_.newest != EventPosition();
+    if (!has_head_) return {};
+    const auto oldest = first_behind(snapshot, key_of(head_.oldest));
+    if (oldest.ok()) oldest_ = *oldest;
+    return oldest.status();
+  }();
+  if (read.reason() != Reason::DATA_LOSS) return read;
+  // All that was told before counts as lost.
+  has_head_ = true;
+  head_ = {head_.oldest, {applied_sequence, kMovedOrdinal}, head_.bytes_through};
+  return {};
+}
+
+// Without a head there are no blocks either, unless the head was lost.
+Status EventWriter::find_head(const EngineSnapshot& snapshot) {
+  return snapshot.scan_from(keys::all_events(), key_of({}), [this](std::string_view key, ByteSpan value) {
     const auto at = keys::events_of(key);
     if (!at) return true;
-    if (!has_head_) head_.oldest = {at->sequence, at->ordinal};
-    has_head_ = true;
     head_.newest = {at->sequence, at->ordinal};
+    if (head_.oldest == EventPosition()) head_.oldest = head_.newest;
     if (const auto header = decode_event_block_header(value); header.ok())
       head_.bytes_through = std::max(head_.bytes_through, header->bytes_through);
     return true;
   });
-  if (scanned.ok() && has_head_) {
-    const auto oldest = first_behind(snapshot, key_of(head_.oldest));
-    if (!oldest.ok()) return oldest.status();
-    oldest_ = *oldest;
-  }
-  return scanned;
 }
 
 // The first block from `key` on. One that cannot be read is as old as can be.
@@ -55,7 +59,8 @@ Result<std::optional<EventWriter::Oldest>> EventWriter::first_behind(const Engin
   const Status scanned = snapshot.scan_from(keys::all_events(), key, [&](std::string_view at, ByteSpan value) {
     const auto last = keys::events_of(at);
     if (!last) return true;
-    found.emplace().last = {last->sequence, last->ordinal};
+    found = Oldest();
+    found->last = {last->sequence, last->ordinal};
     if (const auto header = decode_event_block_header(value); header.ok()) {
       found->time_us = header->time_us;
       found->bytes_before = header->bytes_through - std::min<std::uint64_t>(header->bytes_through, value.size());
@@ -104,6 +109,7 @@ std::vector<FrameRange> EventWriter::moved_ranges(const Kept& kept) {
 
 void EventWriter::begin_commit(const EngineSnapshot& snapshot, std::uint64_t applied_sequence, std::int64_t now_us,
                                std::vector<Put>& puts, std::vector<std::string>& deletes) try {
+  failed();  // a commit that was given up before it began
   begun_ = Begun{std::exchange(kept_, {}), has_head_, head_, oldest_};
   // Given back as it was if the commit fails, so the last block is not the one to which this is added.
   std::optional<EventBlock> last;

@@ -22,8 +22,9 @@ class EventWriter {
  public:
   explicit EventWriter(EventLimits limits) : limits_(limits) {}
 
-  // Goes on behind what the log has. Where the log's head is lost, it is found again from the blocks. IO_ERROR.
-  Status open(const EngineSnapshot& snapshot);
+  // Goes on behind what the log has. Where the log's head is lost, it is found again from the blocks; where these
+  // cannot be read either, the log begins anew behind `applied_sequence`, that of the last commit. IO_ERROR.
+  Status open(const EngineSnapshot& snapshot, std::uint64_t applied_sequence);
 
   // Keeps an event for the next commit. Events ascend.
   void record(const Event& event);
@@ -37,7 +38,8 @@ class EventWriter {
   // commit. What is kept from now on goes to the commit after this.
   void begin_commit(const EngineSnapshot& snapshot, std::uint64_t applied_sequence, std::int64_t now_us,
                     std::vector<Put>& puts, std::vector<std::string>& deletes);
-  // The outcome of the commit that was begun. If it failed, what it told is told by the next one.
+  // The outcome of the commit that was begun. If it failed, what it told is told by the next one; without an outcome,
+  // it failed.
   void committed();
   void failed();
 
@@ -58,6 +60,7 @@ class EventWriter {
     std::uint64_t bytes_before = 0;  // EventBlockHeader::bytes_through of the block before it
   };
 
+  Status find_head(const EngineSnapshot& snapshot);
   static void add_frame(Frames& frames, FrameId id);
   static std::vector<FrameRange> moved_ranges(const Kept& kept);
   bool is_too_old(const Oldest& oldest, std::int64_t now_us) const;

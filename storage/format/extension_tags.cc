@@ -60,6 +60,25 @@ bool take_carried(Extensions& extensions, FrameRange& carried) {
          carried.last - carried.first <= kMaxFrames;
 }
 
+void add_closure_tests(Extensions& extensions, const ClosureTests& tests) {
+  if (tests == ClosureTests()) return;
+  ByteWriter w;
+  w.put(tests.opposing);
+  w.put(static_cast<std::uint8_t>(tests.motion));
+  w.put(tests.motion_sigma);
+  add_extension(extensions, kEvidence, w.take());
+}
+
+bool take_closure_tests(Extensions& extensions, ClosureTests& tests) {
+  const auto bytes = take_extension(extensions, kEvidence);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  tests.opposing = r.get<std::uint16_t>();
+  tests.motion = r.get<MotionSays>();
+  tests.motion_sigma = r.get<float>();
+  return r.at_end() && tests.motion <= MotionSays::kContradicts && tests.motion_sigma >= 0;
+}
+
 void add_way_around(Extensions& extensions, const WayAround* around) {
   if (!around) return;
   ByteWriter w;
@@ -157,6 +176,21 @@ bool take_shown(Extensions& extensions, std::uint64_t& shown) {
   ByteReader r(*bytes);
   shown = r.get<std::uint64_t>();
   return r.at_end() && shown != 0;
+}
+
+void add_digests_commit(Extensions& extensions, std::uint64_t commit) {
+  if (commit == 0) return;
+  ByteWriter w;
+  w.put(commit);
+  add_extension(extensions, kDigests, w.take());
+}
+
+bool take_digests_commit(Extensions& extensions, std::uint64_t& commit) {
+  const auto bytes = take_extension(extensions, kDigests);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  commit = r.get<std::uint64_t>();
+  return r.at_end() && commit != 0;
 }
 
 void add_edit_key(Extensions& extensions, const EditKey& edit) {

@@ -18,13 +18,16 @@ namespace relmap::storage::tags {
 inline constexpr std::uint32_t kUniqueness = 1;  // of an edge, or a proposal
 inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: true if present; no bytes
 inline constexpr std::uint32_t kCarried = 3;  // of a closure: the frames along which it says that the robot was carried
-inline constexpr std::uint32_t kAlone = 25;   // of an edit of an edge: it concerns this edge only; no bytes
+inline constexpr std::uint32_t kEvidence = 22;      // of a closure: what the judgements of closures found out about it
+inline constexpr std::uint32_t kAlone = 25;         // of an edit of an edge: it concerns this edge only; no bytes
 inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state that it had before it was frozen
 inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a mark of what it may remove
 inline constexpr std::uint32_t kWayAround = 28;     // of a closure, or a proposal
 inline constexpr std::uint32_t kUnseen = 29;        // of a closure: frames that saw nothing of where it leads
 inline constexpr std::uint32_t kUnseenPlace = 30;   // of a proposal: the closure of whose place the query saw nothing
 inline constexpr std::uint32_t kEditKey = 31;       // of an edit in the journal: by what its caller names it
+
+inline constexpr std::uint32_t kDigests = 36;  // of the map's state: the commit as of which its digests are right
 
 // These tags say how the map came about, so map hashes leave them out. kOwner is reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
@@ -35,24 +38,28 @@ inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kA
 // They write nothing where the value is unknown or the default.
 void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
+void add_closure_tests(Extensions& extensions, const ClosureTests& tests);
 void add_way_around(Extensions& extensions, const WayAround* around);  // nullptr: there is none
 void add_unseen(Extensions& extensions, const std::vector<std::uint32_t>& unseen);
 void add_unseen_place(Extensions& extensions, ClosureId closure);  // invalid: there is none
 void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
+void add_digests_commit(Extensions& extensions, std::uint64_t commit);
 void add_edit_key(Extensions& extensions, const EditKey& edit);
 void add_submission(Extensions& extensions, std::int64_t time_us, const std::string& author);
 void add_submissions(Extensions& extensions, const std::vector<EdgeEvent>& history);
 // They return false if the extension is malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
+bool take_closure_tests(Extensions& extensions, ClosureTests& tests);
 bool take_way_around(Extensions& extensions, std::shared_ptr<const WayAround>& around);
 bool take_unseen(Extensions& extensions, std::vector<std::uint32_t>& unseen);
 bool take_unseen_place(Extensions& extensions, ClosureId& closure);
 bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
 bool take_shown(Extensions& extensions, std::uint64_t& shown);
+bool take_digests_commit(Extensions& extensions, std::uint64_t& commit);
 bool take_edit_key(Extensions& extensions, EditKey& edit);
 bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string& author);
 // Of the history as it was read. What is said of an event that it no longer has is dropped.

@@ -79,6 +79,7 @@ Extensions edge_extensions(const Edge& e) {
   Extensions all = e.unknown;
   tags::add_uniqueness(all, e.uniqueness);
   tags::add_carried(all, e.carried);
+  tags::add_closure_tests(all, e.tests);
   tags::add_way_around(all, e.around.get());
   tags::add_unseen(all, e.unseen);
   tags::add_submissions(all, e.history);
@@ -201,8 +202,8 @@ Edge get_edge(ByteReader& r, FrameId id) {
   if (flag(byte, 7)) {
     e.unknown = get_extensions(r);
     if (!tags::take_uniqueness(e.unknown, e.uniqueness) || !tags::take_carried(e.unknown, e.carried) ||
-        !tags::take_way_around(e.unknown, e.around) || !tags::take_unseen(e.unknown, e.unseen) ||
-        !tags::take_submissions(e.unknown, e.history))
+        !tags::take_closure_tests(e.unknown, e.tests) || !tags::take_way_around(e.unknown, e.around) ||
+        !tags::take_unseen(e.unknown, e.unseen) || !tags::take_submissions(e.unknown, e.history))
       spend(r);
   }
   return e;

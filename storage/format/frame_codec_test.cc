@@ -74,6 +74,7 @@ Bytes dumped(const FrameHot& f) {
     w.put(e.carried.session), w.put(e.carried.first), w.put(e.carried.last), dump_ids(w, e.carried_by),
         dump(w, e.unknown);
     w.put(e.unseen.size()), w.put_array(e.unseen.data(), e.unseen.size());
+    w.put(e.tests.opposing), w.put(e.tests.motion), w.put(e.tests.motion_sigma);
     w.put(e.around != nullptr);
     if (e.around) dump(w, e.around->from), dump(w, e.around->T), w.put_array(e.around->covariance.data(), 36);
     for (const EdgeEvent& event : e.history) {
@@ -175,6 +176,7 @@ TEST(FrameCodec, WritesRoundedEstimatesInAThirdOfTheBytes) {
   edge.carried_by.clear();
   edge.around.reset();
   edge.unseen.clear();
+  edge.tests = {};
   edge.unknown.clear();
   const std::size_t before = encoded(hot).size();
   round_estimates(hot);

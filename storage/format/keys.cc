@@ -46,7 +46,7 @@ std::string escaped(std::string_view label) {
 
 }  // namespace
 
-bool is_known(char first) { return std::string_view("\0msgqhwcvlie", 12).find(first) != std::string_view::npos; }
+bool is_known(char first) { return std::string_view("\0msgqhwcvlide", 13).find(first) != std::string_view::npos; }
 
 std::string map_state() { return "m"; }
 
@@ -102,6 +102,13 @@ std::string pending(ChunkId id) { return chunk_key(all_pending(), id); }
 std::string_view all_pending() { return "q"; }
 std::optional<ChunkId> pending_of(std::string_view key) {
   if (key.size() != kChunkKey) return std::nullopt;
+  return ChunkId{get_u32(key.substr(1)), get_u32(key.substr(5))};
+}
+
+std::string digests(ChunkId id) { return chunk_key(all_digests(), id); }
+std::string_view all_digests() { return "d"; }
+std::optional<ChunkId> digests_of(std::string_view key) {
+  if (key.size() != kChunkKey || !key.starts_with(all_digests())) return std::nullopt;
   return ChunkId{get_u32(key.substr(1)), get_u32(key.substr(5))};
 }
 

@@ -33,6 +33,11 @@ std::string pending(ChunkId id);
 std::string_view all_pending();
 std::optional<ChunkId> pending_of(std::string_view key);
 
+// The digests of a chunk.
+std::string digests(ChunkId id);
+std::string_view all_digests();
+std::optional<ChunkId> digests_of(std::string_view key);
+
 // The name of an edit, by the edit's sequence in the journal.
 std::string edit(std::uint64_t sequence);
 std::string_view all_edits();

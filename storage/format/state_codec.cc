@@ -191,6 +191,7 @@ Bytes encode_state(const MapState& s) {
   w.put(s.idle_records);
   Extensions extensions = s.unknown;
   tags::add_map_identity(extensions, s.identity);
+  tags::add_digests_commit(extensions, s.digests_commit);
   put_extensions(w, extensions);
   return seal(kStateKind, kStateVersion, w.bytes());
 }
@@ -206,7 +207,8 @@ Result<MapState> decode_state(ByteSpan bytes) {
   if (sealed->version > kFormat2) s.idle_records = r.get<std::uint32_t>();
   if (sealed->version == kStateVersion) {
     s.unknown = get_extensions(r);
-    if (!tags::take_map_identity(s.unknown, s.identity)) return malformed("state");
+    if (!tags::take_map_identity(s.unknown, s.identity) || !tags::take_digests_commit(s.unknown, s.digests_commit))
+      return malformed("state");
   }
   if (!r.at_end() || sealed->kind != kStateKind) return malformed("state");
   s.lookups = {lookups.begin(), lookups.end()};

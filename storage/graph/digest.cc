@@ -59,6 +59,7 @@ ClosureDigest digest_of(const Edge& closure) {
       .decided = std::any_of(closure.history.begin(), closure.history.end(), by_operator),
       .carried = closure.carried.session != 0,
       .uniqueness = closure.uniqueness,
+      .tests = closure.tests,
   };
 }
 

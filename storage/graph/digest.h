@@ -34,6 +34,7 @@ struct ClosureDigest {
   bool decided = false;           // an operator accepted it
   bool carried = false;           // it says that the robot was carried
   Uniqueness uniqueness = {};
+  ClosureTests tests = {};
 };
 
 // A frame and its motion.
@@ -56,6 +57,9 @@ struct ChunkDigest {
   ChunkId id;
   std::vector<FrameDigest> frames;  // those that are present, ascending by slot
 };
+
+// Which frames of a chunk are asked for: of a map without closures, none need be decoded to see that there are none.
+enum class DigestsOf : std::uint8_t { kAll, kClosures };  // closures: frames with closures, candidate or not
 
 // How far the estimate of a closure has moved away from what was measured, in standard deviations of the measurement:
 // the root of the squared Mahalanobis distance. 0 if the covariance cannot be used, or there is no metric measurement.

@@ -76,6 +76,23 @@ struct Uniqueness {
   bool operator==(const Uniqueness&) const = default;
 };
 
+// What the robot's own motion said of a closure when it was judged (server/map/consistency.h).
+enum class MotionSays : std::uint8_t { kNothing = 0, kAgrees = 1, kContradicts = 2 };
+
+// What the judgements of closures found out about one of them, beyond those that agree with it: by its own, and by
+// those of later closures. It is told to people and decides nothing.
+struct ClosureTests {
+  // Number of closures that contradicted it and with which no third one in force reconciled it, each counted when the
+  // later of the two was judged.
+  std::uint16_t opposing = 0;
+  MotionSays motion = MotionSays::kNothing;
+  // Of kAgrees and kContradicts: how well the motion tells where the closure's ends lie, one standard deviation,
+  // metres.
+  float motion_sigma = 0;
+
+  bool operator==(const ClosureTests&) const = default;
+};
+
 // What the map says, by a closure and a way that does not lead through a stop, of the motion of the session that made
 // the closure. The odometry between the two frames leads through a stop: the robot may have been carried there
 // (server/map/way_around.h). It is what the map said when the closure was proposed, and is not changed later.
@@ -130,6 +147,8 @@ struct Edge {
   // Indices, ascending, of frames that its newer end's session took after it, from where landmarks around its older end
   // should have been seen, and none was (server/map/unseen.h). kMaxUnseen at most.
   std::vector<std::uint32_t> unseen;
+
+  ClosureTests tests;
 
   // Of a closure that agrees with others and not with the odometry of its newer end's session: it says that the robot
   // was carried somewhere between the frames `first` and `last`. Session 0: it says nothing of the kind.

@@ -45,6 +45,9 @@ struct MapState : MapFacts {
   std::set<FrameId> lookups;       // frames that are applied but not looked up yet; the next start goes on with them
   std::uint32_t idle_records = 0;  // records of idle work since the last record that could cause some
   Extensions unknown;              // from a later version, kept unchanged
+  // The commit as of which the stored digests are right (storage/graph/digest.h); 0: none. A program that knows nothing
+  // of digests keeps the number, and commits: from then on it is not that of the last commit.
+  std::uint64_t digests_commit = 0;
 };
 
 }  // namespace relmap::storage

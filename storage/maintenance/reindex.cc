@@ -33,6 +33,7 @@ class Reindexer {
     const StoredSessions stored = load_sessions(*snapshot_);
     check(stored);
     state_ = stored.state.value_or(MapState{});
+    digests_hold_ = state_.digests_commit == last_commit_;
     summary_.former_crc = state_.vocabulary_crc;
     summary_.frames = state_.keyframes;
     if (summary_.frames == 0 || state_.vocabulary_crc == vocabulary_crc) return summary_;
@@ -59,6 +60,7 @@ class Reindexer {
   void say_vocabulary(std::uint32_t crc) {
     if (state_.vocabulary_crc == crc) return;
     state_.vocabulary_crc = crc;
+    state_.digests_commit = digests_hold_ ? last_commit_ + 1 : 0;  // they have nothing to do with words
     commit({{keys::map_state(), encode_state(state_)}}, {});
   }
 
@@ -129,6 +131,7 @@ class Reindexer {
   const std::shared_ptr<const EngineSnapshot> snapshot_;
   MapState state_;
   std::uint64_t epoch_ = 0, last_commit_ = snapshot_->commit_number();
+  bool digests_hold_ = false;
   ReindexSummary summary_;
 };
 

@@ -1,5 +1,6 @@
 #include "storage/maintenance/repair.h"
 
+#include "storage/maintenance/digest_check.h"
 #include "storage/maintenance/mend.h"
 #include "storage/maintenance/quarantine.h"
 #include "storage/maintenance/rebuild.h"
@@ -24,6 +25,7 @@ class Repair {
   RepairSummary run() {
     if (verified({}) == 0) return summary_;
     epoch_ = engine_->acquire().or_throw();
+    find_wrong_digests();
     throw_if(rewrite_broken_parts(*engine_, epoch_, quarantine_, summary_, on_finding_, on_progress_));
     {
       const auto map = open();
@@ -43,12 +45,30 @@ class Repair {
       summary_.changed = summary_.changed || rebuilt > 0;
       summary_.rebuilt += rebuilt;
     }
+    rebuild_digests();
     summary_.remaining = verified(on_finding_);
     if (quarantine_.used()) summary_.quarantine = quarantine_.directory();
     return summary_;
   }
 
  private:
+  // Before anything is rewritten: then the digests are those of an earlier commit.
+  void find_wrong_digests() {
+    const auto tell = [&](Finding finding) {
+      finding.repaired = true;
+      if (on_finding_) on_finding_(finding);
+    };
+    wrong_digests_ = check_digests(*engine_->snapshot(), tell, on_progress_);
+    summary_.changed = summary_.changed || wrong_digests_ > 0;
+    summary_.rebuilt += wrong_digests_;
+  }
+  void rebuild_digests() {
+    const auto map = open();
+    if (map->digests_hold() && wrong_digests_ == 0) return;
+    throw_if(map->rebuild_digests([&](std::uint64_t done, std::uint64_t total) {
+      return !on_progress_ || on_progress_({"making digests", done, total, "frames"});
+    }));
+  }
   std::uint64_t verified(const OnFinding& on_finding) {
     const auto summary = verify(*engine_->snapshot(), verify_options_, on_finding, on_progress_).or_throw();
     if (!summary.complete)
@@ -65,7 +85,7 @@ class Repair {
   const VerifyOptions verify_options_;
   const OnFinding& on_finding_;
   const OnProgress& on_progress_;
-  std::uint64_t epoch_ = 0;
+  std::uint64_t epoch_ = 0, wrong_digests_ = 0;
   RepairSummary summary_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "storage/format/keys.h"
 #include "storage/journal/journal_record.h"
+#include "storage/maintenance/digest_check.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/recount.h"
 #include "storage/maintenance/references.h"
@@ -105,6 +106,7 @@ class Verifier {
       for_each_part<FrameHot>(snapshot_, number, span(number), [&](StoredPart<FrameHot> part) {
         std::uint64_t present = 0;
         for (const PartDamage& damage : part.damage) find_damage(damage);
+        if (chosen(number)) digests_.check(part);
         for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
           if (!part.frames[slot]) continue;
           ++done;
@@ -115,6 +117,7 @@ class Verifier {
         progress("hot parts", done);
         return true;
       });
+    digests_.check_others(table_);
   }
   void check_frame(FrameId id, const FrameHot& frame) {
     ++summary_.frames;
@@ -376,6 +379,8 @@ class Verifier {
   const OnDifference& on_difference_;
   const StoredSessions stored_;
   const StoredGraph graph_;
+  const DigestCheck digests_{snapshot_, stored_.state,
+                             [this](const Finding& finding) { find(finding.reason, finding.frame, finding.what); }};
   SightedPaths paths_{graph_};
   std::vector<SessionNumber> numbers_;  // of sessions that have a record, or frames
   ChunkTable table_;

@@ -8,9 +8,13 @@
 #include <functional>
 #include <random>
 
+#include "storage/format/digest_codec.h"
 #include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/maintenance/stored_hash.h"
+#include "storage/maintenance/stored_sessions.h"
 #include "storage/maintenance/testing/driven_map.h"
+#include "storage/testing/digest_oracle.h"
 
 namespace relmap::storage {
 namespace {
@@ -231,6 +235,53 @@ std::vector<HandMadeFault> hand_made_faults() {
   };
 }
 
+// Changes stored digests by hand, in a commit that says that they are right.
+TEST_F(Verify, DigestsThatDoNotFollowFromTheFramesAreNamedAndMadeAnew) {
+  const DigestsByChunk sound_digests = digests_of_frames(*open_map(engine)->view());
+  const ChunkId first{1, 0}, second{1, 1}, last{1, 2}, none{1, 7};
+  const auto record = [&](ChunkId id) { return *engine->snapshot()->get(keys::digests(id)).or_throw(); };
+  ChunkDigest digests;
+  ASSERT_TRUE(decode_digests(record(first), first, digests).ok());
+  digests.frames.at(5).time_us += 1;
+  digests.frames.erase(digests.frames.begin() + 9);
+  Bytes damaged = record(second);
+  damaged[40] ^= 1;
+  MapState state = *load_sessions(*engine->snapshot()).state;
+  ASSERT_EQ(state.digests_commit, engine->snapshot()->commit_number());
+  ++state.digests_commit;
+  ChunkDigest stray = digests;
+  stray.id = none;
+  const std::vector<Put> puts{{keys::digests(first), digest_bytes(digests)},
+                              {keys::digests(second), damaged},
+                              {keys::digests(none), digest_bytes(stray)},
+                              {keys::map_state(), encode_state(state)}};
+  const std::vector<std::string> deletes{keys::digests(last)};
+  ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), puts, deletes).ok());
+
+  const Verified broken = found();
+  EXPECT_EQ(broken.findings.size(), 5u) << ::testing::PrintToString(broken.findings);
+  for (const char* what : {"digest of frame 1:5:", "digest of frame 1:9:", "digests of chunk 1:1: CORRUPT",
+                           "digests of chunk 1:2: missing", "digests of chunk 1:7: there is no such chunk"})
+    EXPECT_TRUE(broken.names(what)) << what << " in " << ::testing::PrintToString(broken.findings);
+  std::vector<std::string> told;
+  const auto repaired =
+      repair(engine, "/nonexistent", {}, [&](const Finding& finding) { told.push_back(finding.what); }, {});
+  ASSERT_TRUE(repaired.ok()) << repaired.status().to_string();
+  EXPECT_TRUE(repaired->changed);
+  EXPECT_EQ(repaired->rebuilt, 5u);
+  EXPECT_EQ(repaired->remaining, 0u);
+  EXPECT_EQ(told, broken.findings);
+  EXPECT_THAT(found().findings, IsEmpty());
+  EXPECT_TRUE(open_map(engine)->digests_hold());
+  EXPECT_EQ(digests_visited(*open_map(engine)->view()), sound_digests);
+}
+
+TEST_F(Verify, DigestsOfAnEarlierCommitAreNoFinding) {
+  const std::vector<std::string> deletes{keys::digests({1, 0})};
+  ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), {}, deletes).ok());
+  EXPECT_THAT(found().findings, IsEmpty());
+}
+
 class VerifyFault : public Verify, public ::testing::WithParamInterface<HandMadeFault> {};
 
 TEST_P(VerifyFault, IsNamedAndRepaired) {
@@ -247,6 +298,8 @@ TEST_P(VerifyFault, IsNamedAndRepaired) {
   EXPECT_EQ(repaired->remaining, 0u);
   EXPECT_THAT(found().findings, IsEmpty());
   EXPECT_THAT(map::derived_differences(*open_map(engine)->view()), IsEmpty());
+  EXPECT_TRUE(open_map(engine)->digests_hold());
+  EXPECT_EQ(digests_visited(*open_map(engine)->view()), digests_of_frames(*open_map(engine)));
   if (GetParam().oracle) {
     EXPECT_EQ(hash_map(*open_map(engine)), hash_map(*open_map(sound())));
   }

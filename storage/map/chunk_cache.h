@@ -68,6 +68,8 @@ class ChunkCache {
   void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot, std::span<const Written<FrameWarm>> warm,
                  std::span<const std::shared_ptr<const Session>> sessions);
 
+  const std::shared_ptr<Budget>& budget() const { return budget_; }
+
   // Drops the least recently used entries that are not held until the cache keeps to its allowance.
   void evict();
   void clear();

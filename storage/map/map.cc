@@ -52,8 +52,9 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
     if (!decoded.ok()) return lost("the map's state", decoded.status());
     impl->state = std::move(*decoded);
   }
+  impl->digests_hold = impl->state.digests_commit == snapshot.commit_number();
   impl->events = EventWriter(events);
-  if (Status told = impl->events.open(snapshot); !told.ok()) return told;
+  if (Status told = impl->events.open(snapshot, impl->state.applied_sequence); !told.ok()) return told;
   Status failed;
   // An edit that cannot be read is forgotten: it is an answer to a question that will hardly be asked.
   throw_if(snapshot.scan(keys::all_edits(), [&](std::string_view key, ByteSpan value) {
@@ -325,6 +326,8 @@ Status Map::commit() {
   if (Status begun = impl_->begin_commit({}); !begun.ok()) return begun;
   return *impl_->finish_commit();
 }
+bool Map::digests_hold() const { return impl_->digests_hold; }
+Status Map::rebuild_digests(const DigestProgress& progress) { return impl_->rebuild_digests(progress); }
 Status Map::begin_commit(std::function<void()> written) { return impl_->begin_commit(std::move(written)); }
 std::optional<Status> Map::finish_commit() { return impl_->finish_commit(); }
 bool Map::commit_is_due() const {

@@ -14,6 +14,7 @@
 #include "storage/format/frame_codec.h"
 #include "storage/format/keys.h"
 #include "storage/format/state_codec.h"
+#include "storage/map/digest_records.h"
 #include "storage/map/map_impl.h"
 #include "storage/map/pending_frames.h"
 
@@ -47,12 +48,20 @@ struct Map::Impl::Batch {
   };
   std::vector<Part<FrameHot>> hot;
   std::vector<Part<FrameWarm>> warm;
+  std::vector<std::pair<ChunkId, std::size_t>> digests;  // ascending: where their puts are
+
+  // The record of the chunk's digests that this commit writes; nullptr if it writes none.
+  const Bytes* find_digests(ChunkId id) const {
+    const auto at = std::lower_bound(digests.begin(), digests.end(), std::pair(id, std::size_t{0}));
+    return at != digests.end() && at->first == id ? &puts[at->second].value : nullptr;
+  }
 
   void put(std::string key, Bytes value) { puts.push_back({std::move(key), std::move(value)}); }
 
   void append(Batch&& other) {
     for (auto& part : other.hot) hot.push_back(std::move(part).after(puts.size()));
     for (auto& part : other.warm) warm.push_back(std::move(part).after(puts.size()));
+    for (const auto& [id, put] : other.digests) digests.emplace_back(id, puts.size() + put);
     std::move(other.puts.begin(), other.puts.end(), std::back_inserter(puts));
     std::move(other.deletes.begin(), other.deletes.end(), std::back_inserter(deletes));
   }
@@ -143,9 +152,40 @@ void Map::Impl::write_removal(Batch& batch, ChunkId id) {
   batch.warm.push_back({id, true, batch.puts.size(), batch.puts.size(), {}});
   batch.deletes.push_back(keys::part(Part::kHot, id));
   batch.deletes.push_back(keys::part(Part::kWarm, id));
+  batch.deletes.push_back(keys::digests(id));
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
     for (const Part part : {Part::kHot, Part::kWarm, Part::kCold, Part::kWords})
       batch.deletes.push_back(keys::frame(part, frame_in(id, slot)));
+}
+
+// Writes the digests of a chunk of which hot frames are dirty: those of the others are copied from the record as the
+// commit before leaves it.
+void Map::Impl::write_digests(Batch& batch, ChunkId id, bool existed, const WorkingChunk& chunk) {
+  if (!digests_hold || !any(chunk.hot.frames)) return;
+  HotFrames edited;
+  std::copy(chunk.hot.frames.begin(), chunk.hot.frames.end(), edited.begin());
+  std::optional<Bytes> stored;
+  const Bytes* record = committing ? committing->batch->find_digests(id) : nullptr;
+  if (!record && existed) {
+    stored = snapshot->get(keys::digests(id)).or_throw();
+    if (stored) record = &*stored;
+  }
+  auto before = record ? unpack_digests(*record, id) : Result<PackedDigests>(PackedDigests{});
+  if (existed && (!record || !before.ok())) {  // it is lost, and made anew
+    before = PackedDigests{};
+    const WorkingChunk* writing = find_writing(id);
+    const HotFrames committed = readable_frames(*cache->part<FrameHot>(*snapshot, id));
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+      if (edited[slot]) continue;
+      edited[slot] = writing && writing->hot.frames[slot] ? writing->hot.frames[slot] : committed[slot];
+    }
+  }
+  if (auto written = digest_record(id, *before, edited)) {
+    batch.digests.emplace_back(id, batch.puts.size());
+    batch.put(keys::digests(id), *std::move(written));
+  } else {
+    batch.deletes.push_back(keys::digests(id));
+  }
 }
 
 void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
@@ -177,6 +217,7 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   const bool existed = before && before->frames > 0 && id.chunk <= chunk_of({id.session, before->last});
   const bool was_open = existed && is_open(*before);
   const bool open = is_open(*session(id.session));
+  write_digests(batch, id, existed, chunk);
   if (open) {
     write_frames(batch, id, !existed, chunk.hot);
     write_frames(batch, id, !existed, chunk.warm);
@@ -224,6 +265,7 @@ void Map::Impl::write_rest(Batch& batch) {
       batch.deletes.push_back(keys::edit(sequence));
   }
   write_pending(state.pending, batch.puts, batch.deletes);
+  state.digests_commit = digests_hold ? batch.number : 0;
   batch.puts.push_back({keys::map_state(), encode_state(state)});
 }
 

@@ -71,6 +71,7 @@ struct Map::Impl {
   std::map<std::uint64_t, EditKey> edits;
   std::set<std::uint64_t> changed_edits;  // remembered or forgotten since the last commit was begun
   MapState state;
+  bool digests_hold = false;      // the digests in the snapshot are right, and commits keep them so
   EventWriter events{{}};
   std::size_t event_bytes = 0;    // part of dirty_bytes: what the next commit tells
   std::size_t dirty_bytes = 0;    // charged, including what a commit is writing
@@ -148,12 +149,14 @@ struct Map::Impl {
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
   std::shared_ptr<const Session> last_committed(SessionNumber number) const;
   void write_chunk(Batch& batch, ChunkId id);
+  void write_digests(Batch& batch, ChunkId id, bool existed, const WorkingChunk& chunk);
   void write_removal(Batch& batch, ChunkId id);
   void write_chunks(Batch& batch, std::span<const ChunkId> chunks);
   void write_all(Batch& batch);
   void write_rest(Batch& batch);
   Status begin_commit(std::function<void()> written);
   std::optional<Status> finish_commit();
+  Status rebuild_digests(const DigestProgress& progress);
   void complete(Commit& commit) noexcept;  // the engine has it
   void restore(Commit& commit) noexcept;   // it failed: what it held is dirty again
 };

@@ -119,6 +119,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts.version = ++version;
   parts.cache = cache;
   parts.snapshot = snapshot;
+  parts.digests_hold = digests_hold;
   parts.dirty = published_dirty;
   parts.sessions = published_sessions;
   parts.session_counts = session_counts;

@@ -5,7 +5,12 @@
 #include <map>
 
 #include "storage/engine/memory_engine.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/digest_codec.h"
+#include "storage/format/frame_codec.h"
 #include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
+#include "storage/testing/digest_oracle.h"
 #include "storage/testing/fault_engine.h"
 #include "storage/testing/forgetful_files.h"
 #include "storage/testing/random_frames.h"
@@ -47,6 +52,34 @@ struct MapTest : ::testing::Test {
     return count;
   }
 };
+
+TEST_F(MapTest, EventsAreChargedUntilTheyAreCommittedAndSurviveAFailedCommit) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(3), faults).value();
+  epoch = engine->acquire().value();
+  const auto map = open();
+  const std::size_t before = budget->used(Share::kDirty);
+  const auto record = [&](std::uint64_t sequence) {
+    map->record({{sequence, 0}, {}, std::string(1000, 'n'), ClosureRemovedEvent{{{1, 2}, 3}}});
+    map->note_moved({1, 7});
+    map->state().applied_sequence = sequence;
+  };
+  record(1);
+  EXPECT_GT(budget->used(Share::kDirty), before + 1000);
+  EXPECT_EQ(map->dirty_bytes(), budget->used(Share::kDirty) - before);
+  faults->commits = 1;
+  EXPECT_FALSE(map->commit().ok());
+  record(2);
+  EXPECT_GT(budget->used(Share::kDirty), before + 2000);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(budget->used(Share::kDirty), before);
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+  const EventsRead read = read_events(*map->view()->committed(), {}, 1u << 20).value();
+  ASSERT_EQ(read.events.size(), 3u);
+  EXPECT_EQ(read.events[0].at, (EventPosition{1, 0}));
+  EXPECT_EQ(read.events[1].at, (EventPosition{2, 0}));
+  EXPECT_EQ(read.events[2].at, (EventPosition{2, kMovedOrdinal}));
+}
 
 TEST_F(MapTest, SkippedSequencesAreFoundBySequence) {
   auto map = open();
@@ -288,6 +321,9 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
         break;
       case 3:
         map->publish();
+        if (step % 10 == 0) {
+          EXPECT_EQ(digests_visited(*map->view()), digests_of_frames(*map->view()));
+        }
         break;
       default: {
         const FrameId id{number, index > 0 ? random.below(index + 1) : 0};
@@ -302,10 +338,14 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
       ASSERT_TRUE(map->commit().ok());
       const MapHash before = hash_map(*map);
       EXPECT_EQ(hash_map(*map->view()), before);
+      const DigestsByChunk digests = digests_of_frames(*map->view());
+      EXPECT_EQ(digests_visited(*map->view()), digests);
       const MapState state = map->state();
       map.reset();
       map = open();
       ASSERT_EQ(hash_map(*map), before) << step;
+      EXPECT_TRUE(map->digests_hold());
+      EXPECT_EQ(digests_visited(*map->view()), digests);
       EXPECT_EQ(map->state().pending, state.pending);
       EXPECT_EQ(map->state().applied_sequence, state.applied_sequence);
     }
@@ -317,7 +357,8 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
                   ->scan("",
                          [&](std::string_view key, ByteSpan) {
                            const auto part = keys::part_of(key);
-                           left += part && part->chunk.session == 3;
+                           const auto digests = keys::digests_of(key);
+                           left += (part && part->chunk.session == 3) || (digests && digests->session == 3);
                            return true;
                          })
                   .ok());
@@ -400,12 +441,18 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
   for (const SessionNumber number : {1u, 2u}) begin(*map, number);
   for (std::uint32_t i = 0; i < 600; ++i) add(*map, {2, i});
   std::uint32_t frames = 0, failures = 0;
-  std::vector<std::pair<std::shared_ptr<const MapView>, MapHash>> views;
+  struct Seen {
+    std::shared_ptr<const MapView> view;
+    MapHash hash;
+    DigestsByChunk digests;
+  };
+  std::vector<Seen> views;
   for (int step = 0; step < 600; ++step) {
     for (int k = 0; k < 3; ++k) {
       if (random.below(3) == 0) add(*map, {1, frames++});
       if (frames == 0) continue;
       const FrameId id{1, random.below(frames)};
+      if (random.below(4) == 0) map->edit_hot(id).edges = random.hot(id).edges;
       if (random.below(2) == 0) map->edit_hot(id).mean_error = static_cast<float>(step);
       if (random.below(4) == 0) map->edit_warm(id) = random.warm();
       if (random.below(4) == 0) map->set_label(id, "label" + std::to_string(random.below(3)), random.below(2) == 0);
@@ -417,7 +464,8 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
     if (random.below(2) == 0) map->publish();
     if (step % 7 == 0) {
       const auto view = map->publish();
-      views.emplace_back(view, hash_map(*map));
+      views.push_back({view, hash_map(*map), digests_of_frames(*view)});
+      EXPECT_EQ(digests_visited(*view), views.back().digests);
     }
     if (step % 5 != 0) continue;
     const bool fails = random.below(4) == 0;
@@ -425,13 +473,17 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
       if (outcome->ok()) committed = begun;
       failures += !outcome->ok();
       EXPECT_EQ(hash_map(*open()), committed) << step;
+      EXPECT_EQ(digests_visited(*open()->view()), digests_of_frames(*open()->view())) << step;
     }
     faults->commits = fails ? 1 : 0;
     map->publish();
     begun = hash_map(*map);
     ASSERT_TRUE(map->begin_commit({}).ok());
     if (views.size() > 8) {
-      for (const auto& [view, hash] : views) EXPECT_EQ(hash_map(*view), hash);
+      for (const auto& [view, hash, digests] : views) {
+        EXPECT_EQ(hash_map(*view), hash);
+        EXPECT_EQ(digests_visited(*view), digests);
+      }
       views.clear();
     }
   }
@@ -442,6 +494,8 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
   EXPECT_EQ(map->dirty_bytes(), 0u);
   EXPECT_EQ(budget->used(Share::kDirty), 0u);
   EXPECT_EQ(hash_map(*open()), hash_map(*map));
+  EXPECT_TRUE(open()->digests_hold());
+  EXPECT_EQ(digests_visited(*open()->view()), digests_of_frames(*map));
   EXPECT_TRUE(open()->state().pending == map->state().pending);
   for (int k = 0; k < 3; ++k) {
     const std::string label = "label" + std::to_string(k);
@@ -486,7 +540,8 @@ TEST_F(MapTest, AnEditOfTheHotPartLeavesTheOtherBytesAlone) {
                            return true;
                          })
                   .ok());
-  EXPECT_EQ(changed, (std::vector<std::string>{keys::part(Part::kHot, {1, 0})}));
+  EXPECT_EQ(changed, (std::vector<std::string>{keys::part(Part::kHot, {1, 0}), keys::map_state()}))
+      << "the state says as of which commit the digests are right";
 }
 
 // Parts name the commit that wrote them. In a map that an older version migrated from format 1 they may name commits
@@ -610,6 +665,142 @@ TEST_F(MapTest, DamagedPartsAreNamed) {
   EXPECT_EQ(lost(), before);
   EXPECT_EQ(map->hot({1, sound})->mean_error, 0.5F);
   EXPECT_TRUE(map->hot({1, kFramesPerChunk}));
+}
+
+TEST_F(MapTest, DigestsAreVisitedFromAnyChunkOnUntilToldToStop) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u, 4u}) begin(*map, number);
+  for (std::uint32_t i = 0; i < 130; ++i)
+    for (const SessionNumber number : {1u, 4u}) add(*map, {number, i});
+  ASSERT_TRUE(map->commit().ok());
+  for (std::uint32_t i = 0; i < 70; ++i) add(*map, {2, 200 + i});  // not committed
+  map->edit_hot({1, 70}) = random.hot({1, 70});
+  const auto view = map->publish();
+  const DigestsByChunk all = digests_of_frames(*view);
+  EXPECT_EQ(all.size(), 8u);
+  for (const ChunkId from : {ChunkId{}, ChunkId{1, 1}, ChunkId{1, 2}, ChunkId{2, 0}, ChunkId{2, 4}, ChunkId{4, 3}})
+    EXPECT_EQ(digests_visited(*view, from), DigestsByChunk(all.lower_bound(from), all.end())) << from.to_string();
+  for (std::size_t most = 1; most < 8; ++most) {
+    std::size_t visited = 0;
+    EXPECT_TRUE(view->visit_digests({}, [&](const ChunkDigest&) { return ++visited < most; }).ok());
+    EXPECT_EQ(visited, most);
+  }
+}
+
+// A program that knows nothing of digests keeps what it does not know, and commits frames without them.
+TEST_F(MapTest, DigestsOfAnotherCommitAreNotBelievedAndMadeAnew) {
+  {
+    auto map = open();
+    for (const SessionNumber number : {1u, 2u, 3u}) begin(*map, number);
+    for (std::uint32_t i = 0; i < 200; ++i)
+      for (const SessionNumber number : {1u, 2u}) add(*map, {number, i});
+    for (std::uint32_t i = 0; i < 20; ++i) add(*map, {3, i});
+    ASSERT_TRUE(map->commit().ok());
+    EXPECT_TRUE(open()->digests_hold());
+  }
+  const std::string key = keys::part(Part::kHot, {1, 1});
+  PartWriter writer(Part::kHot, {1, 1}, 9);
+  for (std::uint32_t slot = 0; slot < 10; ++slot) {
+    ByteWriter body;
+    encode_hot(body, frame_in({1, 1}, slot), random.hot(frame_in({1, 1}, slot)));
+    writer.add(slot, body.bytes());
+  }
+  std::vector<std::string> gone;
+  for (std::uint32_t i = 0; i < 20; ++i) gone.push_back(keys::frame(Part::kHot, {3, i}));
+  ASSERT_TRUE(engine->commit(epoch, 0, std::vector<Put>{{key, writer.finish()}}, gone).ok());
+
+  auto map = open();
+  EXPECT_FALSE(map->digests_hold());
+  const auto expected = [&] {
+    DigestsByChunk frames = digests_of_frames(*map->view());
+    EXPECT_EQ(frames.size(), 8u);
+    return frames;
+  };
+  EXPECT_EQ(digests_visited(*map->view()), expected()) << "made from the frames";
+  map->edit_hot({2, 70}) = random.hot({2, 70});
+  add(*map, {1, 200});
+  map->publish();
+  EXPECT_EQ(digests_visited(*map->view()), expected());
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_FALSE(open()->digests_hold()) << "not before they are made anew";
+  EXPECT_EQ(digests_visited(*open()->view()), expected());
+
+  map->edit_hot({2, 71}) = random.hot({2, 71});
+  const auto before = map->publish();
+  const MapHash hash = hash_map(*before);
+  const DigestsByChunk digests = expected();
+  std::uint64_t done = 0;
+  ASSERT_TRUE(map->rebuild_digests([&](std::uint64_t frames, std::uint64_t) { return done = frames, true; }).ok());
+  EXPECT_TRUE(map->digests_hold());
+  EXPECT_EQ(keys("d"), 8u) << "those of chunks that are gone are deleted";
+  EXPECT_EQ(digests_visited(*map->view()), digests);
+  EXPECT_EQ(digests_visited(*before), digests);
+  EXPECT_EQ(hash_map(*map->view()), hash);
+  EXPECT_FALSE(hash_map(*open()) == hash) << "what was dirty still is";
+  EXPECT_TRUE(open()->digests_hold());
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(hash_map(*open()), hash);
+  EXPECT_EQ(digests_visited(*open()->view()), digests);
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+}
+
+TEST_F(MapTest, MakingDigestsAnewGoesOnAfterItWasStoppedOrFailed) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
+  epoch = engine->acquire().value();
+  auto map = open();
+  begin(*map, 1);
+  FrameHot hot = random.hot({1, 0});
+  hot.edges.assign(30, random.edge({1, 0}, 1));
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    add(*map, {1, i});
+    map->edit_hot({1, i}).edges = hot.edges;
+  }
+  ASSERT_TRUE(map->commit().ok());
+  const DigestsByChunk expected = digests_of_frames(*map->view());
+  std::uint64_t told = 0;
+  const auto stop = [&](std::uint64_t, std::uint64_t) { return ++told, false; };
+  EXPECT_EQ(map->rebuild_digests(stop).reason(), Reason::SHUTTING_DOWN);
+  EXPECT_EQ(told, 1u);
+  EXPECT_FALSE(map->digests_hold());
+  EXPECT_FALSE(open()->digests_hold());
+  EXPECT_EQ(digests_visited(*map->view()), expected);
+  faults->commits = 1;
+  EXPECT_EQ(map->rebuild_digests({}).reason(), Reason::IO_ERROR);
+  EXPECT_EQ(digests_visited(*map->view()), expected);
+  map->edit_hot({1, 5}).time_us = 1;
+  ASSERT_TRUE(map->commit().ok());
+  ASSERT_TRUE(map->rebuild_digests({}).ok());
+  EXPECT_EQ(digests_visited(*map->view()), digests_of_frames(*map));
+  EXPECT_EQ(digests_visited(*open()->view()), digests_of_frames(*map));
+}
+
+TEST_F(MapTest, DamagedDigestsAreNamedAndMadeAnewWithTheNextEdit) {
+  {
+    auto map = open();
+    begin(*map, 1);
+    for (std::uint32_t i = 0; i < 3 * kFramesPerChunk; ++i) add(*map, {1, i});
+    ASSERT_TRUE(map->commit().ok());
+  }
+  Bytes damaged = engine->snapshot()->get(keys::digests({1, 1})).value().value();
+  damaged[damaged.size() / 2] ^= 1;
+  MapState state = decode_state(engine->snapshot()->get(keys::map_state()).value().value()).value();
+  ++state.digests_commit;
+  ASSERT_TRUE(engine
+                  ->commit(epoch, 0,
+                           std::vector<Put>{{keys::digests({1, 1}), damaged}, {keys::map_state(), encode_state(state)}},
+                           std::vector<std::string>{keys::digests({1, 0})})
+                  .ok());
+  auto map = open();
+  ASSERT_TRUE(map->digests_hold());
+  const Status lost = map->view()->visit_digests({}, [](const ChunkDigest&) { return true; });
+  EXPECT_EQ(lost.reason(), Reason::DATA_LOSS);
+  EXPECT_NE(lost.message().find("digests of chunk 1:1"), std::string::npos) << lost.message();
+  EXPECT_EQ(digests_visited(*map->view(), {1, 2}).size(), 1u);
+  map->edit_hot({1, 3}).time_us = 1;
+  map->edit_hot({1, 70}).time_us = 1;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(digests_visited(*map->view()), digests_of_frames(*map->view()));
 }
 
 TEST_F(MapTest, LabelsAreFoundWhetherCommittedOrNot) {

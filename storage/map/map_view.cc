@@ -1,4 +1,5 @@
 #include "storage/format/keys.h"
+#include "storage/map/digest_records.h"
 #include "storage/map/indices.h"
 #include "storage/map/map_view_impl.h"
 #include "storage/map/part_loader.h"
@@ -82,6 +83,21 @@ std::vector<FrameId> MapView::labelled(const std::string& label) const {
 std::vector<std::string> MapView::labels(const std::string& prefix) const {
   impl_->check_alive();
   return labels_beginning(*impl_->snapshot, *impl_->labels, prefix);
+}
+
+Status MapView::visit_digests(ChunkId from, const std::function<bool(const ChunkDigest&)>& visit,
+                              DigestsOf which) const {
+  try {
+    impl_->check_alive();
+    relmap::storage::visit_digests(*impl_->snapshot, impl_->digests_hold, impl_->cache->budget(), *impl_->dirty, from,
+                                   which, [&](const ChunkDigest& digests) {
+                                     impl_->check_alive();
+                                     return visit(digests);
+                                   });
+    return {};
+  } catch (const StatusError& error) {
+    return error.status();
+  }
 }
 
 Status MapView::scan_words(const std::function<bool(FrameId)>& known,

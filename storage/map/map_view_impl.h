@@ -17,6 +17,7 @@ struct MapView::Impl {
   std::shared_ptr<ChunkCache> cache;
   std::shared_ptr<ViewLedger> ledger;
   std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
+  bool digests_hold = false;                       // its digests are right
   std::shared_ptr<const DirtyTable> dirty;         // on top of it
   std::shared_ptr<const SessionTable> sessions;
   SessionCounts session_counts;

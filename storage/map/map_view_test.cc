@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <map>
 #include <thread>
 #include <vector>
 
@@ -211,6 +212,14 @@ TEST_F(MapViewTest, StaysConsistentUnderEditsCommitsAndEvictions) {
           EXPECT_TRUE(view->warm(id));
         }
         EXPECT_EQ(view->session(1)->frames, view->state().keyframes + kFrames);
+        std::map<std::uint32_t, std::int64_t> times;
+        throw_if(view->visit_digests({}, [&](const ChunkDigest& digests) {
+          for (const FrameDigest& frame : digests.frames) times[frame_in(digests.id, frame.slot).index] = frame.time_us;
+          return true;
+        }));
+        EXPECT_EQ(times.size(), kFrames);
+        EXPECT_EQ(times[id.index], view->hot(id)->time_us);
+        EXPECT_EQ(times[twin.index], view->hot(twin)->time_us);
         ++reads;
       } catch (const StatusError& error) {
         EXPECT_EQ(error.status().reason(), Reason::VIEW_EXPIRED);
@@ -222,6 +231,7 @@ TEST_F(MapViewTest, StaysConsistentUnderEditsCommitsAndEvictions) {
     const std::uint32_t index = random.below(kFrames / 2);
     map->edit_hot({1, index}).mean_error = static_cast<float>(round);
     map->edit_hot({1, index + kFrames / 2}).mean_error = static_cast<float>(round);
+    map->edit_hot({1, index}).time_us = round;
     ++map->edit_session(1).frames;
     ++map->state().keyframes;
     if (round % 20 == 19) {

@@ -1,5 +1,7 @@
 #include "storage/map/part_loader.h"
 
+#include <utility>
+
 #include "storage/format/frame_codec.h"
 #include "storage/format/keys.h"
 
@@ -48,6 +50,31 @@ LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::s
   }
   loaded.part = std::make_shared<const PackedPart<Frame>>(std::move(budget), id, std::move(records));
   return loaded;
+}
+
+void scan_hot_parts(const EngineSnapshot& snapshot, ChunkId from, const std::shared_ptr<Budget>& budget,
+                    const std::function<bool(const PackedPart<FrameHot>&)>& visit) {
+  std::optional<ChunkId> at;
+  PackedPart<FrameHot>::Records records;
+  const auto give = [&] { return !at || visit(PackedPart<FrameHot>(budget, *at, std::exchange(records, {}))); };
+  bool going = true;
+  const std::string first = keys::part(Part::kHot, from);
+  const Status scanned = snapshot.scan_from(first.substr(0, 1), first, [&](std::string_view key, ByteSpan value) {
+    const auto part = keys::part_of(key);
+    if (!part) return true;
+    if (at && *at != part->chunk && !(going = give())) return false;
+    at = part->chunk;
+    std::uint64_t commit = 0;
+    const Status opened =
+        unpack<FrameHot>(std::make_shared<const Bytes>(value.begin(), value.end()), *at, records, &commit);
+    if (opened.ok()) return true;
+    const auto damage = std::make_shared<const Status>(opened);
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+      if (!part->slot || *part->slot == slot) records[slot].damage = damage;
+    return true;
+  });
+  throw_if(scanned);
+  if (going) give();
 }
 
 template LoadedPart<FrameHot> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -21,6 +22,11 @@ LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::s
 
 extern template LoadedPart<FrameHot> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
 extern template LoadedPart<FrameWarm> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+
+// Visits the hot parts of all chunks from `from` on, ascending, until `visit` returns false. What of them is damaged is
+// found when it is asked for.
+void scan_hot_parts(const EngineSnapshot& snapshot, ChunkId from, const std::shared_ptr<Budget>& budget,
+                    const std::function<bool(const PackedPart<FrameHot>&)>& visit);
 
 struct LoadedCold {
   std::shared_ptr<const FrameCold> frame;  // null: no such frame, or one that sent neither features nor picture

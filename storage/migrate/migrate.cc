@@ -94,6 +94,7 @@ class Target {
   void rebuild_derived() {
     const auto map = Map::open(engine_, epoch_, std::make_shared<Budget>(kRebuildBytes)).or_throw();
     relmap::storage::rebuild_derived(*map, *engine_, kRebuildBytes, {}, {}).or_throw();
+    throw_if(map->rebuild_digests({}));
   }
   // Session numbers are never given twice, not even across a migration.
   void give_out_sessions(SessionNumber through) {
@@ -214,6 +215,18 @@ std::uint64_t copy_format2(const Engine& source, const std::string& from, const 
   return frames;
 }
 
+// Former formats have no digests.
+void make_digests(const std::string& directory, const Progress& progress) {
+  RocksDbOptions options;
+  options.cache_bytes = kCacheBytes;
+  const auto engine = open_rocksdb(directory, options).or_throw();
+  const auto map = Map::open(engine, engine->acquire().or_throw(), std::make_shared<Budget>(kRebuildBytes)).or_throw();
+  throw_if(map->rebuild_digests([&](std::uint64_t done, std::uint64_t total) {
+    if (progress) progress(done, total);
+    return true;
+  }));
+}
+
 void exchange(const std::string& a, const std::string& b) {
   if (::syscall(SYS_renameat2, AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) != 0)
     throw StatusError(Status(Reason::IO_ERROR, "exchanging " + a + " and " + b + ": " + std::strerror(errno)));
@@ -257,6 +270,7 @@ Result<MigrateSummary> migrate(const std::string& directory, const Progress& pro
     copy_journal(*source, draft);
   } else {
     summary.frames = copy_format2(*source, directory, draft, progress);
+    make_digests(draft, progress);
   }
   for (const std::string& folder : {draft + "/map", draft + "/journal", draft, parent})
     throw_if(files->sync_directory(folder));

@@ -17,6 +17,7 @@
 #include "storage/migrate/facts.h"
 #include "storage/migrate/rehearsal.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/testing/digest_oracle.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/paths.h"
 
@@ -45,6 +46,8 @@ class Migrate : public ::testing::Test {
     return Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{64} << 20)).or_throw();
   }
   static void expect_sound(const Map& map) {
+    EXPECT_TRUE(map.digests_hold());
+    EXPECT_EQ(digests_visited(*map.view()), digests_of_frames(map));
     std::vector<std::string> findings;
     const auto verified =
         verify(*map.view(), {}, [&](const Finding& finding) { findings.push_back(finding.what); }, {});

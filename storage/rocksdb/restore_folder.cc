@@ -40,13 +40,15 @@ Status copy_files(const std::string& from, const std::string& to, const EnginePr
 // that the map has now. A map without an identity is left as it is, and an unknown identity is returned. IO_ERROR,
 // DISK_FULL, STALE_OWNER; DATA_LOSS if the map's state cannot be read.
 Result<MapIdentity> mark_restored(Engine& engine, std::uint64_t now_us) {
-  const auto stored = engine.snapshot()->get(keys::map_state());
+  const auto snapshot = engine.snapshot();
+  const auto stored = snapshot->get(keys::map_state());
   if (!stored.ok()) return stored.status();
   if (!stored->has_value()) return MapIdentity{};
   auto state = decode_state(**stored);
   if (!state.ok()) return {Reason::DATA_LOSS, "the map's state: " + state.status().message()};
   if (!state->identity.known()) return MapIdentity{};
   state->identity.epoch = std::max(now_us, state->identity.epoch + 1);
+  if (state->digests_commit == snapshot->commit_number()) ++state->digests_commit;  // this commit changes no frame
   const auto owner = engine.acquire();
   if (!owner.ok()) return owner.status();
   const Put put{keys::map_state(), encode_state(*state)};

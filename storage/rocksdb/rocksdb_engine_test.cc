@@ -211,6 +211,7 @@ TEST(RocksDbEngine, WhatIsRestoredIsTheMapWithAHigherEpoch) {
     EXPECT_EQ(map->state().identity, restored->map);
     EXPECT_EQ(map->state().keyframes, 3u);
     EXPECT_EQ(hash_map(*map), hash);
+    EXPECT_TRUE(map->digests_hold());
     EXPECT_EQ(agrees_with_recorded_hash(folder / name, *engine->snapshot(), patient).value(), true);
     EXPECT_GT(engine->allocate_session(engine->acquire().value()).value(), 1u << 20)
         << "the map that was backed up may have given out others since";

@@ -128,6 +128,9 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   e.uniqueness = uniqueness();
   e.around = way_around();
   for (std::uint32_t n = below(4), index = 0; n > 0; --n) e.unseen.push_back(index += 1 + below(100));
+  if (below(3) == 0)
+    e.tests = {static_cast<std::uint16_t>(below(9)), pick(*this, MotionSays::kNothing, MotionSays::kContradicts),
+               static_cast<float>(std::abs(real()))};
   if (below(3) == 0) {
     const std::uint32_t first = below(1000);
     e.carried = {1 + below(9), first, first + 1 + below(100)};

@@ -13,6 +13,8 @@
 #include "server/map/mapper.h"
 #include "server/place/testing/random_vocabulary.h"
 #include "storage/engine/memory_engine.h"
+#include "storage/events/event_block.h"
+#include "storage/events/event_log.h"
 #include "storage/testing/forwarding_engine.h"
 #include "tests/support/patience.h"
 #include "tests/support/small_world.h"
@@ -198,6 +200,8 @@ class Run {
       return wrong(idle.to_string());
     check(life.mapper());
     final_ = storage::hash_map(*life.mapper().view());
+    (void)life.mapper().commit(steady_clock::now() + kPatience).or_throw();
+    told_ = told(*life.mapper().view()->committed());
     result_.closures_accepted = life.mapper().view()->state().closures_accepted;
     if (life.mapper().view()->state().keyframes != kFrames) wrong("keyframes counted twice");
   }
@@ -259,7 +263,20 @@ class Run {
       wrong("the session's counts are wrong");
   }
 
-  // The journal alone gives the same map.
+  // What the log of events tells, but for what moved, which depends on when commits were made.
+  Bytes told(const storage::EngineSnapshot& snapshot) {
+    storage::EventBlock events;
+    storage::EventsRead read;
+    do {
+      read = storage::read_events(snapshot, read.through, std::size_t{1} << 20).or_throw();
+      if (read.gap) wrong("the log of events has a gap");
+      for (const storage::Event& event : read.events)
+        if (event.at.ordinal != storage::kMovedOrdinal) events.add(event);
+    } while (read.more);
+    return events.events.take();
+  }
+
+  // The journal alone gives the same map, and tells the same.
   void replay() {
     auto engine = storage::make_memory_engine();
     const std::uint64_t epoch = engine->acquire().or_throw();
@@ -276,6 +293,8 @@ class Run {
     const storage::MapHash again = storage::hash_map(*map->publish());
     if (again.structure != final_.structure) wrong("the same journal gives another structure");
     if (again.estimates != final_.estimates) wrong("the same journal gives other estimates");
+    throw_if(map->commit());
+    if (told_.empty() || told(*map->view()->committed()) != told_) wrong("the same journal tells other events");
   }
 
   bool right() {
@@ -297,6 +316,7 @@ class Run {
   Journal journal_;
   std::uint64_t acknowledged_ = 0;
   storage::MapHash final_;
+  Bytes told_;
   PowerFailureRun result_;
 };
 

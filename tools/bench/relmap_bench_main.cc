@@ -40,6 +40,8 @@ const Subcommand kSubcommands[] = {
     {"security", "What seals, TLS, forgeries, crowds and strangers cost others", relmap::bench::declare_security},
     {"storage", "Write and read a map by storage's own API: speed, memory, bytes written",
      relmap::bench::declare_storage},
+    {"suspicion", "Plant wrong closures among true ones, and find them by how doubtful closures are",
+     relmap::bench::declare_suspicion},
     {"unpack", "Unpack raw frames of a stereo camera, in comparison with a copy of as many bytes",
      relmap::bench::declare_unpack},
     {"vast", "A town driven for 150 km by a fleet, through a daemon that is killed and asked meanwhile",

@@ -48,7 +48,7 @@ RideDrive drive_ride(const sim::PictureWorldOptions& options) {
   return drive;
 }
 
-std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures) {
+std::unique_ptr<map::Mapper> begin_ride(const RideDrive& drive, bool closures) {
   map::MapperOptions options;
   options.deterministic = true;
   options.closures = closures;
@@ -56,12 +56,20 @@ std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures) {
       map::Mapper::open(storage::make_memory_engine(), std::make_shared<storage::Budget>(std::size_t{2} << 30),
                         place::Vocabulary::load(place::default_vocabulary_path()).or_throw(), options)
           .or_throw();
-  const SessionNumber session = mapper->begin_session(drive.keyframes.front().session).or_throw();
-  for (const Keyframe& keyframe : drive.keyframes) {
-    Bytes payload = encode_keyframe(keyframe);
-    const std::uint32_t crc = crc32c(payload);
-    mapper->submit_and_wait(storage::KeyframeRecord{session, crc, std::move(payload)}).or_throw();
-  }
+  mapper->begin_session(drive.keyframes.front().session).or_throw();
+  return mapper;
+}
+
+void take_in(const RideDrive& drive, std::size_t i, map::Mapper& mapper) {
+  constexpr SessionNumber kSession = 1;  // the first
+  Bytes payload = encode_keyframe(drive.keyframes[i]);
+  const std::uint32_t crc = crc32c(payload);
+  mapper.submit_and_wait(storage::KeyframeRecord{kSession, crc, std::move(payload)}).or_throw();
+}
+
+std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures) {
+  auto mapper = begin_ride(drive, closures);
+  for (std::size_t i = 0; i < drive.keyframes.size(); ++i) take_in(drive, i, *mapper);
   const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::minutes(10));
   if (!idle.ok()) throw StatusError(idle);
   return mapper;

@@ -23,8 +23,12 @@ struct RideDrive {
 // Renders the pictures and runs the front-end on them. Throws StatusError.
 RideDrive drive_ride(const sim::PictureWorldOptions& options);
 
-// Maps the drive by a deterministic mapper over the memory engine, with the shipped vocabulary or without closures.
-// Throws StatusError.
+// Opens a deterministic mapper over the memory engine for the drive, with the shipped vocabulary or without closures,
+// and begins its session, number 1. take_in() adds keyframe i, and returns once what follows from it is done. Throw
+// StatusError.
+std::unique_ptr<map::Mapper> begin_ride(const RideDrive& drive, bool closures);
+void take_in(const RideDrive& drive, std::size_t i, map::Mapper& mapper);
+// The same for the whole drive.
 std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures);
 
 }  // namespace relmap::bench

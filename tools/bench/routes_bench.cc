@@ -15,6 +15,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "server/map/closure_list.h"
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/overlay_table.h"
@@ -399,6 +400,31 @@ void run_fleet(const RoutesOptions& options, Report& report) {
       filtered.cost(map, random() % metrics.size(), from, to);
   }
 
+  // The same routes without and with alternatives, as they are answered.
+  std::vector<double> alone_ms, alternatives_ratio;
+  double alternatives = 0;
+  for (std::uint32_t i = 0; i < std::max(1u, options.queries / 20); ++i) {
+    const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
+    start = Clock::now();
+    const auto answer = route::search_route(map, from, to, {}, 0, {}).or_throw();
+    const double alone = seconds_since(start);
+    alternatives += static_cast<double>(route::search_alternatives(map, from, to, {}, 0, answer, 3, {}).size());
+    alone_ms.push_back(1e3 * alone);
+    alternatives_ratio.push_back(seconds_since(start) / alone);
+  }
+
+  // The closures of the whole map that are most suspicious, and how many there are between each two sessions.
+  std::vector<double> list_ms, matrix_ms;
+  const auto go_on = [] { return Status(); };
+  for (int i = 0; i < 5; ++i) {
+    start = Clock::now();
+    map::first_closures(*map.view, {}, map::ClosureOrder::kSuspicion, {}, 1000, go_on).or_throw();
+    list_ms.push_back(1e3 * seconds_since(start));
+    start = Clock::now();
+    map::closure_cells(*map.view, {}, {0, 0}, 1000, go_on).or_throw();
+    matrix_ms.push_back(1e3 * seconds_since(start));
+  }
+
   std::vector<double> follow_us, follow_cold_us;  // per 100 frames
   for (int i = 0; i < 200; ++i) {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
@@ -532,6 +558,12 @@ void run_fleet(const RoutesOptions& options, Report& report) {
   report.add("near_missed_share", near_missed / options.queries, "not found among so many frames");
   report.add("filtered_p50_ms", quantile(filtered.ms, 0.5), "around a frame that is to be avoided");
   report.add("filtered_p99_ms", quantile(filtered.ms, 0.99), "");
+  report.add("route_p50_ms", quantile(alone_ms, 0.5), "of a route with all its frames");
+  report.add("alternatives_ratio_p50", quantile(alternatives_ratio, 0.5), "with three alternatives, times as long");
+  report.add("alternatives_ratio_p90", quantile(alternatives_ratio, 0.9), "");
+  report.add("alternatives_mean", alternatives / static_cast<double>(alone_ms.size()), "found, of three");
+  report.add("list_ms", quantile(list_ms, 0.5), "the 1,000 most suspicious closures of the map");
+  report.add("matrix_ms", quantile(matrix_ms, 0.5), "the number of closures between each two sessions");
   report.add("unpack_p50_ms", quantile(warm.unpack_ms, 0.5), "of that, the chunks on the way");
   report.add("cold_p50_ms", quantile(cold.ms, 0.5), "of the first 50");
   report.add("follow_us", quantile(follow_us, 0.5), "frame by frame, each 100 frames of the route, in memory");

@@ -32,6 +32,7 @@ Run declare_rides(CLI::App& app);
 Run declare_routes(CLI::App& app);
 Run declare_security(CLI::App& app);
 Run declare_storage(CLI::App& app);
+Run declare_suspicion(CLI::App& app);
 Run declare_unpack(CLI::App& app);
 Run declare_vast(CLI::App& app);
 Run declare_watch(CLI::App& app);

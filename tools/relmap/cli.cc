@@ -49,7 +49,9 @@ Examples:
   relmap ingest --source kitti ~/kitti/sequences/* --jobs 4
   relmap ingest lcmlog-2026-11-21.00     # what robots sent, as lcm-logger recorded it
   relmap export --format tum --out map.tum     # relaxed, a file for each connected part
-  relmap map --out map.png --from 1:0 --to kitchen)";
+  relmap map --out map.png --from 1:0 --to kitchen
+  relmap edges --suspicion --state accepted --limit 10 --out sheet.png   # which closures should be looked at?
+  relmap report --out report.html        # one page: what the map holds, what to look at)";
 
 // Of the package: its service, and where that has its socket while it runs.
 constexpr char kServiceUnit[] = "/lib/systemd/system/relmapd.service", kServiceFolder[] = "/run/relmap";
@@ -82,9 +84,9 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.add_option("--deadline", options.deadline_s, "time limit of each request, in seconds")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
-  for (const auto add :
-       {add_status, add_top, add_watch, add_sessions, add_session, add_frame, add_transform, add_localise, add_match,
-        add_route, add_label, add_labels, add_edges, add_edge, add_import, add_ingest, add_export, add_map, add_wait})
+  for (const auto add : {add_status,   add_top,    add_watch,  add_sessions, add_session, add_frame, add_transform,
+                         add_localise, add_match,  add_route,  add_label,    add_labels,  add_edges, add_edge,
+                         add_import,   add_ingest, add_export, add_map,      add_report,  add_wait})
     add(app, action);
 }
 

@@ -64,6 +64,7 @@ TEST(Cli, TheHelpOfEachCommandHasExamplesOfIt) {
                                                        {"ingest"},
                                                        {"export"},
                                                        {"map"},
+                                                       {"report"},
                                                        {"wait"}};
   for (const std::vector<const char*>& words : commands) {
     std::vector<const char*> argv{"relmap"};

@@ -33,5 +33,6 @@ void add_import(CLI::App& app, Action& action);
 void add_ingest(CLI::App& app, Action& action);
 void add_export(CLI::App& app, Action& action);
 void add_map(CLI::App& app, Action& action);
+void add_report(CLI::App& app, Action& action);
 
 }  // namespace relmap::cli

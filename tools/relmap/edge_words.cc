@@ -1,5 +1,6 @@
 #include "tools/relmap/edge_words.h"
 
+#include "tools/relmap/degrees.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::cli {
@@ -91,6 +92,61 @@ std::string unmeasured_text(const client::Unmeasured& unmeasured, double distanc
   return "a guess along " + counted_text(unmeasured.steps, "step") + " that nothing measured, " +
          fixed(unmeasured.distance_m, 2) + " of " + fixed(distance_m, 2) +
          " m: " + stretches_text(unmeasured.stretches);
+}
+
+std::string doubt_text(const client::Doubt& doubt) {
+  return fixed(doubt.weight, 2) + " " + name_of(doubt.kind) + (doubt.message.empty() ? "" : ": " + doubt.message);
+}
+
+std::string verdict_text(const client::MotionVerdict& verdict) {
+  const char* said = "says nothing of it";
+  switch (verdict.verdict) {
+    case Reason::OK:
+      said = "agrees with it";
+      break;
+    case Reason::CONTRADICTS_MOTION:
+      said = "contradicts it";
+      break;
+    case Reason::CARRIED:
+      said = "does not agree, since the robot was carried";
+      break;
+    case Reason::UNIMPLEMENTED:
+      return "not told by this daemon";
+    default:
+      break;
+  }
+  std::string text = said;
+  if (verdict.verdict != Reason::OK) text += " (" + std::string(reason_name(verdict.verdict)) + ")";
+  if (verdict.edges > 0)
+    text += ": by the way without it, " + counted_text(verdict.edges, "edge") + ", " + fixed(verdict.distance_m, 1) +
+            " m, the ends lie " + fixed(verdict.metres_apart, 2) + " m and " +
+            fixed(kDegrees * verdict.radians_apart, 1) + " degrees from where it puts them, " +
+            fixed(verdict.sigmas_apart, 1) + " sigmas";
+  else if (!verdict.message.empty())
+    text += ": " + verdict.message;
+  return text;
+}
+
+std::string agreements_text(const client::EdgeExplanation& explained) {
+  constexpr std::size_t kMaxNamedClosures = 6;
+  std::vector<EdgeId> agreeing, contradicting;
+  for (const client::Agreement& other : explained.agreements)
+    (other.agrees ? agreeing : contradicting).push_back(other.edge);
+  std::string text;
+  if (!agreeing.empty())
+    text = counted_text(agreeing.size(), "closure") + (agreeing.size() == 1 ? " agrees" : " agree") +
+           " with it:" + ids_text(agreeing, kMaxNamedClosures);
+  if (!contradicting.empty())
+    text += (text.empty() ? "" : "; ") + counted_text(contradicting.size(), "closure") +
+            (contradicting.size() == 1 ? " contradicts it:" : " contradict it:") +
+            ids_text(contradicting, kMaxNamedClosures);
+  return text;
+}
+
+std::string no_points_text(const Status& missing) {
+  if (missing.ok()) return "no points are known that both show";
+  return "no points that both show: " + std::string(reason_name(missing.reason())) +
+         (missing.message().empty() ? "" : ", " + missing.message());
 }
 
 std::string uniqueness_text(const client::Uniqueness& found) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/evidence_types.h"
 #include "client/map_types.h"
 
 namespace relmap::cli {
@@ -26,6 +27,15 @@ std::string carried_text(const std::vector<client::CarriedStretch>& stretches);
 // "a guess along 3 steps that nothing measured, 9.12 of 9.86 m: frames 3:50..3:53"; empty if all steps were
 // measured.
 std::string unmeasured_text(const client::Unmeasured& unmeasured, double distance_m);
+
+// "0.40 contradicted: 3 closures in force contradict it"
+std::string doubt_text(const client::Doubt& doubt);
+// What the robot's motion says of a closure: "contradicts it (CONTRADICTS_MOTION): 12.3 m and 34.0 degrees apart, ...".
+std::string verdict_text(const client::MotionVerdict& verdict);
+// "3 closures agree with it: 3:120/1 3:121/1; 1 contradicts it: 4:7/1"; empty: there are neither.
+std::string agreements_text(const client::EdgeExplanation& explained);
+// Why there are no points that both pictures show.
+std::string no_points_text(const Status& missing);
 
 // How clearly the recognised place stands out from other places.
 std::string uniqueness_text(const client::Uniqueness& uniqueness);

@@ -1,9 +1,12 @@
 // relmap map: draws the relaxed graph, each connected part by itself.
+#include <algorithm>
 #include <memory>
 #include <ostream>
 
 #include "client/map_picture.h"
 #include "tools/relmap/commands.h"
+#include "tools/relmap/map_drawing.h"
+#include "tools/relmap/picture_output.h"
 #include "tools/relmap/relaxed_map.h"
 #include "tools/relmap/route_options.h"
 
@@ -12,55 +15,13 @@ namespace relmap::cli {
 namespace {
 
 struct MapOptions {
-  std::string out, title = "relmap", query, query_right;
+  std::string out, title = "relmap", query, query_right, colour = "session";
   std::vector<std::string> sessions;
-  bool removed = false;
+  bool removed = false, tears = false;
   std::uint32_t width = 2400;  // of a PNG, pixels
   RouteOptions route;
   ViewOptions camera;
 };
-
-client::MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
-  if (edge.kind != client::EdgeKind::kLoop) {
-    if (!edge.carried_by.empty()) return client::MapPicture::EdgeKind::kCarriedMotion;
-    return edge.unmeasured ? client::MapPicture::EdgeKind::kUnmeasuredMotion : client::MapPicture::EdgeKind::kMotion;
-  }
-  switch (edge.state) {
-    case client::EdgeState::kCandidate:
-      return client::MapPicture::EdgeKind::kLoopCandidate;
-    case client::EdgeState::kQuarantined:
-      return client::MapPicture::EdgeKind::kLoopQuarantined;
-    case client::EdgeState::kRemoved:
-      return client::MapPicture::EdgeKind::kLoopRemoved;
-    case client::EdgeState::kAccepted:
-      break;
-  }
-  return client::MapPicture::EdgeKind::kLoopAccepted;
-}
-
-client::MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
-  client::MapPicture picture;
-  picture.title = options.title;
-  picture.png_scale = options.width / picture.width;
-  picture.session_names = map.graph.names;
-  for (const MapPart& part : map.parts) {
-    client::MapPicture::Part& drawn = picture.parts.emplace_back();
-    drawn.root = part.root;
-    for (const PlacedFrame& placed : part.frames) drawn.frames.push_back({placed.frame, placed.T_root_frame});
-    for (const MapPart::Label& label : part.labels) picture.labels.push_back({label.frame, label.text});
-  }
-  std::size_t loops = 0;
-  for (const client::Edge& edge : map.graph.edges) {
-    if (edge.state == client::EdgeState::kRemoved && !options.removed) continue;
-    picture.edges.push_back({edge.a, edge.b, picture_kind(edge)});
-    if (edge.kind == client::EdgeKind::kLoop && edge.state == client::EdgeState::kAccepted) ++loops;
-  }
-  const std::size_t sessions = map.graph.names.size(), frames = map.graph.frames.size();
-  picture.subtitle = counted_text(sessions, "session") + ", " + counted_text(frames, "keyframe") + ", " +
-                     counted_text(loops, "loop closure");
-  picture.mono_sessions = map.graph.mono_sessions;
-  return picture;
-}
 
 Status add_route_to(client::MapPicture& picture, const MapOptions& options, client::Client& client,
                     terminal::Console& console) {
@@ -88,7 +49,22 @@ Status add_query_to(client::MapPicture& picture, const MapOptions& options, clie
   return {};
 }
 
+void tell_tears(const RelaxedMap& map, terminal::Console& console) {
+  std::size_t tears = 0;
+  for (const MapPart& part : map.parts) tears += part.tears.size();
+  if (tears == 0)
+    console.err() << "no tear: the picture stretches no edge by more than " << fixed(kTearSigmas, 0) << " sigmas\n";
+  for (const MapPart& part : map.parts)
+    for (std::size_t i = 0; i < std::min(part.tears.size(), kMaxListed); ++i)
+      console.err() << "tear: " << part.tears[i].words() << '\n';
+  if (tears > kMaxListed) console.err() << count_text(tears) << " tears in all\n";
+  for (std::size_t i = 0; i < std::min(map.strained.size(), kMaxListed); ++i)
+    console.err() << "stretched closure: " << map.strained[i].words() << '\n';
+}
+
 Status draw(const MapOptions& options, client::Client& client, terminal::Console& console) {
+  const auto format = client::picture_format(options.out);
+  if (!format.ok()) return format.status();
   const terminal::Console::Aside aside(console);
   auto graph = read_map_graph(options.sessions, client, console);
   if (!graph.ok()) return graph.status();
@@ -97,18 +73,26 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
   if (!labels.ok()) return labels.status();
   const auto map = relax_map(std::move(graph).value(), *labels);
   if (!map.ok()) return map.status();
-  client::MapPicture picture = picture_of(*map, options);
+  client::MapPicture picture = picture_of(*map, options.removed);
+  picture.title = options.title;
+  picture.png_scale = options.width / picture.width;
+  if (options.tears) mark_tears(*map, picture);
+  if (options.colour == "time") colour_by_time(*map, picture);
+  if (options.colour == "uncertainty") colour_by_uncertainty(*map, picture);
   Status status;
   if (!options.route.from.empty()) status = add_route_to(picture, options, client, console);
   if (status.ok() && !options.query.empty()) status = add_query_to(picture, options, client, console);
-  if (status.ok()) status = client::write_map_picture(picture, options.out);
   if (!status.ok()) return status;
+  const auto bytes = client::draw_map_picture(picture, *format);
+  if (!bytes.ok()) return bytes.status();
+  if (Status written = write_output(options.out, *bytes, console); !written.ok()) return written;
   console.err() << options.out << ": " << picture.subtitle;
   if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
   console.err() << '\n';
   if (const std::string text = contraction_text(*map); !text.empty()) console.err() << text << '\n';
   if (const std::size_t mono = map->graph.mono_sessions; mono > 0)
     console.err() << not_placed_text(mono, "drawn") << '\n';
+  if (options.tears) tell_tears(*map, console);
   if (picture.query && !map->graph.frames.contains(picture.query->frame))
     console.err() << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
   return {};
@@ -126,6 +110,15 @@ void add_map(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--only", options->sessions, "draw only these sessions (number or name)")->type_name("SESSION");
   command->add_flag("--removed", options->removed, "draw also loop closures that were removed");
+  command
+      ->add_option("--colour", options->colour,
+                   "what colours tell: the session, when it was driven, or how well the position relative to the frame "
+                   "of reference is known")
+      ->check(CLI::IsMember({"session", "time", "uncertainty"}))
+      ->capture_default_str();
+  command->add_flag("--tears", options->tears,
+                    "mark edges that the picture had to stretch by more than 6 sigmas, and list the closures that it "
+                    "stretches most: measurements contradict each other there");
   auto* query = command->add_option("--query", options->query, "localise this picture, and draw where it was taken")
                     ->type_name("PICTURE");
   command->add_option("--query-right", options->query_right, "the right picture of a pair whose left one is --query")
@@ -137,6 +130,7 @@ void add_map(CLI::App& app, Action& action) {
       "Examples:\n"
       "  relmap map --out map.png\n"
       "  relmap map --out map.svg --from 1:0 --to kitchen --only morning\n"
+      "  relmap map --out map.png --tears --colour uncertainty\n"
       "--from and --to draw a route.\n"
       "Mono sessions (photographs) have no scale of their own and are not drawn; the legend counts them.");
   command->callback([&action, options] {

@@ -48,6 +48,7 @@ Result<MapGraph> read_map_graph(const std::vector<std::string>& choice, client::
     }
     graph.names[session.number] = session.name;
     graph.cameras[session.number] = session.camera;
+    graph.sessions_by_number[session.number] = session;
     if (session.frames > 0) graph.frames.insert({session.number, session.first});
   }
   if (!missing.empty()) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(*missing.begin())};

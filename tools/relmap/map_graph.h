@@ -14,6 +14,7 @@ namespace relmap::cli {
 struct MapGraph {
   std::map<SessionNumber, std::string> names;
   std::map<SessionNumber, StereoCamera> cameras;
+  std::map<SessionNumber, client::Session> sessions_by_number;  // those of `names`
   std::set<FrameId> frames;
   std::vector<client::Edge> edges;  // between those frames, of every state
   std::size_t mono_sessions = 0;    // left out: nothing connects their frames, which have no scale

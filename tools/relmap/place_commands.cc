@@ -1,12 +1,16 @@
 // relmap localise and match: where a picture was taken, and which places it could show.
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <ostream>
 
+#include "client/pair_picture.h"
 #include "proto/base/json.h"
 #include "tools/relmap/commands.h"
+#include "tools/relmap/pairs.h"
 #include "tools/relmap/picture_file.h"
+#include "tools/relmap/picture_output.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -17,6 +21,7 @@ struct Seen {
   std::string left, right, near;
   client::MatchOptions match;
   std::string thumbnails;  // folder
+  std::string out;         // picture
   ViewOptions camera;
 };
 
@@ -77,6 +82,46 @@ std::string refusal_json(const Status& status) {
   return Json()
       .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
       .text();
+}
+
+// The view at the left of each pair.
+Result<AskedView> asked_view(const Seen& seen, const client::View& view, const SessionsByNumber& sessions,
+                             client::Client& client) {
+  AskedView asked{std::filesystem::path(seen.left).filename().string(), {}};
+  if (view.frame) {
+    asked.title = view.frame->to_string();
+    asked.picture = kept_picture(*view.frame, sessions, client);
+    return asked;
+  }
+  const auto size = client::picture_size(view.left);
+  if (!size.ok()) return size.status();
+  asked.picture = {view.left, static_cast<std::uint32_t>(size->x()), static_cast<std::uint32_t>(size->y()), 1, {}};
+  return asked;
+}
+
+Status write_matches(const Seen& seen, const client::View& view, const client::PlaceMatches& matches,
+                     client::Client& client, terminal::Console& console) {
+  constexpr std::size_t kMaxRows = 8;
+  const auto format = client::picture_format(seen.out);
+  if (!format.ok()) return format.status();
+  if (matches.places.empty()) return {Reason::NEW_PLACE, "there is no place to draw"};
+  const terminal::Console::Aside aside(console);
+  const auto sessions = read_sessions(client, console);
+  if (!sessions.ok()) return sessions.status();
+  const auto asked = asked_view(seen, view, *sessions, client);
+  if (!asked.ok()) return asked.status();
+  client::PairSheet sheet;
+  sheet.title = "Where " + asked->title + " could be";
+  sheet.subtitle =
+      "A place that the map does not hold: probability " + fixed(matches.new_place, 3) + " by appearance." +
+      (matches.nothing_verified.ok() ? "" : " No place is confirmed: " + matches.nothing_verified.to_string());
+  for (const client::PlaceMatch& place : matches.places) {
+    if (sheet.pairs.size() == kMaxRows) break;
+    sheet.pairs.push_back(pair_of(*asked, place, *sessions, client));
+    sheet.pairs.back().title = std::to_string(sheet.pairs.size()) + ". " + sheet.pairs.back().title;
+  }
+  const auto bytes = client::draw_pair_sheet(sheet, *format);
+  return bytes.ok() ? write_output(seen.out, *bytes, console) : bytes.status();
 }
 
 }  // namespace
@@ -140,6 +185,8 @@ void add_match(CLI::App& app, Action& action) {
       "had seen before.\n"
       "Examples:\n"
       "  relmap match photo.jpg --thumbnails places/\n"
+      "  relmap match photo.jpg --out match.png   # with the best places beside it, and what both show joined by "
+      "lines\n"
       "  relmap match 2:17   # which other places look like this frame?");
   command->add_option("--max", seen->match.max_places, "list at most so many places (default 20)");
   command
@@ -154,6 +201,11 @@ void add_match(CLI::App& app, Action& action) {
       ->add_option("--thumbnails", seen->thumbnails,
                    "write a small picture of each place to this folder, as SESSION-INDEX.jpg")
       ->type_name("FOLDER");
+  command
+      ->add_option("--out", seen->out,
+                   "draw the picture beside each of the best places (at most 8), with what both show joined by lines: "
+                   "FILE.png or FILE.svg")
+      ->type_name("FILE");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
     action = [seen](client::Client& client, terminal::Console& console) -> Status {
@@ -164,10 +216,13 @@ void add_match(CLI::App& app, Action& action) {
       if (!near.ok()) return near.status();
       match.near = *near;
       match.thumbnails = !seen->thumbnails.empty();
+      match.correspondences = !seen->out.empty();
       const auto matches = client.match_image(*view, match);
       if (!matches.ok()) return matches.status();
       if (match.thumbnails)
         if (Status status = write_thumbnails(matches->places, seen->thumbnails); !status.ok()) return status;
+      if (!seen->out.empty())
+        if (Status status = write_matches(*seen, *view, *matches, client, console); !status.ok()) return status;
       if (!console.json) print(*matches, console);
       return {};
     };

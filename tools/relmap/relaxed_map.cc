@@ -63,13 +63,12 @@ class Measured {
   std::unordered_map<FrameId, FrameId> parent_;
 };
 
-// Of an edge that was relaxed, and which stands for that of `spring`.
-std::optional<Tear> tear_of(const client::RelaxationEdge& edge, const RelaxedMap::Spring& spring, const MapPart& part) {
+// By how much the poses contradict an edge that was relaxed, and which stands for that of `spring`.
+Tear strain_of(const client::RelaxationEdge& edge, const RelaxedMap::Spring& spring, const MapPart& part) {
   const SE3 off = edge.T_ab.inverse() * (part.find(edge.a)->inverse() * *part.find(edge.b));
   const Vector6 xi = off.log();
   const double sigmas = std::sqrt(std::max(0.0, mahalanobis_squared(xi, edge.covariance)));
-  if (sigmas <= kTearSigmas) return std::nullopt;
-  return Tear{spring.edge, spring.relaxed.a, spring.relaxed.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
+  return {spring.edge, spring.relaxed.a, spring.relaxed.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
 }
 
 // One part for each component of the relaxation, with frames and root only.
@@ -188,7 +187,9 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     const RelaxedMap::Spring& spring = *spring_of[relaxed->stands_for[e]];
     if (spring.doubtful) continue;
     MapPart& part = *part_of.at(spring.relaxed.a);
-    if (const auto tear = tear_of(relaxed->edges[e], spring, part)) part.tears.push_back(*tear);
+    const Tear strain = strain_of(relaxed->edges[e], spring, part);
+    if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
+    if (spring.kind == client::EdgeKind::kLoop) map.strained.push_back(strain);
   }
   for (const client::Edge& edge : map.graph.edges) {
     if (!in_graph(edge) || !is_doubtful(edge)) continue;
@@ -201,9 +202,10 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     part->doubtful.push_back(step);
     if (part != other) other->doubtful.push_back(step);
   }
-  for (MapPart& part : map.parts)
-    std::stable_sort(part.tears.begin(), part.tears.end(),
-                     [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; });
+  const auto worse = [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; };
+  for (MapPart& part : map.parts) std::stable_sort(part.tears.begin(), part.tears.end(), worse);
+  std::stable_sort(map.strained.begin(), map.strained.end(), worse);
+  if (map.strained.size() > kMaxStrained) map.strained.resize(kMaxStrained);
   for (const client::LabelledFrames& label : labels)
     for (const FrameId frame : label.frames)
       if (const auto part = part_of.find(frame); part != part_of.end())

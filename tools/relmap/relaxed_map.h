@@ -35,6 +35,7 @@ struct Tear {
   std::string words() const;  // "3:120/1 from 1:4 to 3:120: 0.031 m, 0.10 degrees, 7.3 sigmas"
 };
 inline constexpr double kTearSigmas = 6;
+inline constexpr std::size_t kMaxStrained = 10;
 
 // A step of a robot that nothing measured, or along which it was carried.
 struct DoubtfulStep {
@@ -89,6 +90,9 @@ struct RelaxedMap {
   std::vector<Spring> springs;
   std::size_t relaxed_frames = 0;  // fewer than the graph has, if it was too large: see client/contraction.h
   std::vector<MapPart> parts;      // the one with the chosen root first, then the others, largest first
+  // The loop closures that the relaxed poses contradict most, whether or not they are tears; the worst first, at most
+  // kMaxStrained.
+  std::vector<Tear> strained;
 
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
 };

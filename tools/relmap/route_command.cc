@@ -6,10 +6,19 @@
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/route_options.h"
+#include "tools/relmap/route_views.h"
 
 namespace relmap::cli {
 
 namespace {
+
+// Of the frames that are passed: "hall, kitchen"; "none".
+std::string labels_text(const std::vector<client::RouteStep>& steps) {
+  std::string passed;
+  for (const client::RouteStep& step : steps)
+    for (const std::string& label : step.labels) passed += (passed.empty() ? "" : ", ") + label;
+  return passed.empty() ? "none" : passed;
+}
 
 void print_steps(const client::Route& route, bool covariance, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
@@ -44,13 +53,10 @@ std::string searched_text(const client::Route& route, double max_cost) {
 }
 
 void print(const client::Route& route, const RouteOptions& asked, terminal::Console& console) {
-  std::string passed;
   std::size_t loops = 0;
   const bool weighed = !asked.weights.empty();
-  for (const client::RouteStep& step : route.steps) {
-    for (const std::string& label : step.labels) passed += (passed.empty() ? "" : ", ") + label;
+  for (const client::RouteStep& step : route.steps)
     if (step.edge && step.kind == client::EdgeKind::kLoop) ++loops;
-  }
   std::vector<std::pair<std::string, std::string>> facts{
       {"from", route.from.to_string() + (route.from_view ? " (by its picture)" : "")},
       {"to", route.to.to_string() + (route.to_view ? " (by its picture)" : "")},
@@ -63,12 +69,22 @@ void print(const client::Route& route, const RouteOptions& asked, terminal::Cons
       {"loop edges", count_text(loops) + (route.long_loops ? ", of which " + count_text(route.long_loops) +
                                                                  " longer than 5 m: passable by assumption only"
                                                            : "")},
-      {"labels passed", passed.empty() ? "none" : passed},
+      {"labels passed", labels_text(route.steps)},
       {"searched", searched_text(route, asked.max_cost)}};
   if (const std::string text = unmeasured_text(route.unmeasured, route.distance_m); !text.empty())
     facts.emplace(facts.begin(), "not measured", text);
   if (const std::string text = carried_text(route.carried); !text.empty()) facts.emplace_back("carried", text);
   console.facts(facts);
+}
+
+void print_alternatives(const client::Route& route, terminal::Console& console) {
+  std::vector<std::vector<std::string>> rows;
+  for (const client::Route& other : route.alternatives)
+    rows.push_back({std::to_string(rows.size() + 1), fixed(other.distance_m, 2), terminal::duration_text(other.time_s),
+                    fixed(route.cost > 0 ? 100 * (other.cost / route.cost - 1) : 0, 0) + " %",
+                    fixed(100 * other.shared, 0) + " %", count_text(other.steps.size()), labels_text(other.steps)});
+  console.out() << '\n';
+  console.table({"alternative", ">metres", ">time", ">dearer by", ">shared", ">frames", "labels"}, rows);
 }
 
 }  // namespace
@@ -194,6 +210,7 @@ Result<client::RouteRequest> make_route_request(client::Client& client, terminal
   for (const std::string& state : options.suppose)
     (state == "candidate" ? request.filter.suppose_candidates : request.filter.suppose_quarantined) = true;
   request.covariance = options.covariance;
+  request.alternatives = options.alternatives;
   return request;
 }
 
@@ -202,6 +219,8 @@ void add_route(CLI::App& app, Action& action) {
     RouteOptions route;
     ViewOptions camera;
     bool steps = false;
+    std::string out;
+    std::size_t stops = 12;
   };
   auto* command = app.add_subcommand("route", "find the shortest, quickest or most certain route");
   auto asked = std::make_shared<Asked>();
@@ -212,8 +231,24 @@ void add_route(CLI::App& app, Action& action) {
       ->add_flag("--covariance", asked->route.covariance,
                  "print for each step how well its pose relative to the start is known")
       ->needs(steps);
+  command
+      ->add_option("--alternatives", asked->route.alternatives,
+                   "find so many other routes, too: each at most 1.5 times as dear, a quarter of it apart from those "
+                   "before it; there may be fewer")
+      ->check(CLI::Range(0, 5));
+  auto* const out =
+      command
+          ->add_option("--out", asked->out,
+                       "draw what the route passes, and below it how well the position relative to the start is known: "
+                       "FILE.png or FILE.svg")
+          ->type_name("FILE");
+  command->add_option("--stops", asked->stops, "with --out: the number of views along the way")
+      ->check(CLI::Range(2, 48))
+      ->capture_default_str()
+      ->needs(out);
   command->footer(
       "Examples:\n"
+      "  relmap route --from 3:120 --to kitchen --out strip.png --alternatives 2\n"
       "  relmap route --from 3:120 --to kitchen\n"
       "  relmap route --from robot:anna --to dock --to charger --by time --standing\n"
       "  relmap route --from photo.jpg --to 5:77 --weigh metre=1,second=0.5 --avoid lift --no-long-loops\n"
@@ -224,12 +259,17 @@ void add_route(CLI::App& app, Action& action) {
       "2,000 frames nearest to the start. All other routes by cells follow edges only.");
   command->callback([&action, asked] {
     action = [asked](client::Client& client, terminal::Console& console) -> Status {
-      const auto request = make_route_request(client, console, asked->route, asked->camera);
+      auto request = make_route_request(client, console, asked->route, asked->camera);
       if (!request.ok()) return request.status();
+      if (!asked->out.empty()) request->covariance = true;
       const auto route = client.find_route(*request);
       if (!route.ok()) return route.status();
+      if (!asked->out.empty())
+        if (Status status = write_route_strip(*route, asked->stops, asked->out, client, console); !status.ok())
+          return status;
       if (console.json) return {};
       asked->steps ? print_steps(*route, asked->route.covariance, console) : print(*route, asked->route, console);
+      if (!route->alternatives.empty()) print_alternatives(*route, console);
       return {};
     };
   });

@@ -18,6 +18,7 @@ struct RouteOptions {
   std::vector<std::string> sessions, avoid, suppose;
   std::uint32_t min_support = 0;
   bool no_long_loops = false, covariance = false;
+  std::uint32_t alternatives = 0;
 };
 void add_route_options(CLI::App& command, RouteOptions& options, bool required);
 

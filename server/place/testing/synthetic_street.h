@@ -58,6 +58,7 @@ class SyntheticStreet {
     return features;
   }
 
+  const Vector3& point(std::size_t i) const { return points_[i]; }  // in the street's frame, that of frame 0
   LandmarkId landmark_of(std::size_t point) const { return base_[point]; }
   double uniform(double low, double high) {
     return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;

@@ -234,7 +234,7 @@ void Search::walk_links(Direction direction, At at, double cost) {
     if (!(direction == kForward ? link.out : link.in) || is_refused(link)) continue;
     const auto end = end_of(link);
     if (!end || is_refused(places_[end->place], link.to)) continue;
-    const double to_end = cost + weights_(link.costs());
+    const double to_end = cost + weights_(link.costs()) * query_.penalty(cell.nodes[at.node], link.to);
     if (offer(direction, *end, to_end, at)) queues_[direction].push({to_end, *end});
   }
 }
@@ -403,6 +403,8 @@ Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const s
   Search search(overlay, graph, query, overlay.tree().root(), marks, work);
   search.open_stale(query.stale);
   for (const std::uint32_t cell : query.opened) search.open_around(cell);
+  if (query.penalty.frames)  // the costs of passing a cell are without it
+    for (const auto& [chunk, frames] : query.penalty.frames->chunks()) search.open_around(overlay.tree().find(chunk));
   for (const auto& ends : {from, to})
     for (const FrameId frame : ends) search.open_around(overlay.tree().find(storage::chunk_id(frame)));
   for (const FrameId frame : from)

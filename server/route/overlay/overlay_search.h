@@ -12,6 +12,7 @@
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay.h"
 #include "server/route/passage.h"
+#include "server/route/penalty.h"
 #include "server/route/work_limit.h"
 
 namespace relmap::route {
@@ -40,6 +41,7 @@ struct OverlayQuery {
   RouteFilter filter = {};                  // closures that it supposes are ignored, since cells do not contain them
   std::vector<std::uint32_t> opened;        // cells_to_open() of the filter
   double max_cost = std::numeric_limits<double>::infinity();
+  Penalty penalty = {};  // the search and max_cost include it; the costs of hops do not
 };
 
 // Returns the cells that hold something that the filter refuses; a search must open them. nullopt if cells are of no

@@ -1,6 +1,7 @@
 #include "server/route/overlay/route_search.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/route/overlay/overlay_search.h"
@@ -40,6 +41,18 @@ Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const Rou
   return query;
 }
 
+Result<Route> route_by_cells(const RouteIndex::Snapshot& map, const OverlayQuery& query, std::span<const FrameId> from,
+                             std::span<const FrameId> to, bool count_standing, const WorkLimit& work) {
+  try {
+    auto route = find_route(*map.overlay, *map.view, query, from, to, work);
+    if (!route.ok()) return route.status();
+    if (Status status = unpack(*map.overlay, *map.view, query.metric, *route, work); !status.ok()) return status;
+    return follow(*map.overlay, *map.view, query.metric, *route, count_standing, work);
+  } catch (const StatusError& error) {
+    return error.status();
+  }
+}
+
 // One question, and the searches that answer it.
 class RouteSearch {
  public:
@@ -55,7 +68,7 @@ class RouteSearch {
       if (Status status = check_joined(); !status.ok()) return with_near(std::move(status), near_steps);
       return frame_by_frame();
     }
-    Result<Route> route = by_cells(*query);
+    Result<Route> route = route_by_cells(map_, *query, from_, to_, options_.count_standing, work_);
     // Frame by frame it may still succeed: cells read all frames of a chunk, of which a damaged one may not be on the
     // route, and they need memory of their own.
     if (const Reason reason = route.reason();
@@ -67,17 +80,6 @@ class RouteSearch {
   }
 
  private:
-  Result<Route> by_cells(const OverlayQuery& query) const {
-    try {
-      auto route = find_route(*map_.overlay, *map_.view, query, from_, to_, work_);
-      if (!route.ok()) return route.status();
-      if (Status status = unpack(*map_.overlay, *map_.view, query.metric, *route, work_); !status.ok()) return status;
-      return follow(*map_.overlay, *map_.view, query.metric, *route, options_.count_standing, work_);
-    } catch (const StatusError& error) {
-      return error.status();
-    }
-  }
-
   Result<RouteAnswer> frame_by_frame() { return as_answer(find_route(*map_.view, from_, to_, options_, work_)); }
 
   // NOT_CONNECTED if the cells show that no edges join the ends, even though they cannot answer the question itself: a
@@ -140,6 +142,40 @@ Result<RouteAnswer> search_route(const RouteIndex::Snapshot& map, std::span<cons
                                  std::span<const FrameId> to, const RouteOptions& options, std::uint64_t near_steps,
                                  const WorkLimit& work) {
   return RouteSearch(map, from, to, options, work).answer(near_steps);
+}
+
+std::vector<Alternative> search_alternatives(const RouteIndex::Snapshot& map, std::span<const FrameId> from,
+                                             std::span<const FrameId> to, const RouteOptions& options,
+                                             std::uint64_t near_steps, const RouteAnswer& cheapest, std::size_t count,
+                                             const WorkLimit& work) {
+  const AlternativesQuery asked{from, to, options.weights, options.max_cost, count};
+  if (cheapest.near || !cheapest.frame_by_frame.empty()) {
+    RouteOptions each = options;
+    each.max_cost = std::numeric_limits<double>::infinity();  // which counts without the penalty
+    // Within kMaxStretch times the cost of a route lie some kMaxStretch^2 times as many frames as within its own.
+    const std::size_t around = cheapest.near ? 4 * kNearFramesAStep * near_steps : work.max_frames;
+    return find_alternatives(
+        *map.view, cheapest.route, asked,
+        [&](std::span<const FrameId> starts, std::span<const FrameId> goals, const Penalty& penalty,
+            const WorkLimit& rest) {
+          WorkLimit limit = rest;
+          limit.max_frames = std::min(limit.max_frames, around);
+          each.penalty = penalty;
+          return find_route(*map.view, starts, goals, each, limit);
+        },
+        work);
+  }
+  auto query = as_cells_have_it(map, options);
+  if (!query.ok()) return {};
+  query->max_cost = std::numeric_limits<double>::infinity();
+  return find_alternatives(
+      *map.view, cheapest.route, asked,
+      [&](std::span<const FrameId> starts, std::span<const FrameId> goals, const Penalty& penalty,
+          const WorkLimit& rest) {
+        query->penalty = penalty;
+        return route_by_cells(map, *query, starts, goals, options.count_standing, rest);
+      },
+      work);
 }
 
 }  // namespace relmap::route

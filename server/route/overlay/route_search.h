@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "proto/base/status.h"
+#include "server/route/alternatives.h"
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/route_index.h"
 #include "server/route/work_limit.h"
@@ -33,5 +35,13 @@ inline constexpr std::uint64_t kNearFramesAStep = 40;
 Result<RouteAnswer> search_route(const RouteIndex::Snapshot& map, std::span<const FrameId> from,
                                  std::span<const FrameId> to, const RouteOptions& options, std::uint64_t near_steps,
                                  const WorkLimit& work);
+
+// Returns at most `count` alternatives (alternatives.h) to the route with which search_route() answered on the same
+// map. They are found in the same way: by cells, frame by frame, or around the start. What ends the searches, be it
+// `work` or what cannot be read, leaves fewer of them. Thread-safe.
+std::vector<Alternative> search_alternatives(const RouteIndex::Snapshot& map, std::span<const FrameId> from,
+                                             std::span<const FrameId> to, const RouteOptions& options,
+                                             std::uint64_t near_steps, const RouteAnswer& cheapest, std::size_t count,
+                                             const WorkLimit& work);
 
 }  // namespace relmap::route

@@ -101,6 +101,51 @@ TEST_F(RouteSearchTest, QuestionsThatCellsCannotAnswerAreSearchedFrameByFrame) {
   EXPECT_EQ("the disk is full", without->frame_by_frame);
 }
 
+// By cells, each search finds what Dijkstra's finds, and so do all of them together.
+TEST_F(RouteSearchTest, CellsFindTheAlternativesThatDijkstraFinds) {
+  town_.drive(2400);
+  ASSERT_TRUE(index_->wait_current(std::chrono::steady_clock::now() + std::chrono::minutes(10)));
+  map_ = index_->snapshot();
+  std::mt19937_64 random(7);
+  RouteIndex::Snapshot without = map_;
+  without.overlay = nullptr;
+  without.missing_because = "not asked for";
+  std::size_t alternatives = 0;
+  for (int i = 0; i < 30; ++i) {
+    const FrameId from = town_.random_frame(random), to = town_.random_frame(random);
+    RouteOptions options;
+    options.weights = kTownMetrics[static_cast<std::size_t>(i) % kTownMetrics.size()];
+    if (i % 4 == 3) options.filter.avoided.insert(town_.random_frame(random));
+    const auto others = [&](const RouteIndex::Snapshot& map) {
+      const auto answer = search_route(map, {&from, 1}, {&to, 1}, options, 0, {});
+      if (!answer.ok()) return std::vector<Alternative>();
+      return search_alternatives(map, {&from, 1}, {&to, 1}, options, 0, *answer, 3, {});
+    };
+    const auto by_cells = others(map_), by_frames = others(without);
+    ASSERT_EQ(by_cells.size(), by_frames.size()) << from.to_string() << " to " << to.to_string();
+    for (std::size_t n = 0; n < by_cells.size(); ++n) {
+      const Route &one = by_cells[n].route, &other = by_frames[n].route;
+      EXPECT_NEAR(one.cost, other.cost, 1e-9 * other.cost);
+      EXPECT_NEAR(one.distance_m, other.distance_m, 1e-9 * other.distance_m);
+      EXPECT_NEAR(by_cells[n].shared, by_frames[n].shared, 1e-9);
+      EXPECT_EQ(one.steps(), other.steps());
+    }
+    alternatives += by_cells.size();
+  }
+  EXPECT_GT(alternatives, 20u);
+}
+
+TEST_F(RouteSearchTest, AlternativesToAShortRouteAreSearchedAroundItsStart) {
+  const FrameId from{1, 100}, to{1, 103};
+  const auto answer = search(from, to, {}, 50);
+  ASSERT_TRUE(answer.ok() && answer->near);
+  for (const Alternative& other :
+       search_alternatives(map_, {&from, 1}, {&to, 1}, {}, 50, *answer, 3, {.max_frames = 100'000, .proceed = {}})) {
+    EXPECT_LE(other.route.cost, kMaxStretch * answer->route.cost);
+    EXPECT_LE(other.route.frames_touched, 4 * 50 * kNearFramesAStep);
+  }
+}
+
 TEST_F(RouteSearchTest, EndsWithTheStatusOfItsWorkLimit) {
   const WorkLimit stopped{.max_frames = 1'000'000,
                           .proceed = [](std::size_t) { return Status(Reason::DEADLINE, "too late"); }};

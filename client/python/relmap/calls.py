@@ -1,0 +1,87 @@
+"""Calls over gRPC, for the blocking client. Made of relmap/aio_calls.py by client/python/make_sync; do not edit."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any, Iterator, Optional
+
+import grpc
+
+from relmap.connection import Connection, Stubs, check_boot, unreachable
+from relmap.errors import RelmapError, Unreachable, error_of_rpc
+from relmap.v1 import status_pb2
+
+MAX_RESUMPTIONS = 3
+"""How often a stream is resumed without progress in between."""
+
+
+class Caller:
+    """Calls over one channel. Thread-safe.
+
+    Attributes:
+        connection: what it was connected with.
+        stubs: of the services.
+    """
+
+    def __init__(self, connection: Connection, channel: Any) -> None:
+        self.connection = connection
+        self.stubs = Stubs(channel)
+        self._channel = channel
+        self._metadata = connection.metadata
+
+    @staticmethod
+    def open(connection: Connection) -> "Caller":
+        """Connects, and checks that the daemon answers. RelmapError: why not."""
+        where = connection.resolve()
+        caller = Caller(connection, connection.open(where))
+        try:
+            reply = caller.ask(caller.stubs.map.GetStatus, status_pb2.GetStatusRequest())
+            check_boot(connection, where, reply.boot_id)
+        except RelmapError as error:
+            caller.close()
+            raise unreachable(connection, where, error) from None
+        return caller
+
+    def close(self) -> None:
+        """Closes the channel; calls under way fail."""
+        self._channel.close()
+
+    def _limit(self, timeout: Optional[float]) -> Optional[float]:
+        if timeout is None:
+            return self.connection.timeout
+        return None if timeout == math.inf else timeout
+
+    def ask(self, method: Any, request: Any, timeout: Optional[float] = None) -> Any:
+        """The reply to a request. RelmapError: why there is none."""
+        try:
+            return method(request, timeout=self._limit(timeout), metadata=self._metadata)
+        except grpc.RpcError as error:
+            raise error_of_rpc(error) from None
+
+    def stream(self, method: Any, request: Any, timeout: Optional[float] = None) -> Iterator[Any]:
+        """The replies to a request; not resumed. The timeout is for all of them; None: that of the connection, inf: none."""
+        call = method(request, timeout=self._limit(timeout), metadata=self._metadata)
+        try:
+            for reply in call:
+                yield reply
+        except grpc.RpcError as error:
+            raise error_of_rpc(error) from None
+        finally:
+            call.cancel()
+
+    def resumed(self, method: Any, request: Any, timeout: Optional[float] = None) -> Iterator[Any]:
+        """The replies to a request with a resume_token: a stream that breaks goes on after the last reply."""
+        until = time.monotonic() + (self.connection.timeout if timeout is None else timeout)
+        broken = 0
+        while True:
+            try:
+                for reply in self.stream(method, request, max(until - time.monotonic(), 0.001)):
+                    yield reply
+                    request.resume_token = reply.resume_token
+                    broken = 0
+                return
+            except Unreachable:
+                broken += 1
+                if not request.resume_token or broken > MAX_RESUMPTIONS:
+                    raise

@@ -1,0 +1,121 @@
+"""Exceptions: one class for each group of reasons, all under RelmapError.
+
+Wrong arguments that can be judged without a daemon raise ValueError or TypeError before anything is sent.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Mapping, Type
+
+import grpc
+
+from relmap.reason import Reason, ReasonGroup
+from relmap.v1 import reason_pb2
+
+
+class RelmapError(Exception):
+    """A call that failed.
+
+    Attributes:
+        reason: why.
+        message: what exactly is wrong, with the numbers.
+        request_id: the id under which the daemon logged the call; empty if it never reached one.
+    """
+
+    reason: Reason
+    message: str
+    request_id: str
+
+    def __init__(self, reason: Reason, message: str, request_id: str = "") -> None:
+        super().__init__(f"{reason.name}: {message}")
+        self.reason = reason
+        self.message = message
+        self.request_id = request_id
+
+
+class RobotDataError(RelmapError):
+    """What a robot, or an imported graph, sent cannot be taken: BAD_SIZE, TIME_BACKWARDS, BAD_NAME, ..."""
+
+
+class RequestError(RelmapError):
+    """What was asked for cannot be answered: NO_SUCH_FRAME, NOT_CONNECTED, NOT_A_PICTURE, NO_CALIBRATION, ..."""
+
+
+class PlaceNotRecognised(RelmapError):
+    """The map does not recognise what the view shows: NEW_PLACE, AMBIGUOUS_PLACE, TOO_FEW_INLIERS, EMPTY_MAP, ..."""
+
+
+class ClosureStateError(RelmapError):
+    """The state of an edge does not allow what was asked for: WRONG_STATE, ODOMETRY_EDGE, ..."""
+
+
+class DaemonError(RelmapError):
+    """The daemon or its disk cannot do it now: UNREACHABLE, READ_ONLY, BUDGET_EXCEEDED, DISK_FULL, UNIMPLEMENTED, ..."""
+
+
+class Unreachable(DaemonError, ConnectionError):
+    """No daemon answers there (UNREACHABLE)."""
+
+
+class DeadlineExceeded(DaemonError, TimeoutError):
+    """The call took longer than its timeout (DEADLINE). An edit may have been done all the same."""
+
+
+class ViewExpired(DaemonError):
+    """The version of the map that a list was read from is gone (VIEW_EXPIRED): begin the list again."""
+
+
+class AccessError(RelmapError):
+    """The caller is not known, or may not do this: UNAUTHENTICATED, NOT_ALLOWED, REPLAYED."""
+
+
+class CameraError(RelmapError):
+    """Something is wrong with a camera, or with its calibration as the pictures show it: ROWS_APART, EYE_DEAD, ..."""
+
+
+_BY_REASON: Mapping[Reason, Type[RelmapError]] = {
+    Reason.UNREACHABLE: Unreachable,
+    Reason.DEADLINE: DeadlineExceeded,
+    Reason.VIEW_EXPIRED: ViewExpired,
+}
+_BY_GROUP: Mapping[ReasonGroup, Type[RelmapError]] = {
+    ReasonGroup.ROBOT_DATA: RobotDataError,
+    ReasonGroup.REQUEST: RequestError,
+    ReasonGroup.PLACE: PlaceNotRecognised,
+    ReasonGroup.CLOSURE: ClosureStateError,
+    ReasonGroup.DAEMON: DaemonError,
+    ReasonGroup.ACCESS: AccessError,
+    ReasonGroup.CAMERA: CameraError,
+}
+# What a status of gRPC means that carries no reason, as where nothing answers.
+_BY_CODE = {
+    grpc.StatusCode.UNAVAILABLE: Reason.UNREACHABLE,
+    grpc.StatusCode.DEADLINE_EXCEEDED: Reason.DEADLINE,
+    grpc.StatusCode.CANCELLED: Reason.DEADLINE,
+    grpc.StatusCode.UNIMPLEMENTED: Reason.UNIMPLEMENTED,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: Reason.BUDGET_EXCEEDED,
+    grpc.StatusCode.UNAUTHENTICATED: Reason.UNAUTHENTICATED,
+    grpc.StatusCode.PERMISSION_DENIED: Reason.NOT_ALLOWED,
+    grpc.StatusCode.INVALID_ARGUMENT: Reason.INVALID_ARGUMENT,
+    grpc.StatusCode.DATA_LOSS: Reason.DATA_LOSS,
+}
+
+
+def error_of(reason: Reason, message: str, request_id: str = "") -> RelmapError:
+    """The exception of a reason, of the class that its group has. It is returned, not raised."""
+    kind: Type[RelmapError] = _BY_REASON.get(reason) or _BY_GROUP.get(reason.group) or RelmapError
+    return kind(reason, message, request_id)
+
+
+def error_of_rpc(error: Any) -> RelmapError:
+    """The exception of a failed call of gRPC (grpc.RpcError of either kind), by grpc-status-details-bin if it is there."""
+    details = reason_pb2.Error()
+    for key, value in error.trailing_metadata() or ():
+        if key == "grpc-status-details-bin":
+            try:
+                details.ParseFromString(value)
+            except Exception:  # what a proxy put there
+                details.Clear()
+    if details.reason:
+        return error_of(Reason(details.reason), details.message, details.request_id)
+    return error_of(_BY_CODE.get(error.code(), Reason.INTERNAL), error.details() or "the call failed")

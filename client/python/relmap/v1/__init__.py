@@ -1,0 +1,1 @@
+"""Messages and stubs that protoc makes of proto/relmap/v1 (client/python/update_stubs)."""

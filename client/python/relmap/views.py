@@ -1,0 +1,105 @@
+"""Views: what a place is recognised by. A picture, a stereo pair, features, or what a frame of the map saw."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from relmap.camera import RawStereo, StereoCamera, camera_message, raw_message
+from relmap.ids import FrameId, frame_message
+from relmap.measurements import Features, feature_set_message
+from relmap.pictures import PictureLike, picture_bytes
+from relmap.v1 import common_pb2
+
+CameraLike = Union[StereoCamera, RawStereo, int]
+"""The camera that took a view: a rectified one (the pictures are rectified), a rig before rectification (they are not),
+or the number of a session of the map, whose camera took the raw pictures."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A view, encoded once: localise several times, or with several priors, at no further cost.
+
+    Exactly one of `left`, `features` and `frame` is given. ValueError: more or less is, or the parts do not go together.
+
+    Attributes:
+        left: the left picture, or the only one.
+        right: the right picture of a stereo pair.
+        features: instead of pictures; they need a camera.
+        frame: instead of pictures: what this frame of the map saw. Its own recent past is excluded from the answers.
+        camera: None: not known. Then the focal length is estimated if a pose in metres is asked for.
+        rectified: with a session as camera: the pictures are rectified already.
+        supposed: the camera is only assumed; the covariance allows for another one.
+        either_eye: with a session and one picture: it is not known which eye of the rig took it.
+    """
+
+    left: Optional[PictureLike] = None
+    right: Optional[PictureLike] = None
+    features: Optional[Features] = None
+    frame: Optional[FrameId] = None
+    camera: Optional[CameraLike] = None
+    rectified: bool = False
+    supposed: bool = False
+    either_eye: bool = False
+    _message: common_pb2.View = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given = [name for name in ("left", "features", "frame") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError("a view is one of left, features and frame; given: " + (", ".join(given) or "nothing"))
+        if self.right is not None and self.left is None:
+            raise ValueError("a right picture needs a left one")
+        if self.features is not None and self.camera is None:
+            raise ValueError("features need a camera")
+        if self.frame is not None and self.camera is not None:
+            raise ValueError("a frame of the map has its session's camera; name none")
+        message = common_pb2.View(rectified=self.rectified, supposed=self.supposed, either_eye=self.either_eye)
+        if self.left is not None:
+            message.left.data = picture_bytes(self.left)
+        elif self.features is not None:
+            message.features.CopyFrom(feature_set_message(self.features))
+        elif self.frame is not None:
+            message.frame.CopyFrom(frame_message(self.frame))
+        if self.right is not None:
+            message.right.data = picture_bytes(self.right)
+        if isinstance(self.camera, StereoCamera):
+            message.camera.CopyFrom(camera_message(self.camera))
+        elif isinstance(self.camera, RawStereo):
+            message.raw.CopyFrom(raw_message(self.camera))
+        elif self.camera is not None:
+            if isinstance(self.camera, bool) or not isinstance(self.camera, int) or self.camera < 1:
+                raise ValueError(f"the camera is {self.camera!r}; must be a camera, or the number of a session")
+            message.session = self.camera
+        object.__setattr__(self, "_message", message)
+
+    @property
+    def message(self) -> common_pb2.View:
+        """The view as a message. Do not change it."""
+        return self._message
+
+
+ViewLike = Union[View, FrameId, PictureLike]
+"""A view, a frame of the map (what it saw), or a picture: a path, bytes, or an array of uint8."""
+
+
+def as_view(view: ViewLike, right: Optional[PictureLike] = None, camera: Optional[CameraLike] = None) -> View:
+    """The view that is meant. ValueError: `right` or `camera` beside a View, or what View refuses. TypeError: it is none."""
+    if isinstance(view, View):
+        if right is not None or camera is not None:
+            raise ValueError("a View has its right picture and its camera itself")
+        return view
+    if isinstance(view, FrameId):
+        return View(frame=view, right=right, camera=camera)
+    if isinstance(view, (str, os.PathLike, bytes, np.ndarray)):
+        return View(left=view, right=right, camera=camera)
+    raise TypeError(f"a view is a View, a FrameId, a path, bytes or an array, not {type(view).__name__}")
+
+
+def view_message(view: Any, right: Optional[PictureLike] = None, camera: Optional[CameraLike] = None) -> common_pb2.View:
+    """A view as a message; ValueError, TypeError as as_view()."""
+    return as_view(view, right, camera).message
+
+

@@ -1,0 +1,154 @@
+"""Lists and streams: pages, versions of the map that expire, streams that break."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any, Iterator
+
+import grpc
+import pytest
+import relmap
+import relmap.aio
+from fake_daemon import FakeDaemon, edge, refuse
+from relmap.v1 import common_pb2, map_pb2, reason_pb2
+
+EXPIRED = (grpc.StatusCode.ABORTED, reason_pb2.REASON_VIEW_EXPIRED, "the version is gone")
+
+
+class Pages:
+    """Lists nine edges, three a page. `expires`: the calls (from 0) that find the version gone."""
+
+    def __init__(self, *expires: int) -> None:
+        self.expires, self.call = set(expires), -1
+
+    def __call__(self, request: map_pb2.ListEdgesRequest, context: Any) -> map_pb2.ListEdgesReply:
+        self.call += 1
+        if self.call in self.expires:
+            refuse(context, *EXPIRED)
+        first = int(request.page_token or 1)
+        token = str(first + 3) if first < 7 else ""
+        return map_pb2.ListEdgesReply(edges=[edge(i) for i in range(first, first + 3)], next_page_token=token)
+
+
+def _indices(edges: Any) -> list[int]:
+    return [e.b.index for e in edges]
+
+
+@pytest.mark.parametrize("expires", [(), (0,), (1,), (2,), (0, 1, 3)])
+def test_a_list_begins_again_when_its_version_expires(expires: tuple[int, ...]) -> None:
+    with FakeDaemon(ListEdges=Pages(*expires)) as daemon, relmap.connect(daemon.address) as client:
+        assert _indices(client.edges()) == list(range(1, 10))
+
+
+def test_a_list_does_not_begin_again_for_ever() -> None:
+    with FakeDaemon(ListEdges=Pages(*range(100))) as daemon, relmap.connect(daemon.address) as client:
+        with pytest.raises(relmap.ViewExpired):
+            client.edges()
+        with pytest.raises(relmap.ViewExpired):
+            list(client.iter_edges())
+
+
+def test_an_iterator_begins_again_only_while_nothing_was_given_out() -> None:
+    with FakeDaemon(ListEdges=Pages(0, 1)) as daemon, relmap.connect(daemon.address) as client:
+        assert _indices(client.iter_edges()) == list(range(1, 10))
+    with FakeDaemon(ListEdges=Pages(2)) as daemon, relmap.connect(daemon.address) as client:
+        edges = client.iter_edges()
+        assert _indices(next(edges) for _ in range(6)) == [1, 2, 3, 4, 5, 6]
+        with pytest.raises(relmap.ViewExpired, match="6 items of it were given out; begin the list again") as raised:
+            next(edges)
+        assert raised.value.request_id == "fake"
+
+
+def test_an_asynchronous_iterator_does_the_same() -> None:
+    async def run(address: str) -> tuple[list[int], list[int]]:
+        async with await relmap.aio.connect(address) as client:
+            whole = _indices(await client.edges())
+            return whole, [e.b.index async for e in client.iter_edges()]
+
+    with FakeDaemon(ListEdges=Pages(1, 5)) as daemon:
+        whole, iterated = asyncio.run(run(daemon.address))
+        assert whole == iterated == list(range(1, 10))
+
+
+def _route(breaks: int) -> Any:
+    """A route of six steps, one a message, whose stream breaks after each of the first `breaks` messages."""
+    broken = [0]
+
+    def method(request: map_pb2.FindRouteRequest, context: Any) -> Iterator[map_pb2.FindRouteReply]:
+        for i in range(int(request.resume_token or 0), 6):
+            reply = map_pb2.FindRouteReply(resume_token=str(i + 1))
+            reply.steps.add(frame=common_pb2.FrameId(session=1, index=i))
+            if i == 0:
+                reply.summary.cost = 7
+            yield reply
+            if broken[0] < breaks:
+                broken[0] += 1
+                context.abort(grpc.StatusCode.UNAVAILABLE, "broken")
+
+    return method
+
+
+def test_a_stream_that_breaks_goes_on() -> None:
+    with FakeDaemon(FindRoute=_route(4)) as daemon, relmap.connect(daemon.address) as client:
+        route = client.find_route("1:0", "1:5")
+        assert [f.index for f in route.frames] == list(range(6)) and route.cost == 7
+        assert [r.resume_token for r in daemon.calls["FindRoute"]] == ["", "1", "2", "3", "4"]
+
+
+def test_a_stream_that_always_breaks_ends() -> None:
+    def never(request: Any, context: Any) -> Iterator[Any]:
+        if False:
+            yield
+        context.abort(grpc.StatusCode.UNAVAILABLE, "broken")
+
+    with FakeDaemon(FindRoute=never) as daemon, relmap.connect(daemon.address) as client:
+        with pytest.raises(relmap.Unreachable):
+            client.find_route("1:0", "1:5")
+        assert len(daemon.calls["FindRoute"]) == 1  # there was nothing to resume
+
+
+def test_edits_are_sent_again_with_the_same_key() -> None:
+    failures = iter([True, True, False])
+
+    def set_label(request: map_pb2.SetLabelRequest, context: Any) -> map_pb2.SetLabelReply:
+        if next(failures):
+            context.abort(grpc.StatusCode.UNAVAILABLE, "broken")
+        return map_pb2.SetLabelReply(labels=["a"])
+
+    with FakeDaemon(SetLabel=set_label) as daemon, relmap.connect(daemon.address) as client:
+        assert client.set_label("1:2", "a") == ("a",)
+        keys = {request.idempotency_key for request in daemon.calls["SetLabel"]}
+        assert len(daemon.calls["SetLabel"]) == 3 and len(keys) == 1 and "" not in keys
+
+
+def test_what_is_wrong_is_not_sent() -> None:
+    with FakeDaemon(ListEdges=Pages(), FindRoute=_route(0)) as daemon, relmap.connect(daemon.address) as client:
+        for wrong in (
+            lambda: client.edges(min_suspicion=float("nan")),
+            lambda: client.edges(frame="nonsense"),
+            lambda: client.find_route("1:2", "kitchen", max_cost=float("nan")),
+            lambda: client.find_route("1:2", "kitchen", alternatives=6),
+            lambda: client.find_route("1:2", "kitchen", weights=relmap.RouteWeights()),
+            lambda: client.skeleton(4),
+            lambda: client.localise(relmap.View(left=b"no picture")),
+            lambda: client.edit_edge("1:2/1", "destroy"),
+        ):
+            with pytest.raises(ValueError):
+                wrong()
+        with pytest.raises(TypeError):
+            client.localise(3.5)  # type: ignore[arg-type]
+        assert set(daemon.calls) == {"GetStatus"}
+
+
+def test_an_older_daemon_is_drawn_by_its_edges() -> None:
+    def unimplemented(request: Any, context: Any) -> Iterator[Any]:
+        if False:
+            yield
+        refuse(context, grpc.StatusCode.UNIMPLEMENTED, reason_pb2.REASON_UNIMPLEMENTED, "GetSkeleton")
+
+    methods = dict(
+        ListEdges=Pages(), GetSkeleton=unimplemented,
+        ListSessions=lambda r, c: map_pb2.ListSessionsReply(), FindLabels=lambda r, c: map_pb2.FindLabelsReply(),
+    )  # fmt: skip
+    with FakeDaemon(**methods) as daemon, relmap.connect(daemon.address) as client:
+        assert "10 frames" in client.draw_map().svg

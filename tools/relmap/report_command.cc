@@ -1,0 +1,65 @@
+// relmap report: one page about a map, for people to read, print and pass on.
+#include <memory>
+#include <ostream>
+
+#include "proto/base/json.h"
+#include "tools/relmap/commands.h"
+#include "tools/relmap/picture_output.h"
+#include "tools/relmap/report_page.h"
+
+namespace relmap::cli {
+
+namespace {
+
+Status write_report(const ReportOptions& options, client::Client& client, terminal::Console& console) {
+  const auto report = gather_report(options, client, console);
+  if (!report.ok()) return report.status();
+  const std::string page = report_page(*report);
+  if (Status status = write_output(options.out, page, console); !status.ok()) return status;
+  const std::vector<std::string> findings = findings_of(*report);
+  if (options.out == "-") return {};
+  if (console.json) {
+    console.reply(Json()
+                      .add("out", options.out)
+                      .add("bytes", page.size())
+                      .add("findings", findings)
+                      .add("tears", report->tears.size())
+                      .add("suspicious", report->suspicious.size())
+                      .text());
+    return {};
+  }
+  for (const std::string& finding : findings) console.out() << finding << '\n';
+  console.err() << options.out << ": " << terminal::bytes_text(page.size()) << '\n';
+  return {};
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("report", "write one page about the map: what it holds, and what to look at");
+  auto options = std::make_shared<ReportOptions>();
+  command->add_option("--out", options->out, "page to write: FILE.html; - is standard output")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--title", options->title, "title of the page")->capture_default_str();
+  command
+      ->add_option("--suspicious", options->suspicious, "show the pictures of so many of the most suspicious closures")
+      ->check(CLI::Range(0, 50))
+      ->capture_default_str();
+  bool* const map = &options->map;
+  command->add_flag_callback(
+      "--no-map", [map] { *map = false; }, "do not draw the map, which of a large one takes minutes");
+  command->footer(
+      "The page is one file of HTML without scripts; its pictures are part of it. What the daemon does not tell the\n"
+      "caller, as the audit log to a reader, is left out, with the reason. Prints what to look at first.\n"
+      "Examples:\n"
+      "  relmap report --out report.html\n"
+      "  relmap report --out report.html --title 'Hall 3, week 48' --suspicious 10");
+  command->callback([&action, options] {
+    action = [options](client::Client& client, terminal::Console& console) {
+      return write_report(*options, client, console);
+    };
+  });
+}
+
+}  // namespace relmap::cli
