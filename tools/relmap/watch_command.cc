@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <utility>
 
@@ -51,7 +52,7 @@ class Watcher {
 
   // Several times a second. Whether the watch is to end.
   bool stopped() {
-    if (Clock::now() - flushed_ >= kGather) flush();
+    flush_if_due();
     return !failed_.ok() || terminal::interrupted() || (command_.for_s > 0 && Clock::now() >= end_);
   }
 
@@ -66,13 +67,14 @@ class Watcher {
     }
     if (!console_.json) print(view_.lines_of(event));
     console_.out().flush();
-    if (Clock::now() - flushed_ >= kGather) flush();
+    if (!gathered_since_) gathered_since_ = Clock::now();
+    flush_if_due();
     return failed_;
   }
 
   // Prints what was gathered, and keeps the token of what is printed.
   void flush() {
-    flushed_ = Clock::now();
+    gathered_since_.reset();
     if (!console_.json) print(view_.flush());
     if (!console_.out().flush()) failed_ = {Reason::IO_ERROR, "what happens cannot be written (is the disk full?)"};
     if (failed_.ok()) failed_ = keep_token();
@@ -80,6 +82,9 @@ class Watcher {
   const Status& failed() const { return failed_; }
 
  private:
+  void flush_if_due() {
+    if (gathered_since_ && Clock::now() - *gathered_since_ >= kGather) flush();
+  }
   void print(const std::vector<std::string>& lines) {
     for (const std::string& line : lines) console_.out() << line << '\n';
   }
@@ -98,7 +103,8 @@ class Watcher {
   const WatchCommand& command_;
   terminal::Console& console_;
   WatchView view_;
-  Clock::time_point end_, flushed_ = Clock::now();
+  Clock::time_point end_;
+  std::optional<Clock::time_point> gathered_since_;
   std::string token_, kept_;
   bool lost_ = false;
   Status failed_;
