@@ -2,6 +2,7 @@
 #pragma once
 
 #include "client/map_types.h"
+#include "client/skeleton.h"
 
 namespace relmap::v1 {
 class Edge;
@@ -11,6 +12,7 @@ class ExportedFrame;
 class FindRouteRequest;
 class Frame;
 class FrameId;
+class GetSkeletonReply;
 class GetStatusReply;
 class Robot;
 class LocaliseReply;
@@ -38,6 +40,8 @@ Result<PlaceMatches> read_matches(const v1::MatchImageReply& message);
 Status read_route_summary(const v1::RouteSummary& message, Route& route);
 Result<RouteStep> read_route_step(const v1::RouteStep& message);
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message);
+// Adds what a message tells to what the ones before it told.
+Status read_skeleton_part(const v1::GetSkeletonReply& message, Skeleton& skeleton);
 DaemonStatus read_status(const v1::GetStatusReply& message);
 RobotStatus read_robot(const v1::Robot& message);
 

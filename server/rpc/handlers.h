@@ -48,6 +48,8 @@ class GetStatusRequest;
 class GetStatusReply;
 class ExportRequest;
 class ExportReply;
+class GetSkeletonRequest;
+class GetSkeletonReply;
 class WaitIdleRequest;
 class WaitIdleReply;
 class VerifyRequest;
@@ -112,6 +114,8 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest& request, const
                                       const HealthProbe& health, const Metrics& metrics);
 Result<Producer<v1::ExportReply>> export_trajectories(const v1::ExportRequest& request, const Deadline& deadline,
                                                       map::Mapper& mapper, ViewKeeper& views);
+Result<Producer<v1::GetSkeletonReply>> get_skeleton(const v1::GetSkeletonRequest& request, const Deadline& deadline,
+                                                    map::Mapper& mapper, ViewKeeper& views);
 Result<v1::WaitIdleReply> wait_idle(const v1::WaitIdleRequest& request, const Deadline& deadline, map::Mapper& mapper);
 
 // Long work, on threads of its own (Lane::kMaintenance); each producer ends its work when it is destroyed.
