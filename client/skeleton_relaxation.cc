@@ -94,7 +94,7 @@ Result<RelaxedSkeleton> relax_skeleton(const Skeleton& skeleton, const SkeletonL
   if (graph.points.empty()) return {Reason::EMPTY_MAP, "the skeleton has no points"};
   if (layout.root && !graph.find(*layout.root))
     return {Reason::NO_SUCH_FRAME, "frame " + layout.root->to_string() + " is no point of the skeleton"};
-  const auto relaxed = relax_contracted(graph.points, graph.edges, layout.max_relaxed);
+  const auto relaxed = relax_contracted(graph.points, graph.edges, layout.max_relaxed, layout.relaxation);
   if (!relaxed.ok()) return relaxed.status();
   RelaxedSkeleton out;
   out.relaxed = relaxed->kept;

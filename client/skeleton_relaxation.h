@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "client/relaxation.h"
 #include "client/skeleton.h"
 
 namespace relmap::client {
@@ -36,6 +37,8 @@ struct SkeletonLayout {
   std::optional<FrameId> root = {};
   // Of more points only about so many are relaxed (client/contraction.h). More take seconds, and look no better.
   std::size_t max_relaxed = 20'000;
+  // A picture shows no more than this.
+  RelaxationOptions relaxation = {.max_iterations = 20, .relative_tolerance = 1e-4, .loop_huber = 4};
 };
 
 // NO_SUCH_FRAME: the root is no point of the skeleton. EMPTY_MAP: it has no points. The reasons of relax().

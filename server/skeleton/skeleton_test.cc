@@ -38,6 +38,7 @@ class SkeletonTest : public ::testing::Test {
       FrameHot& straight = add({2, 10 + i}, {Matrix3::Identity(), {0, 0, 1}}, i > 0 && i != 200);
       if (i > 0 && i != 200) {
         straight.edges[0].kind = guess ? storage::EdgeKind::kPrior : storage::EdgeKind::kOdometry;
+        if (guess) straight.edges[0].support = 0;
         if (carried) straight.edges[0].carried_by.push_back({{3, 1}, 1});
         if (i == 500) {
           straight.edges[0].source = MotionSource::kUnsensed;

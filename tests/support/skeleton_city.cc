@@ -75,24 +75,24 @@ class Builder {
  public:
   Builder(const SkeletonCity& city, storage::Map& map) : city_(city), map_(map) {}
 
-  void add_session(SessionNumber number, bool only_remember) {
+  // Adds the frames of a session that the map does not have yet.
+  void add_session(SessionNumber number) {
     const std::vector<SE3> way = true_way(city_, number);
     std::mt19937_64 random(city_.seed * 7'000'003 + number);
     std::uniform_real_distribution<double> share(0, 1);
-    if (!only_remember) begin(number);
+    const auto known = map_.session(number);
+    if (!known) begin(number);
     for (std::uint32_t i = 0; i < way.size(); ++i) {
       const FrameId id{number, i};
       const auto [before, fresh] = last_.try_emplace(place_of(way[i]), Seen{id, way[i]});
-      const bool closes = !fresh && before->second.frame.session != number && share(random) < city_.closures;
-      if (!only_remember) {
-        storage::FrameHot hot = frame(id);
-        if (i > 0) hot.edges.push_back(step(id, noisy(way[i - 1].inverse() * way[i], kStepSigma, kTurnSigma, random)));
-        if (closes) hot.edges.push_back(closure(id, before->second, way[i], share(random) < kCandidates, random));
-        add(id, std::move(hot));
-      }
+      storage::FrameHot hot = frame(id);
+      if (i > 0) hot.edges.push_back(step(id, noisy(way[i - 1].inverse() * way[i], kStepSigma, kTurnSigma, random)));
+      if (!fresh && before->second.frame.session != number && share(random) < city_.closures)
+        hot.edges.push_back(closure(id, before->second, way[i], share(random) < kCandidates, random));
       before->second = {id, way[i]};
+      if (!known || i >= known->next_sequence) add(id, std::move(hot));
     }
-    if (!only_remember) commit_if(true);
+    if (!known || known->next_sequence < way.size()) commit_if(true);
   }
 
  private:
@@ -210,8 +210,7 @@ std::vector<SE3> true_way(const SkeletonCity& city, SessionNumber session) {
 void build_city(const SkeletonCity& city, storage::Map& map) {
   Builder builder(city, map);
   const SessionNumber sessions = (city.frames + city.frames_per_session - 1) / city.frames_per_session;
-  for (SessionNumber number = 1; number <= sessions; ++number)
-    builder.add_session(number, map.session(number).has_value());
+  for (SessionNumber number = 1; number <= sessions; ++number) builder.add_session(number);
 }
 
 void build_city_folder(const SkeletonCity& city, const std::string& folder) {

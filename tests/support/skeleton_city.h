@@ -22,7 +22,7 @@ struct SkeletonCity {
 // Where the robot of a session truly was, frame by frame: camera coordinates, z forward.
 std::vector<SE3> true_way(const SkeletonCity& city, SessionNumber session);
 
-// Adds the city's sessions to a map, from the one behind the last that it holds completely, and commits.
+// Adds to a map what it does not have yet of the city, and commits.
 void build_city(const SkeletonCity& city, storage::Map& map);
 
 // Makes the map in the data folder of a daemon, or what is missing of it.
