@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <numbers>
+
+#include "client/skeleton_picture.h"
 
 namespace relmap::client {
 namespace {
@@ -106,6 +109,29 @@ TEST(SkeletonRelaxation, OfManyPointsSomeAreRelaxedAndTheOthersFollow) {
   ASSERT_EQ(some.parts[0].places.size(), 2000u);
   for (std::size_t i = 0; i < 2000; ++i)
     EXPECT_LT((some.parts[0].places[i].T_root_frame.t - whole.parts[0].places[i].T_root_frame.t).norm(), 0.5) << i;
+}
+
+TEST(SkeletonPicture, ShowsEveryPointStepAndClosureByItsKind) {
+  Skeleton skeleton;
+  skeleton.chains = {chain(1, 5, kAhead), chain(2, 5, kAhead)};
+  skeleton.chains[0].points[2].unmeasured = true;
+  skeleton.chains[1].points[3].carried = true;
+  skeleton.closures = {closure({2, 10}, {1, 10}), closure({2, 20}, {1, 20})};
+  skeleton.closures[1].state = EdgeState::kCandidate;
+  MapPicture picture;
+  const RelaxedSkeleton layout = relax_skeleton(skeleton).or_throw();
+  add_skeleton(picture, skeleton, layout);
+  ASSERT_EQ(picture.parts.size(), layout.parts.size());
+  std::size_t points = 0;
+  for (const MapPicture::Part& part : picture.parts) points += part.frames.size();
+  EXPECT_EQ(points, skeleton.points());
+  std::map<MapPicture::EdgeKind, int> kinds;
+  for (const MapPicture::Edge& edge : picture.edges) ++kinds[edge.kind];
+  EXPECT_EQ(kinds, (std::map<MapPicture::EdgeKind, int>{{MapPicture::EdgeKind::kMotion, 6},
+                                                        {MapPicture::EdgeKind::kUnmeasuredMotion, 1},
+                                                        {MapPicture::EdgeKind::kCarriedMotion, 1},
+                                                        {MapPicture::EdgeKind::kLoopAccepted, 1},
+                                                        {MapPicture::EdgeKind::kLoopCandidate, 1}}));
 }
 
 // A skeleton that is still being read may have closures whose ends are not there yet.
