@@ -23,10 +23,10 @@
 namespace relmap::skeleton {
 
 struct SkeletonOptions {
-  std::uint32_t level = 1;              // 0 to 3
+  std::uint32_t level = 1;                   // 0 to 3
   std::vector<SessionNumber> sessions = {};  // empty: all
-  bool candidates = false;              // also closures that are not in force
-  std::size_t page_bytes = 256u << 10;  // of a message, about
+  bool candidates = false;                   // also closures that are not in force
+  std::size_t page_bytes = 256u << 10;       // of a message, about
 };
 
 struct Closure {

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "storage/engine/engine.h"
-#include "storage/graph/digest.h"
 #include "storage/events/event_log.h"
+#include "storage/graph/digest.h"
 #include "storage/graph/editable_graph.h"
 #include "storage/graph/map_state.h"
 #include "storage/memory/budget.h"
