@@ -4,7 +4,7 @@
 usage: client/python/bench/localise_cost.py [--calls N] [--json]     (PYTHONPATH=client/python)
 
 Makes a map of a drive through points, and asks for the place of what one of its frames saw. Needs
-ninja -C build/release relmap_python_tests relmap_localise_loop.
+ninja -C build/release relmap_python_tests.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ CALLS: Dict[str, Tuple[str, Callable[[Any, str], Any], str]] = {
     "Admin.WaitIdle": ("wait_idle", lambda c, f: c.wait_idle(), ""),
     "Admin.Commit": ("commit", lambda c, f: c.commit(), ""),
     "Admin.SetLogLevel": ("set_log_level", lambda c, f: c.set_log_level(), ""),
-    "Admin.FreezeSession": ("freeze_session", lambda c, f: c.freeze_session(1, False), ""),
+    "Admin.FreezeSession": ("freeze_session", lambda c, f: c.freeze_session(1, False), "WRONG_STATE"),
     "Admin.DeleteSession": ("delete_session", lambda c, f: c.delete_session(1, "no uuid of it"), "INVALID_ARGUMENT"),
     "Admin.ListAudit": ("audit", lambda c, f: c.audit(limit=5), ""),
     "Ingest.Stream": ("session", lambda c, f: _session(c), ""),
