@@ -118,7 +118,7 @@ class Route(Record):
         frame_by_frame: why the daemon had to search frame by frame; empty: it searched by cells.
         bound_closures, no_way_by_edges: see relmap/v1/map.proto, RouteSummary.
         from_view, to_view: how ends that are views were localised.
-        shared: of an alternative: the share of its length that the routes before it use, too.
+        shared: of an alternative: the share of its length on or beside the routes before it, 0..0.75.
         alternatives: other routes, by cost, if they were asked for.
         map_version: the version of the map that was asked.
     """
