@@ -68,7 +68,13 @@ class RouteBy(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class RouteWeights:
-    """The cost of an edge as a weighted sum; each weight is 0, or 1e-9 to 1e9, and not all are 0."""
+    """The cost of an edge as a weighted sum; each weight is 0, or 1e-9 to 1e9, and not all are 0.
+
+    Attributes:
+        metre: of its length.
+        driven_second, standing_second: of the time that robots drove and stood along it.
+        square_metre_of_variance: of the trace of the covariance of its translation.
+    """
 
     metre: float = 0.0
     driven_second: float = 0.0
