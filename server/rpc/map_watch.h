@@ -32,7 +32,7 @@ class MapWatch {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::seconds kHeartbeat{14};  // so that 15 s is kept
   static constexpr int kMaxFrames = 256;                 // of a message, or ranges of frames moved
-  static constexpr std::size_t kReadBytes = 64 << 10;    // of the log, at a time
+  static constexpr std::size_t kReadBytes = 32 << 10;    // of the log, at a time; decoded some 300 kB
 
   // Where the request says that it begins. INVALID_ARGUMENT; IO_ERROR, DATA_LOSS of the log. `feed` must outlive it.
   static Result<std::shared_ptr<MapWatch>> begin(const v1::WatchMapRequest& request, const MapIdentity& map,

@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "relmap/v1/map.pb.h"
+#include "server/map/suspicion.h"
 #include "server/rpc/charge.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/limits.h"
@@ -73,7 +74,7 @@ class SkeletonStream {
       const Status going = deadline_.check();
       return going.ok() ? charge_.grow_to(bytes) : going;
     };
-    auto reader = skeleton::SkeletonReader::open(view_, std::move(options), {}, proceed);
+    auto reader = skeleton::SkeletonReader::open(view_, std::move(options), map::suspicion_value, proceed);
     if (!reader.ok()) return reader.status();
     reader_ = *std::move(reader);
     if (position.empty()) return {};
