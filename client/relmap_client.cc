@@ -347,4 +347,19 @@ Status Client::export_frames(const std::vector<SessionNumber>& sessions, bool la
                                              });
 }
 
+Result<Skeleton> Client::skeleton(const SkeletonOptions& options, const SkeletonSink& take) {
+  v1::GetSkeletonRequest request;
+  request.set_level(options.level);
+  for (const SessionNumber session : options.sessions) request.add_sessions(session);
+  request.set_candidates(options.candidates);
+  Skeleton skeleton;
+  const Status status = impl_->read_stream<v1::GetSkeletonReply>(
+      &MapStub::GetSkeleton, std::move(request), [&](const v1::GetSkeletonReply& reply) -> Status {
+        if (Status read = read_skeleton_part(reply, skeleton); !read.ok()) return read;
+        return take ? take(skeleton) : Status();
+      });
+  if (!status.ok()) return status;
+  return skeleton;
+}
+
 }  // namespace relmap::client

@@ -17,6 +17,7 @@
 #include "client/admin_types.h"
 #include "client/evidence_types.h"
 #include "client/map_types.h"
+#include "client/skeleton.h"
 #include "client/watch_types.h"
 
 namespace relmap::client {
@@ -106,6 +107,10 @@ class Client {
   // The frames of each session, ascending, with their landmarks if `landmarks` is set.
   using FrameSink = std::function<Status(const ExportedFrame& frame)>;
   Status export_frames(const std::vector<SessionNumber>& sessions, bool landmarks, const FrameSink& take);
+
+  // The shape of the map, or of some of its sessions, contracted for drawing. `take`, if it is not empty, sees it grow.
+  // A stream that breaks is resumed with the same map version; VIEW_EXPIRED if that expires meanwhile.
+  Result<Skeleton> skeleton(const SkeletonOptions& options = {}, const SkeletonSink& take = {});
 
   // For operators. The daemon does one of verify, backup and compact at a time (BUDGET_EXCEEDED). DEADLINE also if
   // `on_progress` ended the work.

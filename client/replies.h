@@ -4,6 +4,7 @@
 #include "client/admin_types.h"
 #include "client/evidence_types.h"
 #include "client/map_types.h"
+#include "client/skeleton.h"
 #include "client/watch_types.h"
 
 namespace relmap::v1 {
@@ -18,6 +19,7 @@ class FindRouteReply;
 class FindRouteRequest;
 class Frame;
 class FrameId;
+class GetSkeletonReply;
 class GetStatusReply;
 class Robot;
 class ListEdgesRequest;
@@ -49,6 +51,8 @@ Result<PlaceMatches> read_matches(const v1::MatchImageReply& message);
 // Adds a message of the stream to the route or to one of its alternatives.
 Status read_route_reply(const v1::FindRouteReply& message, Route& route);
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message);
+// Adds what a message tells to what the ones before it told.
+Status read_skeleton_part(const v1::GetSkeletonReply& message, Skeleton& skeleton);
 DaemonStatus read_status(const v1::GetStatusReply& message);
 RobotStatus read_robot(const v1::Robot& message);
 // Nullopt: an event of a kind that a later version tells.

@@ -116,7 +116,7 @@ void list(ByteReader in) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const ByteSpan bytes(data + 1, size - 1);
-  switch (data[0] % 17) {
+  switch (data[0] % 18) {
     case 0:
       read_as(bytes, read_edge);
       break;
@@ -171,8 +171,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 15:
       ask(ByteReader(bytes));
       break;
-    default:
+    case 16:
       read_as(bytes, read_event);
+      break;
+    default: {
+      v1::GetSkeletonReply message;
+      Skeleton skeleton;
+      if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) break;
+      for (int times = 0; times < 2; ++times) {
+        const Status read = read_skeleton_part(message, skeleton);
+        must(read.ok() || read.reason() == Reason::CORRUPT);
+        for (const Skeleton::Chain& chain : skeleton.chains) must(!chain.points.empty());
+      }
+    }
   }
   return 0;
 }

@@ -368,6 +368,36 @@ void write_lcm_messages(const std::string& root) {
   corpus.add("exchange_expired", {kGap, 0, 1, 200}, gap);
 }
 
+namespace {
+
+// Two points of a chain, and a closure between them.
+void add_skeleton(v1::GetSkeletonReply& reply) {
+  reply.set_frames_done(9);
+  reply.set_frames_total(9);
+  v1::SkeletonChain& chain = *reply.add_chains();
+  chain.set_session(1);
+  for (const std::uint32_t index : {3u, 5u}) chain.add_index(index);
+  for (const int time_ms : {1000, 20}) chain.add_time_ms(time_ms);
+  for (int i = 0; i < 6; ++i) chain.add_step(0.1F * static_cast<float>(i));
+  for (int i = 0; i < 2; ++i) chain.add_variance(0.01F);
+  chain.add_frames(5);
+  chain.add_unmeasured(1);
+  v1::SkeletonClosures& closures = *reply.mutable_closures();
+  closures.add_session_b(1);
+  closures.add_index_b(8);
+  closures.add_ordinal(1);
+  closures.add_session_a(1);
+  closures.add_index_a(3);
+  closures.add_state(v1::EDGE_STATE_ACCEPTED);
+  closures.add_carries(true);
+  for (int i = 0; i < 6; ++i) closures.add_a_from_b(0.2F);
+  for (int i = 0; i < 2; ++i) closures.add_variance(0.01F);
+  closures.add_suspicion(0.25F);
+  closures.add_alike(2);
+}
+
+}  // namespace
+
 void write_replies(const std::string& root) {
   const Corpus replies(root, "reply_fuzz");
   add_message<v1::Edge>(replies, 0);
@@ -382,6 +412,14 @@ void write_replies(const std::string& root) {
   add_message<v1::TransformBetweenReply>(replies, 9);
   add_message<v1::GetStatusReply>(replies, 10);
   add_message<v1::Robot>(replies, 11);
+  v1::GetSkeletonReply skeleton;
+  add_skeleton(skeleton);
+  replies.add("skeleton", {17}, as_bytes(skeleton.SerializeAsString()));
+  skeleton.mutable_chains(0)->add_carried(7);
+  replies.add("skeleton_carried_beyond_its_points", {17}, as_bytes(skeleton.SerializeAsString()));
+  skeleton.mutable_chains(0)->clear_carried();
+  skeleton.mutable_closures()->add_alike(3);
+  replies.add("skeleton_with_uneven_closures", {17}, as_bytes(skeleton.SerializeAsString()));
   add_message<v1::MapEvent>(replies, 16);
   const pb::OneofDescriptor& events = *v1::MapEvent::descriptor()->FindOneofByName("event");
   for (int i = 0; i < events.field_count(); ++i) {

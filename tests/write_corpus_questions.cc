@@ -411,6 +411,25 @@ void add_lists(const Corpus& corpus) {
                            r.add_sessions(9);
                          }))
                    .bytes());
+  const auto drawn = [](auto set) { return with<v1::GetSkeletonRequest>(set); };
+  for (const std::uint32_t level : {0u, 1u, 2u, 3u, 4u})
+    corpus.add("skeleton_" + std::to_string(level), {},
+               Calls()
+                   .call("GetSkeleton", drawn([&](v1::GetSkeletonRequest& r) {
+                           r.set_level(level);
+                           r.set_candidates(true);
+                         }))
+                   .call("GetSkeleton", drawn([&](v1::GetSkeletonRequest& r) {
+                           r.set_level(level);
+                           r.set_resume_token(kHeard);
+                         }))
+                   .call("GetSkeleton", drawn([&](v1::GetSkeletonRequest& r) {
+                           r.set_level(level);
+                           r.add_sessions(1);
+                           r.add_sessions(level);
+                         }))
+                   .call("GetSkeleton", drawn([](v1::GetSkeletonRequest& r) { r.set_resume_token("x-1-2"); }))
+                   .bytes());
   corpus.add("export_bad", {},
              Calls()
                  .call("Export", exported([](v1::ExportRequest& r) { r.set_resume_token("x"); }))

@@ -56,9 +56,9 @@ TEST_F(OtherWayTest, OfATrueClosureAgreesAndDoesNotUseIt) {
 }
 
 TEST_F(OtherWayTest, OfAWrongClosureContradictsItWhetherItIsInForceOrNot) {
-  propose(70, 3);
-  propose(75, 3.5, /*accept=*/true);
-  for (const std::uint32_t query : {70u, 75u}) {
+  for (const bool accept : {false, true}) {
+    const std::uint32_t query = accept ? 75 : 70;
+    propose(query, 3, accept);
     const OtherWay found = other_way_of(drive_.map(), frame(query));
     EXPECT_EQ(found.verdict, Reason::CONTRADICTS_MOTION) << found.message;
     EXPECT_GT(found.metres_apart, 2);
@@ -99,7 +99,11 @@ TEST_F(OtherWayTest, WithoutMetresIsNotCompared) {
 
 TEST(OtherWayOfARide, IsCarriedIfOthersSayItToo) {
   RiddenDrive ridden(kBeyond);
-  for (std::uint32_t i = kCircuit + 4; i < kCircuit + 30; i += 4) ridden.drive().apply(ridden.closure(i));
+  for (std::uint32_t i = kCircuit; i < kCircuit + kBeyond; ++i) {
+    auto proposal = ridden.closure(i);
+    proposal.verification = storage::Verification::kStereo;
+    ridden.drive().apply(proposal);
+  }
   const storage::Edge closure = loop_of(ridden.map(), RiddenDrive::frame(kCircuit + 20));
   ASSERT_EQ(closure.state, storage::EdgeState::kAccepted) << reason_name(closure.reason);
   // The nearest closures lead past the ride, which is compared only without them.

@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxAlternatives = 5;
 inline constexpr double kMaxStretch = 1.5, kMaxShared = 0.75;
 // A frame is beside a route up to this distance along edges and closures, or this share of the cheapest route's length
 // if that is less.
-inline constexpr double kBesideMetres = 10, kBesideShare = 0.05;
+inline constexpr double kBesideMetres = 10, kBesideShare = 0.1;
 // A part that is apart from known ways and costs less than this share of the cheapest route is kept only if it is the
 // cheapest way between its ends.
 inline constexpr double kLocalShare = 0.25;

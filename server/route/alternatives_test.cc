@@ -134,17 +134,17 @@ TEST(Alternatives, AreNotTheSameStreetOnAnotherPass) {
 TEST(Alternatives, KeepNoDetoursThatThePenaltyBroughtAbout) {
   DrawnMap map("");
   const std::string main = "ABCDEFGHIJKLM";
-  for (std::size_t i = 0; i < main.size(); ++i) map.place(main[i], {10.0 * static_cast<double>(i), 0, 0});
+  for (std::size_t i = 0; i < main.size(); ++i) map.place(main[i], {100.0 * static_cast<double>(i), 0, 0});
   map.drive(main);
-  map.place('r', {0, 0, 8});
-  map.place('s', {60, 0, 8});
+  map.place('r', {0, 0, 80});
+  map.place('s', {600, 0, 80});
   map.drive("rs");
   map.close("Ar");
-  map.close("sG");  // around the block from A to G: 76 m instead of 60
-  map.place('x', {95, 0, 3});
+  map.close("sG");  // around the block from A to G: 760 m instead of 600
+  map.place('x', {950, 0, 30});
   map.drive("x");
   map.close("xJ");
-  map.close("xK");  // 11.7 m instead of 10
+  map.close("xK");  // 117 m instead of 100
   const Asked asked(map);
   const auto found = asked.names('A', 'M', 3);
   ASSERT_GE(found.size(), 2u);

@@ -52,6 +52,8 @@ class WatchMapRequest;
 class MapEvent;
 class ExportRequest;
 class ExportReply;
+class GetSkeletonRequest;
+class GetSkeletonReply;
 class WaitIdleRequest;
 class WaitIdleReply;
 class VerifyRequest;
@@ -128,6 +130,8 @@ Result<LiveProducer<v1::MapEvent>> watch_map(const v1::WatchMapRequest& request,
                                              map::Mapper& mapper, WatchFeed& feed);
 Result<Producer<v1::ExportReply>> export_trajectories(const v1::ExportRequest& request, const Deadline& deadline,
                                                       map::Mapper& mapper, ViewKeeper& views);
+Result<Producer<v1::GetSkeletonReply>> get_skeleton(const v1::GetSkeletonRequest& request, const Deadline& deadline,
+                                                    map::Mapper& mapper, ViewKeeper& views);
 Result<v1::WaitIdleReply> wait_idle(const v1::WaitIdleRequest& request, const Deadline& deadline, map::Mapper& mapper);
 
 // Long work, on threads of its own (Lane::kMaintenance); each producer ends its work when it is destroyed.

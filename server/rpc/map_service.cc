@@ -68,6 +68,9 @@ class MapService final : public v1::Map::CallbackService {
   Unary* GetStatus(Context* context, const v1::GetStatusRequest* request, v1::GetStatusReply* reply) override {
     return unary(context, "Map.GetStatus", request, reply, get_status);
   }
+  Stream<v1::GetSkeletonReply>* GetSkeleton(Context* context, const v1::GetSkeletonRequest* request) override {
+    return stream<v1::GetSkeletonReply>(context, "Map.GetSkeleton", request, get_skeleton);
+  }
   Stream<v1::ExportReply>* Export(Context* context, const v1::ExportRequest* request) override {
     return stream<v1::ExportReply>(context, "Map.Export", request, export_trajectories);
   }

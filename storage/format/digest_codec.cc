@@ -20,7 +20,7 @@ using varint::put_unsigned;
 // A field added to one of these must be added here, to agree() and to the tests.
 static_assert(sizeof(ClosureDigest) == 208 && sizeof(FrameDigest) == 160);
 
-constexpr std::uint8_t kDigestsKind = 7;
+constexpr std::uint8_t kDigestsKind = 8;
 constexpr std::uint16_t kDigestsVersion = 1;
 
 // Three numbers with one power of two: q / 2^(kBits - exponent), where the largest |q| lies in [2^(kBits-1), 2^kBits).

@@ -45,7 +45,7 @@ void read_record(ByteSpan record) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const ByteSpan bytes(data, size);
   read_record(bytes);
-  read_record(seal(7, 1, bytes));
+  read_record(seal(8, 1, bytes));
   if (size == 0) return 0;
   DigestWriter writer(kChunk, 1'700'000'000'000'000);
   writer.copy(data[0] % kFramesPerChunk, bytes, size % 2 == 0);

@@ -71,7 +71,7 @@ struct Map::Impl {
   std::map<std::uint64_t, EditKey> edits;
   std::set<std::uint64_t> changed_edits;  // remembered or forgotten since the last commit was begun
   MapState state;
-  bool digests_hold = false;      // the digests in the snapshot are right, and commits keep them so
+  bool digests_hold = false;  // the digests in the snapshot are right, and commits keep them so
   EventWriter events{{}};
   std::size_t event_bytes = 0;    // part of dirty_bytes: what the next commit tells
   std::size_t dirty_bytes = 0;    // charged, including what a commit is writing

@@ -57,7 +57,8 @@ class Facts {
   }
 
   void add_state(ByteSpan value) {
-    const MapState state = format_ == 1 ? format1::decode_state(value).or_throw() : decode_state(value).or_throw();
+    MapState state = format_ == 1 ? format1::decode_state(value).or_throw() : decode_state(value).or_throw();
+    state.digests_commit = 0;  // digests follow from frames
     add("state", encode_state(state));
   }
 
@@ -143,7 +144,8 @@ Result<MapFactSums> sum_facts(const Engine& engine, int format,
       SessionNumber session = 0;
       for (const char byte : key.substr(1, sizeof session)) session = session << 8 | static_cast<std::uint8_t>(byte);
       facts.add_skipped(session, item);
-    } else if (!key.starts_with(keys::all_pending()) && !key.starts_with(keys::all_events())) {
+    } else if (!key.starts_with(keys::all_pending()) && !key.starts_with(keys::all_events()) &&
+               !key.starts_with(keys::all_digests())) {
       facts.add(key, value);
     }
     return true;

@@ -38,6 +38,8 @@ const Subcommand kSubcommands[] = {
     {"rides", "Run drives on which the robot is carried through front-end and map", relmap::bench::declare_rides},
     {"routes", "Find routes through a map far larger than memory", relmap::bench::declare_routes},
     {"security", "What seals, TLS, forgeries, crowds and strangers cost others", relmap::bench::declare_security},
+    {"skeleton", "Draw the shape of a map of a million frames: first page, whole, bytes, layout",
+     relmap::bench::declare_skeleton},
     {"storage", "Write and read a map by storage's own API: speed, memory, bytes written",
      relmap::bench::declare_storage},
     {"suspicion", "Plant wrong closures among true ones, and find them by how doubtful closures are",

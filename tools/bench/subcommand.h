@@ -31,6 +31,7 @@ Run declare_rba(CLI::App& app);
 Run declare_rides(CLI::App& app);
 Run declare_routes(CLI::App& app);
 Run declare_security(CLI::App& app);
+Run declare_skeleton(CLI::App& app);
 Run declare_storage(CLI::App& app);
 Run declare_suspicion(CLI::App& app);
 Run declare_unpack(CLI::App& app);

@@ -117,13 +117,13 @@ std::string verdict_text(const client::MotionVerdict& verdict) {
   }
   std::string text = said;
   if (verdict.verdict != Reason::OK) text += " (" + std::string(reason_name(verdict.verdict)) + ")";
-  if (verdict.edges > 0)
-    text += ": by the way without it, " + counted_text(verdict.edges, "edge") + ", " + fixed(verdict.distance_m, 1) +
-            " m, the ends lie " + fixed(verdict.metres_apart, 2) + " m and " +
-            fixed(kDegrees * verdict.radians_apart, 1) + " degrees from where it puts them, " +
-            fixed(verdict.sigmas_apart, 1) + " sigmas";
-  else if (!verdict.message.empty())
+  if (!verdict.message.empty())
     text += ": " + verdict.message;
+  else if (verdict.edges > 0)
+    text += ": the way without it, " + counted_text(verdict.edges, "edge") + ", " + fixed(verdict.distance_m, 1) +
+            " m, leads " + fixed(verdict.metres_apart, 2) + " m and " +
+            fixed(kDegrees * verdict.radians_apart, 1) + " degrees from where it says, " +
+            fixed(verdict.sigmas_apart, 1) + " sigmas";
   return text;
 }
 

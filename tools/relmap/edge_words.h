@@ -30,7 +30,7 @@ std::string unmeasured_text(const client::Unmeasured& unmeasured, double distanc
 
 // "0.40 contradicted: 3 closures in force contradict it"
 std::string doubt_text(const client::Doubt& doubt);
-// What the robot's motion says of a closure: "contradicts it (CONTRADICTS_MOTION): 12.3 m and 34.0 degrees apart, ...".
+// What the robot's motion says of a closure: "contradicts it (CONTRADICTS_MOTION): the way between its ends ..."
 std::string verdict_text(const client::MotionVerdict& verdict);
 // "3 closures agree with it: 3:120/1 3:121/1; 1 contradicts it: 4:7/1"; empty: there are neither.
 std::string agreements_text(const client::EdgeExplanation& explained);

@@ -27,7 +27,7 @@ p{margin:6px 0}.faint{color:var(--faint)}code_html{font:13px ui-monospace,Consol
 .tile b{display:block;font-size:22px;line-height:1.25}.tile span{color:var(--faint);font-size:13px}
 table{border-collapse:collapse;margin:8px 0;font-size:14px}th{text-align:left;color:var(--faint);font-weight:600}
 th,td{padding:3px 12px 3px 0;border-bottom:1px solid var(--rule);vertical-align:top}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}
-.wide{overflow-x:auto}table.heat td,table.heat th{padding:3px 7px;border:1px solid var(--rule);text-align:center}table.heat .sus{outline:2px solid var(--bad);outline-offset:-2px}
+.wide{overflow-x:auto}table.heat td,table.heat th{padding:3px 7px;border:1px solid var(--rule);text-align:center}table.heat td>div{margin:-3px -7px;padding:3px 7px}table.heat .sus{outline:2px solid var(--bad);outline-offset:-2px}
 figure{margin:12px 0;break-inside:avoid}figure svg{display:block;max-width:100%;height:auto;border-radius:6px;border:1px solid var(--rule)}
 .look{border-left:4px solid var(--bad);background:var(--card);padding:6px 14px;margin:12px 0}.look li{margin:3px 0}
 .bar{display:inline-block;height:11px;background:rgb(var(--heat));opacity:.75;vertical-align:middle;min-width:1px}

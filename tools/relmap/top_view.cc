@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tools/relmap/robot_trouble.h"
+#include "tools/relmap/status_view.h"
 
 namespace relmap::cli {
 

@@ -656,7 +656,7 @@ class AsyncClient:
         """The shape of the map, small enough to draw. RequestError: NO_SUCH_SESSION. ValueError: the level.
 
         Args:
-            level: beside junctions at most one frame in 64 (0), 16 (1), 4 (2), or all (3).
+            level: beside junctions, of 64 consecutive frames about 1 (0), 4 (1), 16 (2), or all (3); 1 is for drawing.
             sessions: only these; empty: all.
             candidates: with closures that are not in force.
         """

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Callable, Optional
 
 from relmap.geometry import Array, read_transform
-from relmap.graph import Edge, MotionSource, Session, read_edge, read_session
+from relmap.graph import Edge, MotionSource, SessionState, read_edge
 from relmap.ids import EdgeId, FrameId, read_edge_id, read_frame_id
 from relmap.reason import Reason
 from relmap.record import Record
 from relmap.status import Condition, RobotStatus, read_robot
 from relmap.times import as_datetime
-from relmap.v1 import watch_pb2
+from relmap.v1 import graph_pb2, watch_pb2
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +53,18 @@ class MapEvent(Record):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionChanged(MapEvent):
-    """A session began, ended, was frozen or thawed, or its deletion began."""
+    """A session began, ended, was frozen or thawed, or its deletion began.
 
-    session: Session
+    Attributes:
+        session, uuid, robot, name: which; its number, and its names.
+        state: now.
+    """
+
+    session: int
+    uuid: str
+    robot: str
+    name: str
+    state: SessionState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,6 +215,10 @@ class UnknownEvent(MapEvent):
     """An event of a newer relmapd, that this version does not know."""
 
 
+def _session_changed(o: EventOrigin, m: graph_pb2.Session) -> SessionChanged:
+    return SessionChanged(o, m.number, m.uuid, m.robot, m.name, SessionState(m.state))
+
+
 def _frames_added(o: EventOrigin, m: watch_pb2.FramesAdded) -> FramesAdded:
     return FramesAdded(
         o,
@@ -224,7 +237,7 @@ def _frames_added(o: EventOrigin, m: watch_pb2.FramesAdded) -> FramesAdded:
 
 _Read = Callable[[EventOrigin, watch_pb2.MapEvent], MapEvent]
 _READ: dict[str, _Read] = {
-    "session_changed": lambda o, e: SessionChanged(o, read_session(e.session_changed)),
+    "session_changed": lambda o, e: _session_changed(o, e.session_changed),
     "edge_changed": lambda o, e: EdgeChanged(o, read_edge(e.edge_changed)),
     "frames_moved": lambda o, e: FramesMoved(
         o, tuple(FrameRange(r.session, r.first, r.last) for r in e.frames_moved.ranges)

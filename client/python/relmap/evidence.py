@@ -33,7 +33,8 @@ class MotionVerdict(Record):
     """What the way between the ends without this closure says of it.
 
     Attributes:
-        verdict: OK: it agrees. CONTRADICTS_MOTION, CARRIED: it does not. NOT_CONNECTED, OUT_OF_REACH: it says nothing.
+        verdict: OK: it agrees. CONTRADICTS_MOTION, CARRIED: it does not. NOT_CONNECTED, OUT_OF_REACH: it says
+            nothing. NOT_STEREO: the closure measured no metres.
         message: in words.
         edges, distance_m: of the way.
         T_ab: 4 x 4, relative pose by the way, metres.

@@ -171,10 +171,12 @@ class Suspicion:
     Attributes:
         value: 0: nothing speaks against it; 1: it is wrong as far as the map can tell.
         doubts: the heaviest first.
+        remark: what else to know, in words: what the map does not know of it, or that an operator put it into force.
     """
 
     value: float
     doubts: tuple[Doubt, ...]
+    remark: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -516,7 +518,7 @@ def _read_uniqueness(message: graph_pb2.Uniqueness) -> Uniqueness:
 
 def _read_suspicion(message: graph_pb2.Suspicion) -> Suspicion:
     doubts = tuple(Doubt(DoubtKind(d.kind), d.weight, d.message) for d in message.doubts)
-    return Suspicion(message.value, doubts)
+    return Suspicion(message.value, doubts, message.remark)
 
 
 def read_edge(message: graph_pb2.Edge) -> Edge:

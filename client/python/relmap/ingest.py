@@ -152,7 +152,7 @@ class IngestSession:
             keyframe = self._state.make(
                 time, T_odom_frame, step_cov, source, tracks, features, picture, driven_us, standing_us, sequence
             )
-        return self.add_keyframe(keyframe)
+            return self.add_keyframe(keyframe)
 
     def add_keyframe(self, keyframe: Keyframe) -> int:
         """Adds a keyframe that has this session's header. Raises as add()."""

@@ -23,8 +23,9 @@ class Correspondences(Record):
     Attributes:
         view: float32 (n, 2), pixels u, v in the view's left picture as it was sent.
         frame: float32 (n, 2), pixels in the frame's rectified left camera.
-        inlier: bool (n,), it agrees with the verified transform.
-        residual: float32 (n,), pixels between where it was measured and where the transform puts it; NaN: no metres.
+        inlier: bool (n,), it agrees with the transform that was found.
+        residual: float32 (n,), pixels in the view between where it was measured and where the transform puts the point of the
+            map; NaN: without metres, or without a transform.
         seen_in: of each, the frame beside it that has measured the landmark; None: the frame itself.
     """
 

@@ -26,5 +26,5 @@ class Record:
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented
-        names = [field.name for field in dataclasses.fields(self) if field.compare]  # type: ignore[arg-type]
+        names = [field.name for field in dataclasses.fields(self) if field.compare]
         return all(_same(getattr(self, name), getattr(other, name)) for name in names)

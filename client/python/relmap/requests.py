@@ -118,8 +118,8 @@ def edges_request(
     )
     if other_session and not session:
         raise ValueError("other_session needs session")
-    request.states.extend(int(state) for state in states)  # type: ignore[arg-type]
-    request.kinds.extend(int(kind) for kind in kinds)  # type: ignore[arg-type]
+    request.states.extend(int(state) for state in states)
+    request.kinds.extend(int(kind) for kind in kinds)
     if order != EdgeOrder.ID:
         request.order = int(order)  # type: ignore[assignment]
     if frame is not None:

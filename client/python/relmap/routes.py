@@ -68,7 +68,13 @@ class RouteBy(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class RouteWeights:
-    """The cost of an edge as a weighted sum; each weight is 0, or 1e-9 to 1e9, and not all are 0."""
+    """The cost of an edge as a weighted sum; each weight is 0, or 1e-9 to 1e9, and not all are 0.
+
+    Attributes:
+        metre: of its length.
+        driven_second, standing_second: of the time that robots drove and stood along it.
+        square_metre_of_variance: of the trace of the covariance of its translation.
+    """
 
     metre: float = 0.0
     driven_second: float = 0.0
@@ -118,7 +124,7 @@ class Route(Record):
         frame_by_frame: why the daemon had to search frame by frame; empty: it searched by cells.
         bound_closures, no_way_by_edges: see relmap/v1/map.proto, RouteSummary.
         from_view, to_view: how ends that are views were localised.
-        shared: of an alternative: the share of its length that the routes before it use, too.
+        shared: of an alternative: the share of its length on or beside the routes before it, 0..0.75.
         alternatives: other routes, by cost, if they were asked for.
         map_version: the version of the map that was asked.
     """

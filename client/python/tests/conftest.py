@@ -16,7 +16,7 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 PYTHON = pathlib.Path(__file__).resolve().parents[1]
 SOURCE = PYTHON.parents[1]
 BIN = pathlib.Path(os.environ.get("RELMAP_BIN", SOURCE / "build/release/bin"))
-for folder in (PYTHON, PYTHON / "notebooks"):
+for folder in (PYTHON, PYTHON / "notebooks", PYTHON / "bench"):
     sys.path.insert(0, str(folder))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(PYTHON), os.environ.get("PYTHONPATH", "")])
 

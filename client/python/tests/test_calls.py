@@ -68,7 +68,7 @@ CALLS: Dict[str, Tuple[str, Callable[[Any, str], Any], str]] = {
     "Admin.WaitIdle": ("wait_idle", lambda c, f: c.wait_idle(), ""),
     "Admin.Commit": ("commit", lambda c, f: c.commit(), ""),
     "Admin.SetLogLevel": ("set_log_level", lambda c, f: c.set_log_level(), ""),
-    "Admin.FreezeSession": ("freeze_session", lambda c, f: c.freeze_session(1, False), ""),
+    "Admin.FreezeSession": ("freeze_session", lambda c, f: c.freeze_session(1, False), "WRONG_STATE"),
     "Admin.DeleteSession": ("delete_session", lambda c, f: c.delete_session(1, "no uuid of it"), "INVALID_ARGUMENT"),
     "Admin.ListAudit": ("audit", lambda c, f: c.audit(limit=5), ""),
     "Ingest.Stream": ("session", lambda c, f: _session(c), ""),
@@ -276,6 +276,16 @@ def test_each_group_of_reasons_is_an_exception(client: relmap.Client) -> None:
         client.verify(timeout=1e-6)
     with pytest.raises(relmap.RequestError):
         client.localise(b"\xff\xd8\xff damaged")
+
+
+def test_a_pair_whose_rows_are_apart_is_told(client: relmap.Client) -> None:
+    rng = np.random.default_rng(4)
+    blocks = np.kron(rng.integers(0, 256, (60, 80)), np.ones((8, 8)))
+    left = np.clip(blocks + rng.normal(0, 4, blocks.shape), 0, 255).astype(np.uint8)[:384, 64:576]
+    right = np.clip(blocks + rng.normal(0, 4, blocks.shape), 0, 255).astype(np.uint8)[9:393, 76:588]
+    with pytest.raises(relmap.CameraError) as raised:
+        client.localise(left, right, camera=points_world.CAMERA)
+    assert raised.value.reason == relmap.Reason.ROWS_APART
 
 
 def test_progress_can_end_the_work(client: relmap.Client) -> None:

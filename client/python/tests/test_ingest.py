@@ -9,12 +9,13 @@ import time
 import uuid
 from typing import List
 
+import compare_ingest
 import numpy as np
 import points_world
 import pytest
 import relmap
 import relmap.aio
-from conftest import PATIENCE_S, Daemon, frontend_arguments, program
+from conftest import PATIENCE_S, Daemon
 from relmap.ingest_core import IngestCore
 from relmap.v1 import ingest_pb2
 
@@ -159,36 +160,11 @@ def test_what_is_wrong_is_not_sent(client: relmap.Client) -> None:
         client.session("cart", None)  # type: ignore[arg-type]
 
 
-def test_keyframes_of_cpp_make_the_same_map(keyframe_files: List[pathlib.Path], tmp_path: pathlib.Path) -> None:
-    """Of the keyframes of one drive, sent by relmap-frontend and from Python, two deterministic daemons make equal maps."""
-    hashes = []
-    for how in ("cpp", "python"):
-        running = Daemon(tmp_path / how, "--deterministic")
-        try:
-            if how == "cpp":
-                program("relmap-frontend", *frontend_arguments(keyframe_files[1]), "--server", running.server, "--spool", "none")
-            else:
-                keyframes = list(relmap.read_keyframes(keyframe_files[1].read_bytes()))
-                h = keyframes[0].header
-                with relmap.connect(running.server) as client:
-                    with client.session(h.robot, h.camera, name=h.name, uuid=h.uuid, raw=h.raw) as session:
-                        for keyframe in keyframes:
-                            session.add_keyframe(keyframe)
-            with relmap.connect(running.server, timeout=PATIENCE_S) as client:
-                client.wait_idle()
-                hashes.append(_contents(client))
-        finally:
-            running.stop()
-    assert hashes[0] == hashes[1]
-
-
-def _contents(client: relmap.Client) -> list[object]:
-    """Everything that the map holds of session 1, as answers to questions."""
-    frames = [
-        client.frame(relmap.FrameId(1, i), landmarks=True, observations=True, appearance=True)
-        for i in range(client.sessions()[0].frames)
-    ]
-    return [frames, client.edges(), list(client.export_frames([1], landmarks=True))]
+def test_keyframes_of_cpp_make_the_same_map(tmp_path: pathlib.Path) -> None:
+    """Of one drive, sent by relmap-frontend and from Python, two deterministic daemons make equal maps; with 10,000 keyframes
+    bench/compare_ingest.py does the same."""
+    result = compare_ingest.compare(tmp_path, 160)
+    assert result["equal"] and result["frames"] == 160 and result["closures"] > 5, result
 
 
 # ---- The state machine alone

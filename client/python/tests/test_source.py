@@ -32,9 +32,10 @@ def test_the_blocking_client_is_made_of_the_other() -> None:
 
 def test_types_are_strict(tmp_path: pathlib.Path) -> None:
     pytest.importorskip("mypy")
-    command = [sys.executable, "-m", "mypy", "--config-file", "pyproject.toml", "--cache-dir", str(tmp_path)]
-    result = subprocess.run(command, cwd=PYTHON, capture_output=True, text=True)
-    assert result.returncode == 0, result.stdout
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml", "--cache-dir", str(tmp_path)]
+    for more in ([], ["tests/typed_program.py"]):
+        result = subprocess.run(command + more, cwd=PYTHON, capture_output=True, text=True)
+        assert result.returncode == 0, result.stdout
 
 
 def _modules() -> list[str]:

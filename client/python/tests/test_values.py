@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import pathlib
 import struct
 import zlib
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 import relmap
 from relmap import geometry
+from relmap.address import ServerAddress, resolve_server
 from relmap.crc32c import crc32c
 from relmap.measurements import Features, Tracks
 from relmap.pictures import encode_png, picture_bytes
@@ -240,3 +242,23 @@ def test_crc32c() -> None:
     data = np.random.default_rng(5).integers(0, 256, 9000, dtype=np.uint8).tobytes()
     for size in (0, 1, 3, 4, 5, 7, 63, 64, 4095, 4096, 4097, 8191, 9000):
         assert crc32c(data[:size]) == slow(data[:size]), size
+
+
+def test_addresses_are_found_as_by_cpp(tmp_path: pathlib.Path) -> None:
+    def endpoint(text: str) -> ServerAddress:
+        (tmp_path / "endpoint").write_text(text)
+        return resolve_server(tmp_path)
+
+    assert resolve_server("map.lab:50070") == ServerAddress("map.lab:50070")
+    assert resolve_server("unix:/run/relmap/socket").is_socket
+    here = endpoint("address 0.0.0.0:5\npid 12\nboot ab\nlater something\n")
+    assert here == ServerAddress("localhost:5", "ab", 12) and not here.is_socket
+    assert endpoint("address [::]:5\npid 12\nboot ab\n").address == "localhost:5"
+    both = endpoint("socket /a b/50%?#/socket\naddress 1.2.3.4:5\npid 1\nboot ab\n")
+    assert both.address == "unix:/a b/50%25%3f%23/socket"
+    for text in ("", "address nonsense\nboot ab\n", "address 1.2.3.4:5\n", "address 1.2.3.4:99999\nboot ab\n"):
+        with pytest.raises(relmap.RelmapError, match="does not say where"):
+            endpoint(text)
+    for text in ("nowhere", "host:", "host:x", ":5", "host:0", "host:65536"):
+        with pytest.raises(relmap.RequestError):
+            resolve_server(text)

@@ -8,7 +8,6 @@ import threading
 from typing import Any, Callable, Iterator
 
 import grpc
-import points_world
 import pytest
 import relmap
 import relmap.aio
@@ -31,7 +30,7 @@ class Watcher:
         try:
             for event in self._client.watch(**options):
                 self._queue.put(event)
-        except relmap.RelmapError as error:
+        except Exception as error:
             self._queue.put(error)
 
     def until(self, wanted: Callable[[events.MapEvent], bool]) -> events.MapEvent:
@@ -68,7 +67,7 @@ def test_everything_is_told_through_a_kill(own_daemon: Daemon) -> None:
     assert added == list(range(70))
     told = {e.edge.id: e.edge.state for e in watcher.seen if isinstance(e, events.EdgeChanged)}
     assert told == closures and len(told) > 3
-    assert any(isinstance(e, events.SessionChanged) and e.session.number == number for e in watcher.seen)
+    assert any(isinstance(e, events.SessionChanged) and e.session == number for e in watcher.seen)
     tokens = [e.origin.resume_token for e in watcher.seen if e.origin.resume_token]
     again = Watcher(own_daemon.server, resume_token=tokens[-1])
     again.until(_is(events.CaughtUp))
@@ -102,7 +101,7 @@ def _event(number: int, **event: Any) -> watch_pb2.MapEvent:
 def test_every_event_is_read_and_a_later_one_does_not_disturb() -> None:
     frame = common_pb2.FrameId(session=1, index=2)
     all_of = [
-        _event(1, session_changed=graph_pb2.Session(number=1, camera=_camera())),
+        _event(1, session_changed=graph_pb2.Session(number=1)),
         _event(2, edge_changed=graph_pb2.Edge(id=common_pb2.EdgeId(frame=frame, ordinal=1), b=frame)),
         _event(3, frames_moved=watch_pb2.FramesMoved(ranges=[watch_pb2.FrameRange(session=1, first=2, last=3)])),
         _event(4, frames_added=watch_pb2.FramesAdded(session=1, frames=[watch_pb2.AddedFrame(index=4)])),
@@ -121,11 +120,6 @@ def test_every_event_is_read_and_a_later_one_does_not_disturb() -> None:
     fields = [f.name for f in watch_pb2.MapEvent.DESCRIPTOR.oneofs_by_name["event"].fields]
     assert len(set(kinds)) == len(all_of) == len(fields) - 2 + 1  # two are deprecated, one is unknown
     assert kinds[-1] == "UnknownEvent"
-
-
-def _camera() -> common_pb2.Camera:
-    camera = points_world.CAMERA
-    return common_pb2.Camera(f=camera.f, cx=camera.cx, cy=camera.cy, width=camera.width, height=camera.height)
 
 
 def test_a_stream_goes_on_after_the_last_event() -> None:

@@ -33,6 +33,7 @@ def explanation_html(explanation: "Explanation") -> str:
     if edge.suspicion is not None:
         lines.append(f"suspicion {edge.suspicion.value:.2f}")
         lines += [f"{doubt.weight:.2f}: {safe_text(doubt.message)}" for doubt in edge.suspicion.doubts]
+        lines += [safe_text(edge.suspicion.remark)] if edge.suspicion.remark else []
     if explanation.motion is not None:
         lines.append(f"the way without it: {safe_text(explanation.motion.verdict.name)} {safe_text(explanation.motion.message)}")
     agree = sum(a.agrees for a in explanation.agreements)

@@ -1,0 +1,47 @@
+// A skeleton laid out in one frame for each connected part, for drawing, by pose-graph relaxation
+// (client/relaxation.h).
+//
+// Edges count as in all pictures of the map: a measured step, and a closure that is an edge of the graph and in force,
+// with its covariance; a guess of the robot's motion only where nothing measured connects its ends; a step along which
+// the robot was carried next to nothing.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "client/relaxation.h"
+#include "client/skeleton.h"
+
+namespace relmap::client {
+
+struct RelaxedSkeleton {
+  struct Place {
+    FrameId frame;
+    SE3 T_root_frame;
+  };
+  // Points that edges connect, ascending, with poses relative to `root`: the chosen root, or the first point.
+  struct Part {
+    FrameId root;
+    std::vector<Place> places;
+
+    const SE3* find(FrameId frame) const;  // null: it is not in this part
+  };
+
+  std::vector<Part> parts;  // the one with the chosen root first, then the largest first
+  std::size_t relaxed = 0;  // points that were relaxed; the others follow from these along the motion
+  bool converged = true;
+};
+
+struct SkeletonLayout {
+  std::optional<FrameId> root = {};
+  // Of more points only about so many are relaxed, and the others follow from these (client/contraction.h).
+  std::size_t max_relaxed = 20'000;
+  // A picture shows no more than this.
+  RelaxationOptions relaxation = {.max_iterations = 20, .relative_tolerance = 1e-4, .loop_huber = 4};
+};
+
+// NO_SUCH_FRAME: the root is no point of the skeleton. EMPTY_MAP: it has no points. The reasons of relax().
+Result<RelaxedSkeleton> relax_skeleton(const Skeleton& skeleton, const SkeletonLayout& layout = {});
+
+}  // namespace relmap::client
