@@ -70,13 +70,6 @@ TEST(PublishedRatios, HoldForAPlacePassedAgainAndAgain) {
                 {{growth, times.at(1) / times.at(0), "median update of the last laps over that of the second"}});
 }
 
-TEST(PublishedRatios, HoldForTheWorkerWithWatchers) {
-  expect_ratios({"watch", "--robots", "4", "--watchers", "8", "--stalled", "2", "--seconds", "3", "--rounds", "2"},
-                {{[](const BenchFigures& found) { return found["worker_ratio"]; },
-                  published_figure(kFigures, "with watchers over without \\| ([0-9.]+) "),
-                  "the worker's time of a keyframe with watchers over that without"}});
-}
-
 // A five-hundredth of the published drive, in a sixteenth of its memory.
 TEST(PublishedRatios, HoldForAnUpdateInAMapThatGrows) {
   const auto growth = [](const BenchFigures& found) {
