@@ -1,5 +1,5 @@
-// The skeleton of a map: its shape, contracted for drawing, so that a map of a million frames takes megabytes and
-// seconds. relmap/v1/skeleton.proto describes the levels; client/skeleton_relaxation.h lays a skeleton out in a plane.
+// The skeleton of a map: its shape, contracted for drawing, so that a map of a million frames fits a picture's
+// program. relmap/v1/skeleton.proto describes the levels; client/skeleton_relaxation.h lays a skeleton out in a plane.
 #pragma once
 
 #include <cstdint>

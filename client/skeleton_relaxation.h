@@ -35,7 +35,7 @@ struct RelaxedSkeleton {
 
 struct SkeletonLayout {
   std::optional<FrameId> root = {};
-  // Of more points only about so many are relaxed (client/contraction.h). More take seconds, and look no better.
+  // Of more points only about so many are relaxed, and the others follow from these (client/contraction.h).
   std::size_t max_relaxed = 20'000;
   // A picture shows no more than this.
   RelaxationOptions relaxation = {.max_iterations = 20, .relative_tolerance = 1e-4, .loop_huber = 4};

@@ -107,8 +107,7 @@ TEST_F(EdgeListHandlers, FiltersChooseAmongAllEdges) {
   around.set_max_edges(3);
   std::set<FrameId> near;
   const auto neighbourhood = call(*map_.core, get_neighbourhood, around, deadline_).or_throw();
-  for (const v1::NeighbourhoodFrame& frame : neighbourhood.frames())
-    near.insert(from_wire(frame.frame()).or_throw());
+  for (const v1::NeighbourhoodFrame& frame : neighbourhood.frames()) near.insert(from_wire(frame.frame()).or_throw());
   const auto is_near = [&](const v1::Edge& e) {
     return near.contains(from_wire(e.a()).or_throw()) || near.contains(from_wire(e.b()).or_throw());
   };

@@ -141,9 +141,9 @@ class MapView final : public Graph {
 
   // Visits the digests of all chunks that have frames (with `kClosures`: frames with closures, and only these), from
   // `from` on, ascending, until `visit` returns false: of this version of the map, as precise as they are stored
-  // (storage/format/digest_codec.h), whether they are committed or not. One scan, without the cache: 2 us a chunk and
-  // 0.1 us a frame. DATA_LOSS naming a chunk whose record is damaged, IO_ERROR, VIEW_EXPIRED. What `visit` throws
-  // passes through, but for a StatusError, which is returned.
+  // (storage/format/digest_codec.h), whether they are committed or not. One scan, without the cache. DATA_LOSS naming a
+  // chunk whose record is damaged, IO_ERROR, VIEW_EXPIRED. What `visit` throws passes through, but for a StatusError,
+  // which is returned.
   Status visit_digests(ChunkId from, const std::function<bool(const ChunkDigest&)>& visit,
                        DigestsOf which = DigestsOf::kAll) const;
 

@@ -1,5 +1,5 @@
 // A map of any size whose shape is known: sessions of robots that drive the streets of a city, with closures where one
-// drives where another was before. It is made by storage's own API, without pictures, in a minute for a million frames.
+// drives where another was before. It is made by storage's own API, without pictures.
 #pragma once
 
 #include <cstdint>

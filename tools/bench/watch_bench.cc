@@ -78,13 +78,13 @@ class WatchedFleet {
 
   // Processor time of each thread so far, by its number.
   std::map<std::string, double> thread_seconds() {
-    std::map<std::string, double> seconds;
+    std::map<std::string, double> spent;
     for (const auto& task : fs::directory_iterator("/proc/" + std::to_string(daemon_.process().pid()) + "/task")) {
       std::ifstream file(task.path() / "schedstat");
       double ns = 0;
-      if (file >> ns) seconds[task.path().filename()] = 1e-9 * ns;
+      if (file >> ns) spent[task.path().filename()] = 1e-9 * ns;
     }
-    return seconds;
+    return spent;
   }
 
  private:
@@ -192,13 +192,13 @@ struct Phase {
   double per_frame_us(double s) const { return 1e6 * s / static_cast<double>(frames); }
 };
 
-Phase measure(WatchedFleet& fleet, client::Client& client, double seconds) {
+Phase measure(WatchedFleet& fleet, client::Client& client, double duration_s) {
   std::this_thread::sleep_for(std::chrono::duration<double>(kSettle_s));
   const auto before = fleet.thread_seconds();
   const double cpu = fleet.daemon().process().cpu_seconds();
   const std::uint64_t frames = client.status().or_throw().frames;
   const auto begin = Clock::now();
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+  std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
   Phase phase;
   phase.seconds = seconds_since(begin);
   phase.frames = client.status().or_throw().frames - frames;
