@@ -18,7 +18,7 @@ constexpr std::array<const char*, 10> kDoubts = {"other doubt",
                                                  "another place fits as well",
                                                  "the place differs",
                                                  "contradicted",
-                                                 "nothing agrees",
+                                                 "few agree",
                                                  "under tension",
                                                  "not seen beyond"};
 

@@ -332,7 +332,7 @@ TEST_F(Operator, DrawsRoutesAndMaps) {
   const Finished map = relmap({"map", "--tears", "--colour", "uncertainty", "--out", folder_ / "map.svg"});
   ASSERT_EQ(map.exit_code, 0) << map.standard_error;
   EXPECT_THAT(contents(folder_ / "map.svg"), HasSubstr("(one sigma)"));
-  EXPECT_THAT(map.standard_error, HasSubstr("stretched closure: "));
+  EXPECT_THAT(map.standard_error, HasSubstr("no tear: the picture stretches no edge by more than 6 sigmas"));
   const Finished times = relmap({"map", "--colour", "time", "--out", folder_ / "map.svg"});
   ASSERT_EQ(times.exit_code, 0) << times.standard_error;
   EXPECT_THAT(contents(folder_ / "map.svg"), HasSubstr("colour: when it was"));

@@ -98,6 +98,13 @@ std::string doubt_text(const client::Doubt& doubt) {
   return fixed(doubt.weight, 2) + " " + name_of(doubt.kind) + (doubt.message.empty() ? "" : ": " + doubt.message);
 }
 
+std::vector<client::Doubt> doubts_of(const client::Suspicion& suspicion) {
+  std::vector<client::Doubt> doubts;
+  for (const client::Doubt& doubt : suspicion.doubts)
+    if (doubt.weight >= 0.005) doubts.push_back(doubt);
+  return doubts;
+}
+
 std::string verdict_text(const client::MotionVerdict& verdict) {
   const char* said = "says nothing of it";
   switch (verdict.verdict) {

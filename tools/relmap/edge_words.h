@@ -30,6 +30,8 @@ std::string unmeasured_text(const client::Unmeasured& unmeasured, double distanc
 
 // "0.40 contradicted: 3 closures in force contradict it"
 std::string doubt_text(const client::Doubt& doubt);
+// Those that weigh something when they are rounded to two decimals.
+std::vector<client::Doubt> doubts_of(const client::Suspicion& suspicion);
 // What the robot's motion says of a closure: "contradicts it (CONTRADICTS_MOTION): the way between its ends ..."
 std::string verdict_text(const client::MotionVerdict& verdict);
 // "3 closures agree with it: 3:120/1 3:121/1; 1 contradicts it: 4:7/1"; empty: there are neither.

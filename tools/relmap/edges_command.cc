@@ -7,6 +7,7 @@
 
 #include "client/pair_picture.h"
 #include "tools/relmap/commands.h"
+#include "tools/relmap/edge_words.h"
 #include "tools/relmap/explain.h"
 #include "tools/relmap/pairs.h"
 #include "tools/relmap/picture_output.h"
@@ -43,7 +44,8 @@ void print(const std::vector<client::Edge>& edges, terminal::Console& console) {
                     loop ? fixed(e.probability, 3) : ""});
     if (!judged) continue;
     rows.back().push_back(e.suspicion ? fixed(e.suspicion->value, 2) : "");
-    rows.back().push_back(e.suspicion && !e.suspicion->doubts.empty() ? name_of(e.suspicion->doubts.front().kind) : "");
+    const auto doubts = e.suspicion ? doubts_of(*e.suspicion) : std::vector<client::Doubt>();
+    rows.back().push_back(doubts.empty() ? "" : name_of(doubts.front().kind));
   }
   console.table(heads, rows);
 }

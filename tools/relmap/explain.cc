@@ -64,9 +64,10 @@ void print_evidence(const client::Edge& edge, std::ostream& out) {
 
 void print_suspicion(const client::Edge& edge, std::ostream& out) {
   if (!edge.suspicion) return;
+  const std::vector<client::Doubt> doubts = doubts_of(*edge.suspicion);
   out << "  suspicion " << fixed(edge.suspicion->value, 2) << " of 1"
-      << (edge.suspicion->doubts.empty() ? ": nothing speaks against it" : "") << '\n';
-  for (const client::Doubt& doubt : edge.suspicion->doubts) out << "    " << doubt_text(doubt) << '\n';
+      << (doubts.empty() ? ": nothing speaks against it" : "") << '\n';
+  for (const client::Doubt& doubt : doubts) out << "    " << doubt_text(doubt) << '\n';
   if (!edge.suspicion->remark.empty()) out << "    " << edge.suspicion->remark << '\n';
 }
 

@@ -95,10 +95,11 @@ PairPicture pair_of(const client::EdgeExplanation& explained, const SessionsByNu
   if (edge.suspicion) {
     pair.gauges.push_back(
         {edge.suspicion->value, "suspicion " + fixed(edge.suspicion->value, 2) + " of 1", client::kQueryColour, true});
-    for (const client::Doubt& doubt : edge.suspicion->doubts)
+    const std::vector<client::Doubt> doubts = doubts_of(*edge.suspicion);
+    for (const client::Doubt& doubt : doubts)
       if (pair.gauges.size() <= kMaxDoubts)
         pair.gauges.push_back({doubt.weight, doubt_text(doubt), client::kQueryColour, false});
-    if (edge.suspicion->doubts.empty()) pair.notes.push_back("Nothing speaks against it.");
+    if (doubts.empty()) pair.notes.push_back("Nothing speaks against it.");
     if (!edge.suspicion->remark.empty()) pair.notes.push_back(edge.suspicion->remark);
   }
   if (explained.runner_up && edge.uniqueness && edge.uniqueness->runner_up) {

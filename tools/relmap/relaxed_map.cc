@@ -189,7 +189,7 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     MapPart& part = *part_of.at(spring.relaxed.a);
     const Tear strain = strain_of(relaxed->edges[e], spring, part);
     if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
-    if (spring.kind == client::EdgeKind::kLoop) map.strained.push_back(strain);
+    if (spring.kind == client::EdgeKind::kLoop && strain.sigmas > 1) map.strained.push_back(strain);
   }
   for (const client::Edge& edge : map.graph.edges) {
     if (!in_graph(edge) || !is_doubtful(edge)) continue;

@@ -90,8 +90,8 @@ struct RelaxedMap {
   std::vector<Spring> springs;
   std::size_t relaxed_frames = 0;  // fewer than the graph has, if it was too large: see client/contraction.h
   std::vector<MapPart> parts;      // the one with the chosen root first, then the others, largest first
-  // The loop closures that the relaxed poses contradict most, whether or not they are tears; the worst first, at most
-  // kMaxStrained.
+  // The loop closures that the relaxed poses contradict most, by more than one standard deviation, whether or not they
+  // are tears; the worst first, at most kMaxStrained.
   std::vector<Tear> strained;
 
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
