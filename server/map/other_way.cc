@@ -80,7 +80,7 @@ Result<OtherWay> other_way(const storage::Graph& graph, const storage::Edge& clo
     result.message = "the closure measured no metres, so nothing can be compared";
     return result;
   }
-  const Uncertain measured(closure.T_ab, closure.prior_covariance);
+  const Uncertain measured(closure.prior_T_ab, closure.prior_covariance);
   const Uncertain difference = Uncertain(way.T_ab, way.covariance).inverse() * measured;
   Matrix6 covariance = difference.covariance;
   covariance.diagonal().head<3>().array() += rules.floor_metres * rules.floor_metres;

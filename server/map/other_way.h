@@ -20,7 +20,7 @@ struct OtherWay {
   Reason verdict = Reason::NOT_CONNECTED;
   std::string message;                  // why, with the numbers
   std::optional<route::Transform> way;  // from a to b, if there is one; its covariance includes the odometry's drift
-  double metres_apart = 0, radians_apart = 0;  // between what the closure says and what the way says
+  double metres_apart = 0, radians_apart = 0;  // between what the closure measured and what the way says
   double sigmas_apart = 0;                     // the same as a Mahalanobis distance
 };
 
