@@ -101,15 +101,16 @@ class PngDrawing : public Drawing {
   }
 
   Status picture(const Vector2& corner, const Vector2& size, const std::string& file) override {
-    const auto decoded = decode_picture(file);
+    auto decoded = decode_picture(file);
     if (!decoded.ok()) return decoded.status();
+    const cv::Mat whole(decoded->height, decoded->width, CV_8UC3, decoded->bgr.data());
     const auto pixel = [this](double at) { return static_cast<int>(std::lround(at * scale_)); };
     const cv::Rect box(cv::Point(pixel(corner.x()), pixel(corner.y())),
                        cv::Point(pixel(corner.x() + size.x()), pixel(corner.y() + size.y())));
     const cv::Rect seen = box & cv::Rect(0, 0, page_.cols, page_.rows);
     if (seen.empty()) return {};
     cv::Mat scaled;
-    cv::resize(*decoded, scaled, box.size(), 0, 0, box.width < decoded->cols ? cv::INTER_AREA : cv::INTER_CUBIC);
+    cv::resize(whole, scaled, box.size(), 0, 0, box.width < whole.cols ? cv::INTER_AREA : cv::INTER_CUBIC);
     scaled(seen - box.tl()).copyTo(page_(seen));
     return {};
   }

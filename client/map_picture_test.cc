@@ -17,7 +17,7 @@
 #include "client/drawing.h"
 #include "client/label_placement.h"
 #include "client/map_plan.h"
-#include "client/svg_for_test.h"
+#include "client/testing/svg.h"
 
 namespace relmap::client {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "client/svg_for_test.h"
+#include "client/testing/svg.h"
 
 namespace relmap::client {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "client/svg_for_test.h"
+#include "client/testing/svg.h"
 
 namespace relmap::client {
 namespace {

@@ -321,7 +321,7 @@ TEST_F(Operator, ListsTheMostSuspiciousClosuresAndSeesThemOnASheet) {
 TEST_F(Operator, DrawsRoutesAndMaps) {
   for (const int at : {5, 8, 11}) propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at));
   ASSERT_EQ(relmap({"label", "1:60", "<b>dock</b>"}).exit_code, 0);
-  const Finished route = relmap({"route", "--from", "1:0", "--to", "1:60", "--alternatives", "2", "--out",
+  const Finished route = relmap({"route", "--from", "1:0", "--to", "label:<b>dock</b>", "--alternatives", "2", "--out",
                                  folder_ / "strip.svg", "--stops", "5"});
   ASSERT_EQ(route.exit_code, 0) << route.standard_error;
   const std::string strip = contents(folder_ / "strip.svg");

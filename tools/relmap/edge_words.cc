@@ -128,9 +128,8 @@ std::string verdict_text(const client::MotionVerdict& verdict) {
     text += ": " + verdict.message;
   else if (verdict.edges > 0)
     text += ": the way without it, " + counted_text(verdict.edges, "edge") + ", " + fixed(verdict.distance_m, 1) +
-            " m, leads " + fixed(verdict.metres_apart, 2) + " m and " +
-            fixed(kDegrees * verdict.radians_apart, 1) + " degrees from where it says, " +
-            fixed(verdict.sigmas_apart, 1) + " sigmas";
+            " m, leads " + fixed(verdict.metres_apart, 2) + " m and " + fixed(kDegrees * verdict.radians_apart, 1) +
+            " degrees from where it says, " + fixed(verdict.sigmas_apart, 1) + " sigmas";
   return text;
 }
 
