@@ -11,11 +11,11 @@ Status ill_formed_event(const Status& why) {
 }
 
 Result<FramesAdded> read_frames_added(const v1::FramesAdded& message) {
-  FramesAdded added{message.session(), {}};
+  FramesAdded added;
   added.frames.reserve(static_cast<std::size_t>(message.frames_size()));
   for (const v1::AddedFrame& frame : message.frames()) {
     AddedFrame& read = added.frames.emplace_back();
-    read.index = frame.index();
+    read.frame = from_wire(frame.frame());
     read.time_us = frame.time_us();
     read.source = static_cast<MotionSource>(frame.source());
     if (!frame.has_previous_from_this()) continue;

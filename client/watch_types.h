@@ -34,7 +34,7 @@ struct SessionChanged {
   SessionState state = SessionState::kOpen;
 };
 struct AddedFrame {
-  std::uint32_t index = 0;
+  FrameId frame;
   std::int64_t time_us = 0;
   // As it was when the frame was added; absent: the session's first frame, or one that no motion joins to the frame
   // before.
@@ -42,8 +42,7 @@ struct AddedFrame {
   MotionSource source = MotionSource::kStart;
 };
 struct FramesAdded {
-  SessionNumber session = 0;
-  std::vector<AddedFrame> frames;  // in the order in which they were taken
+  std::vector<AddedFrame> frames;  // of any sessions, in the order in which the map took them in
 };
 // Consecutive frames of a session.
 struct FrameRange {

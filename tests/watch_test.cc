@@ -122,7 +122,7 @@ class Follower {
   void take(const client::FramesAdded& e, const client::WatchEvent& event) RELMAP_REQUIRES(mutex_) {
     note(event);
     for (const client::AddedFrame& frame : e.frames)
-      EXPECT_TRUE(contents_.frames.emplace(FrameId{e.session, frame.index}, frame.time_us).second) << "told twice";
+      EXPECT_TRUE(contents_.frames.emplace(frame.frame, frame.time_us).second) << "told twice";
   }
   void take(const client::FramesRemoved& e, const client::WatchEvent&) RELMAP_REQUIRES(mutex_) {
     const FrameId first{e.session, e.first}, end{e.session + 1, 0};

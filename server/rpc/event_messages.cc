@@ -78,7 +78,7 @@ v1::MapEvent event_message(const storage::Event& event) {
 
 v1::AddedFrame added_frame_message(const storage::FrameAddedEvent& frame) {
   v1::AddedFrame message;
-  message.set_index(frame.frame.index);
+  *message.mutable_frame() = to_wire(frame.frame);
   message.set_time_us(frame.time_us);
   if (frame.T_previous_frame) *message.mutable_previous_from_this() = to_wire(*frame.T_previous_frame);
   message.set_source(static_cast<v1::MotionSource>(frame.source));

@@ -20,12 +20,11 @@ v1::MapEvent storage_message(const Status& storage) {
   return message;
 }
 
-// Frames that come one after another in one message: of one session, and by one author.
+// Whether two frames that come one after another go into one message: they have the same author.
 bool belong_together(const storage::Event& first, const storage::Event& next) {
-  const auto* a = std::get_if<storage::FrameAddedEvent>(&first.content);
-  const auto* b = std::get_if<storage::FrameAddedEvent>(&next.content);
-  return a && b && a->frame.session == b->frame.session && first.submitted.author == next.submitted.author &&
-         first.note == next.note;
+  return std::holds_alternative<storage::FrameAddedEvent>(first.content) &&
+         std::holds_alternative<storage::FrameAddedEvent>(next.content) &&
+         first.submitted.author == next.submitted.author && first.note == next.note;
 }
 
 }  // namespace
@@ -165,9 +164,9 @@ std::optional<v1::MapEvent> MapWatch::take_event() {
 
 v1::MapEvent MapWatch::take_frames() {
   v1::FramesAdded frames;
-  frames.set_session(std::get<storage::FrameAddedEvent>(events_.front().content).frame.session);
   for (;;) {
-    *frames.add_frames() = added_frame_message(std::get<storage::FrameAddedEvent>(events_.front().content));
+    const auto& frame = std::get<storage::FrameAddedEvent>(events_.front().content);
+    if (wants(frame.frame.session)) *frames.add_frames() = added_frame_message(frame);
     const bool goes_on =
         frames.frames_size() < kMaxFrames && events_.size() > 1 && belong_together(events_[0], events_[1]);
     if (!goes_on) break;

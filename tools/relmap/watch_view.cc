@@ -84,12 +84,13 @@ std::vector<std::string> WatchView::lines_of(const client::WatchEvent& event) {
             return line(session_text(e.session) + " of " + e.robot + " " + state_text(e.state));
           },
           [&](const client::FramesAdded& e) -> Lines {
-            if (e.frames.empty()) return {};
-            Motion& motion = motion_[e.session];
-            if (motion.added == 0) motion.first = e.frames.front().index;
-            motion.added += e.frames.size();
-            motion.last = e.frames.back().index;
-            motion.time_us = time_us;
+            for (const client::AddedFrame& frame : e.frames) {
+              Motion& motion = motion_[frame.frame.session];
+              if (motion.added == 0) motion.first = frame.frame.index;
+              ++motion.added;
+              motion.last = frame.frame.index;
+              motion.time_us = time_us;
+            }
             return {};
           },
           [&](const client::FramesMoved& e) -> Lines {

@@ -62,8 +62,8 @@ TEST_F(WatchViewTest, ALineSaysWhenWhatWhyAndWho) {
 }
 
 TEST_F(WatchViewTest, FramesAreGatheredForEachSession) {
-  EXPECT_THAT(tell(client::FramesAdded{3, {{7, 0, {}, {}}, {8, 0, {}, {}}}}), IsEmpty());
-  EXPECT_THAT(tell(client::FramesAdded{3, {{10, 0, {}, {}}}}), IsEmpty());
+  EXPECT_THAT(tell(client::FramesAdded{{{{3, 7}, 0, {}, {}}, {{3, 8}, 0, {}, {}}}}), IsEmpty());
+  EXPECT_THAT(tell(client::FramesAdded{{{{3, 10}, 0, {}, {}}}}), IsEmpty());
   EXPECT_THAT(tell(client::FramesMoved{{{1, 0, 9}, {3, 2, 3}, {3, 5, 5}}}), IsEmpty());
   EXPECT_THAT(view_.flush(),
               ElementsAre("2025-11-24 16:00:00  session 1: 10 frames adjusted",

@@ -113,9 +113,8 @@ class AddedFrame(Record):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramesAdded(MapEvent):
-    """Frames of a session, in the order in which they were taken."""
+    """Frames of any sessions, in the order in which the map took them in."""
 
-    session: int
     frames: tuple[AddedFrame, ...]
 
 
@@ -222,10 +221,9 @@ def _session_changed(o: EventOrigin, m: graph_pb2.Session) -> SessionChanged:
 def _frames_added(o: EventOrigin, m: watch_pb2.FramesAdded) -> FramesAdded:
     return FramesAdded(
         o,
-        m.session,
         tuple(
             AddedFrame(
-                FrameId(m.session, f.index),
+                read_frame_id(f.frame),
                 f.time_us,
                 read_transform(f.previous_from_this) if f.HasField("previous_from_this") else None,
                 MotionSource(f.source),

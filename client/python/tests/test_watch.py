@@ -104,7 +104,7 @@ def test_every_event_is_read_and_a_later_one_does_not_disturb() -> None:
         _event(1, session_changed=graph_pb2.Session(number=1)),
         _event(2, edge_changed=graph_pb2.Edge(id=common_pb2.EdgeId(frame=frame, ordinal=1), b=frame)),
         _event(3, frames_moved=watch_pb2.FramesMoved(ranges=[watch_pb2.FrameRange(session=1, first=2, last=3)])),
-        _event(4, frames_added=watch_pb2.FramesAdded(session=1, frames=[watch_pb2.AddedFrame(index=4)])),
+        _event(4, frames_added=watch_pb2.FramesAdded(frames=[watch_pb2.AddedFrame(frame=common_pb2.FrameId(session=1, index=4))])),
         _event(5, skipped=watch_pb2.SkippedSequences(session=1, first=5, last=6, reason=reason_pb2.REASON_CAPTURE_FAILED)),
         _event(6, frames_removed=watch_pb2.FramesRemoved(session=1, first=3)),
         _event(7, session_deleted=watch_pb2.SessionDeleted(session=1, uuid="u")),
