@@ -15,7 +15,9 @@ Result<FramesAdded> read_frames_added(const v1::FramesAdded& message) {
   added.frames.reserve(static_cast<std::size_t>(message.frames_size()));
   for (const v1::AddedFrame& frame : message.frames()) {
     AddedFrame& read = added.frames.emplace_back();
-    read.frame = from_wire(frame.frame());
+    const auto id = from_wire(frame.frame());
+    if (!id.ok()) return ill_formed_event(id.status());
+    read.frame = *id;
     read.time_us = frame.time_us();
     read.source = static_cast<MotionSource>(frame.source());
     if (!frame.has_previous_from_this()) continue;

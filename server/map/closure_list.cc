@@ -4,6 +4,8 @@
 #include <map>
 #include <utility>
 
+#include "server/map/suspicion.h"
+
 namespace relmap::map {
 
 namespace {
@@ -42,7 +44,7 @@ Result<std::vector<ListedClosure>> first_closures(const storage::MapView& map, c
     for (const storage::ClosureDigest& closure : frame.closures) {
       if (closure.kind != storage::EdgeKind::kLoop) continue;
       const double suspicion =
-          order == ClosureOrder::kSuspicion || choice.min_suspicion > 0 ? listed_suspicion(closure) : 0;
+          order == ClosureOrder::kSuspicion || choice.min_suspicion > 0 ? suspicion_value(closure) : 0;
       if (!choice.has(closure, frame.time_us, suspicion)) continue;
       const ListedClosure listed{closure.id, suspicion, frame.time_us};
       if ((after && !before(*after, listed)) || (first.size() == count && !before(listed, first.front()))) continue;
@@ -108,7 +110,7 @@ Status visit_edges(const storage::MapView& map, const EdgeChoice& choice, EdgeId
     bool may_have = frame.joined && choice.may_have_motion(id, frame.time_us);
     for (const storage::ClosureDigest& closure : frame.closures)
       may_have =
-          may_have || choice.has(closure, frame.time_us, choice.min_suspicion > 0 ? listed_suspicion(closure) : 0);
+          may_have || choice.has(closure, frame.time_us, choice.min_suspicion > 0 ? suspicion_value(closure) : 0);
     return !may_have || visit_edges_of(map, id, choice, after, visit);
   });
 }
@@ -149,7 +151,7 @@ Result<std::vector<ClosureCell>> closure_cells(const storage::MapView& map, std:
           break;
       }
       if (closure.state != storage::EdgeState::kAccepted) continue;
-      const double suspicion = listed_suspicion(closure);
+      const double suspicion = suspicion_value(closure);
       if (!cell->most_suspicious.valid() || suspicion > cell->suspicion) {
         cell->most_suspicious = closure.id;  // of two the one with the lower id, which comes first
         cell->suspicion = suspicion;

@@ -1,23 +1,16 @@
 #include "server/map/edge_choice.h"
 
-#include <cmath>
-
 #include "server/map/suspicion.h"
 #include "storage/format/digest_codec.h"
 
 namespace relmap::map {
-
-double listed_suspicion(const storage::ClosureDigest& closure) {
-  const double value = suspicion_value(closure);
-  return std::isnan(value) ? 1 : value;
-}
 
 double listed_suspicion(const storage::Edge& edge) {
   if (edge.kind != storage::EdgeKind::kLoop) return 0;
   storage::FrameDigest frame;
   frame.slot = storage::slot_of(edge.id.frame);
   frame.closures.push_back(storage::digest_of(edge));
-  return listed_suspicion(storage::as_stored(edge.id.frame, frame).closures.front());
+  return suspicion_value(storage::as_stored(edge.id.frame, frame).closures.front());
 }
 
 bool EdgeChoice::has(const storage::Edge& edge, std::int64_t time_us) const {

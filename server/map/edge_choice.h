@@ -11,8 +11,7 @@
 namespace relmap::map {
 
 // The suspicion of a closure (suspicion.h) as its digest gives it, which has it to four digits: what lists show,
-// compare and order by. 1 where the facts are no numbers, and 0 for an edge that is no loop closure.
-double listed_suspicion(const storage::ClosureDigest& closure);
+// compare and order by.
 double listed_suspicion(const storage::Edge& edge);
 
 struct EdgeChoice {
@@ -23,7 +22,7 @@ struct EdgeChoice {
 
   // `time_us` is that of the newer end.
   bool has(const storage::Edge& edge, std::int64_t time_us) const;
-  // Whether it has the closure, `suspicion` being its listed_suspicion().
+  // Whether it has the closure, `suspicion` being its suspicion_value().
   bool has(const storage::ClosureDigest& closure, std::int64_t time_us, double suspicion) const;
   // False if it does not have the edge of a robot's motion that leads to this frame. A digest does not tell between
   // odometry and prior edges, nor where they begin, so true says little.

@@ -164,7 +164,7 @@ double suspicion_value(const storage::ClosureDigest& closure) {
   if (closure.kind != storage::EdgeKind::kLoop) return 0;
   double right = 1;
   for (const Rule& rule : kRules) right *= 1 - rule.weight(closure);
-  return 1 - right;
+  return std::isnan(right) ? 1 : 1 - right;
 }
 
 Suspicion suspicion_of(const storage::ClosureDigest& closure) {

@@ -38,7 +38,7 @@ struct Suspicion {
 // Combines the doubts as independent reasons to be wrong: value = 1 - product of (1 - weight). How each weight follows
 // from the facts is said with its curve in suspicion.cc. What is not known of a closure, such as the points of an
 // imported one, weighs nothing. An operator's decision does not change the value: the facts are what they were.
-// Pure, and O(1); 0 without doubts for an edge that is no loop closure.
+// Pure, and O(1); 0 without doubts for an edge that is no loop closure, 1 where the facts are no numbers.
 Suspicion suspicion_of(const storage::ClosureDigest& closure);
 double suspicion_value(const storage::ClosureDigest& closure);  // its value, without the words
 

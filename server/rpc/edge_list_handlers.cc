@@ -22,7 +22,6 @@ namespace {
 constexpr std::uint32_t kEdgesPerPage = 1000, kMaxEdgesPerPage = 5000;
 constexpr std::uint32_t kCellsPerPage = 1000, kMaxCellsPerPage = 10'000;
 constexpr std::size_t kMaxRegionFrames = 100'000;
-constexpr int kMaxMatrixSessions = 10'000;
 
 Result<storage::FrameSet> frames_of_region(const storage::MapView& view, const v1::Region& region,
                                            const route::WorkLimit& work) {
@@ -237,8 +236,8 @@ Result<v1::GetClosureMatrixReply> get_closure_matrix(const v1::GetClosureMatrixR
   const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   const storage::MapView& view = *opened->kept;
-  if (request.sessions_size() > kMaxMatrixSessions)
-    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxMatrixSessions) + " sessions"};
+  if (request.sessions_size() > kMaxNamedSessions)
+    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxNamedSessions) + " sessions"};
   std::vector<SessionNumber> sessions(request.sessions().begin(), request.sessions().end());
   std::sort(sessions.begin(), sessions.end());
   for (const SessionNumber number : sessions)

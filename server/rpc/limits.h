@@ -23,6 +23,9 @@ struct RpcLimits {
   std::size_t route_steps_per_message = 1000;    // steps in a message of a stream, at most
 };
 
+// Sessions that a request may name.
+inline constexpr int kMaxNamedSessions = 10'000;
+
 // Usual size of a message of a stream. A slow caller holds one message, once as we made it and once as gRPC sends it.
 inline constexpr std::size_t kUsualStreamMessageBytes = 256u << 10;
 

@@ -114,6 +114,8 @@ class SkeletonStream {
 
 Result<Producer<v1::GetSkeletonReply>> get_skeleton(const v1::GetSkeletonRequest& request, const Deadline& deadline,
                                                     map::Mapper& mapper, ViewKeeper& views) {
+  if (request.sessions_size() > kMaxNamedSessions)
+    return Status(Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxNamedSessions) + " sessions");
   const auto opened = views.open(request.resume_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   skeleton::SkeletonOptions options;

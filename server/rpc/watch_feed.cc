@@ -29,10 +29,10 @@ std::string state_of(const v1::Robot& robot) {
 
 WatchFeed::Sources WatchFeed::sources_of(map::Mapper& mapper, const Intake& intake) {
   return {[&mapper] { return mapper.engine().applied_sequence(); }, [&mapper] { return mapper.progress().storage; },
-          [&mapper, &intake]() -> std::vector<v1::Robot> {
+          [&mapper, &intake]() -> std::optional<std::vector<v1::Robot>> {
             const auto reply = list_robots({}, {}, mapper, intake);
             if (!reply.ok()) return {};
-            return {reply->robots().begin(), reply->robots().end()};
+            return std::vector<v1::Robot>(reply->robots().begin(), reply->robots().end());
           },
           [&mapper](std::function<void()> committed) { mapper.watch_commits(std::move(committed)); }};
 }
@@ -139,7 +139,7 @@ bool WatchFeed::look() {
   if (known_ && now - looked_ < kLookAtRobots) return false;
   looking_ = true;
   Status storage;
-  std::vector<v1::Robot> robots;
+  std::optional<std::vector<v1::Robot>> robots;
   bool committed = false;
   {
     const MutexUnlock unlocked(mutex_);
@@ -158,14 +158,15 @@ bool WatchFeed::look() {
   return compare(storage, std::move(robots)) || committed || first;
 }
 
-bool WatchFeed::compare(const Status& storage, std::vector<v1::Robot> robots) {
+bool WatchFeed::compare(const Status& storage, std::optional<std::vector<v1::Robot>> robots) {
   const std::uint64_t before = change_;
   if (storage.reason() != storage_.reason() || storage.message() != storage_.message()) {
     storage_ = storage;
     storage_changed_ = ++change_;
   }
+  if (!robots) return change_ != before;
   std::map<std::string, KnownRobot> now;
-  for (v1::Robot& robot : robots) {
+  for (v1::Robot& robot : *robots) {
     std::string state = state_of(robot);
     const std::string uuid = robot.uuid();
     const auto known = robots_.find(uuid);

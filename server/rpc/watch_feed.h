@@ -42,9 +42,9 @@ struct Committed {
 class WatchFeed {
  public:
   struct Sources {
-    std::function<std::uint64_t()> committed;        // the journal sequence up to which the map is committed
-    std::function<Status()> storage;                 // why nothing is taken in; OK
-    std::function<std::vector<v1::Robot>()> robots;  // as ListRobots answers; may wait
+    std::function<std::uint64_t()> committed;  // the journal sequence up to which the map is committed
+    std::function<Status()> storage;           // why nothing is taken in; OK
+    std::function<std::optional<std::vector<v1::Robot>>()> robots;  // as ListRobots answers; may wait; none: it failed
     // Calls the function from now on after each commit; an empty one ends that. May be empty: then commits are noticed
     // within a second.
     std::function<void(std::function<void()>)> on_commit = {};
@@ -108,7 +108,7 @@ class WatchFeed {
   void leave(Subscription* subscription);
   void run();
   bool look() RELMAP_REQUIRES(mutex_);
-  bool compare(const Status& storage, std::vector<v1::Robot> robots) RELMAP_REQUIRES(mutex_);
+  bool compare(const Status& storage, std::optional<std::vector<v1::Robot>> robots) RELMAP_REQUIRES(mutex_);
 
   const Sources sources_;
   std::atomic<std::uint64_t> told_{0}, resyncs_{0};

@@ -88,7 +88,7 @@ class SkeletonReader {
   std::vector<FrameId> older_ends_;  // ascending
   ChainContraction contraction_;
   std::optional<Position> position_;
-  bool resumed_ = false, done_ = false;
+  bool done_ = false;
 };
 
 }  // namespace relmap::skeleton

@@ -82,6 +82,7 @@ struct Event {
   Submission submitted;  // of the record; of frames moved: when they were committed
   std::string note;      // an operator's
   EventContent content;
+  std::int64_t committed_us = 0;  // when it was committed, UTC; set where it is read from the log
 };
 
 }  // namespace relmap::storage

@@ -45,8 +45,11 @@ class Reading {
     read_.gap = read_.gap || gap;
     read_.through = last;
     if (damaged) return true;
-    for (Event& event : events)
-      if (event.at > after_) read_.events.push_back(std::move(event));
+    for (Event& event : events) {
+      if (event.at <= after_) continue;
+      event.committed_us = header->time_us;
+      read_.events.push_back(std::move(event));
+    }
     bytes_ += value.size();
     return bytes_ < max_bytes_;
   }

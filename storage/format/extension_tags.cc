@@ -76,7 +76,7 @@ bool take_closure_tests(Extensions& extensions, ClosureTests& tests) {
   tests.opposing = r.get<std::uint16_t>();
   tests.motion = r.get<MotionSays>();
   tests.motion_sigma = r.get<float>();
-  return r.at_end() && tests.motion <= MotionSays::kContradicts && tests.motion_sigma >= 0;
+  return r.at_end() && tests.motion <= MotionSays::kContradicts;
 }
 
 void add_way_around(Extensions& extensions, const WayAround* around) {

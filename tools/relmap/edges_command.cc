@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/pair_picture.h"
+#include "proto/base/clock.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/explain.h"

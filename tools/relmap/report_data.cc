@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "client/pair_picture.h"
+#include "proto/base/clock.h"
 #include "tools/relmap/map_drawing.h"
 #include "tools/relmap/pairs.h"
-#include "tools/relmap/time_option.h"
 
 namespace relmap::cli {
 

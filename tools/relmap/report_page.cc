@@ -6,6 +6,7 @@
 
 #include "proto/base/markup.h"
 #include "proto/base/printf_text.h"
+#include "proto/base/quantile.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/terminal/console.h"
 
@@ -22,7 +23,7 @@ constexpr char kStyle[] = R"(
 @media(prefers-color-scheme:dark){:root{--ink:#e6e6e2;--faint:#9aa0a8;--paper:#17181b;--card:#202226;--rule:#3a3c42;--heat:240,130,40;--bad:#ff6aa8}}
 body{font:15px/1.5 system-ui,"Segoe UI",Helvetica,Arial,sans-serif;color:var(--ink);background:var(--paper);max-width:1240px;margin:0 auto;padding:24px}
 h1{font-size:26px;margin:0 0 4px}h2{font-size:19px;margin:34px 0 8px;border-bottom:1px solid var(--rule);padding-bottom:4px}
-p{margin:6px 0}.faint{color:var(--faint)}code_html{font:13px ui-monospace,Consolas,monospace;background:var(--card);border:1px solid var(--rule);border-radius:3px;padding:0 4px}
+p{margin:6px 0}.faint{color:var(--faint)}code{font:13px ui-monospace,Consolas,monospace;background:var(--card);border:1px solid var(--rule);border-radius:3px;padding:0 4px}
 .tiles{display:flex;flex-wrap:wrap;gap:10px;margin:16px 0}.tile{background:var(--card);border:1px solid var(--rule);border-radius:6px;padding:8px 14px;min-width:110px}
 .tile b{display:block;font-size:22px;line-height:1.25}.tile span{color:var(--faint);font-size:13px}
 table{border-collapse:collapse;margin:8px 0;font-size:14px}th{text-align:left;color:var(--faint);font-weight:600}
@@ -37,7 +38,7 @@ figure{margin:12px 0;break-inside:avoid}figure svg{display:block;max-width:100%;
 
 // HTML is built as text; whatever is not ours goes through this.
 std::string shown_html(std::string_view text) { return "<bdi>" + markup_text(text) + "</bdi>"; }
-std::string code_html(std::string_view text) { return "<code_html>" + markup_text(text) + "</code_html>"; }
+std::string code_html(std::string_view text) { return "<code>" + markup_text(text) + "</code>"; }
 std::string paragraph_html(const std::string& html) { return "<p>" + html + "</p>\n"; }
 std::string heading_html(const char* text) { return std::string("<h2>") + text + "</h2>\n"; }
 // Why something is not in the report.
@@ -70,11 +71,6 @@ class Table {
   std::string html_;
   std::vector<bool> number_;
 };
-
-double quantile_of(const std::vector<double>& ascending, double share) {
-  if (ascending.empty()) return 0;
-  return ascending[static_cast<std::size_t>(share * static_cast<double>(ascending.size() - 1) + 0.5)];
-}
 
 std::string session_name(const MapReport& report, SessionNumber number) {
   for (const client::Session& session : report.sessions)
@@ -250,14 +246,14 @@ std::string errors(const MapReport& report) {
     Table table({"session", ">keyframes", ">median, px", ">largest, px"});
     for (const MapReport::SessionErrors& session : report.errors)
       table.row({shown_html(session_name(report, session.session)), count_text(session.pixels.size()),
-                 fixed(quantile_of(session.pixels, 0.5), 2), fixed(session.pixels.back(), 2)});
+                 fixed(quantile(session.pixels, 0.5), 2), fixed(session.pixels.back(), 2)});
     html += table.html();
   }
   if (!report.sigmas_m.empty())
-    html += paragraph_html("Position relative to " + report.sigmas_root.to_string() +
-                           ", along the most certain path: one sigma is at most " +
-                           number_text(report.sigmas_m.back()) + " m, of half of the keyframes at most " +
-                           number_text(quantile_of(report.sigmas_m, 0.5)) + " m.");
+    html +=
+        paragraph_html("Position relative to " + report.sigmas_root.to_string() +
+                       ", along the most certain path: one sigma is at most " + number_text(report.sigmas_m.back()) +
+                       " m, of half of the keyframes at most " + number_text(quantile(report.sigmas_m, 0.5)) + " m.");
   return html;
 }
 
@@ -306,7 +302,7 @@ std::string storage(const MapReport& report) {
   Table table({"what", ">size"});
   if (report.store_missing.ok()) {
     table.row({"map", markup_text(terminal::bytes_text(report.store.map_bytes))});
-    table.row({"of which <code_html>relmap-admin compact</code_html> frees",
+    table.row({"of which <code>relmap-admin compact</code> frees",
                markup_text(terminal::bytes_text(report.store.garbage_bytes))});
     table.row({"journal, " + count_text(report.store.journal_records) + " records",
                markup_text(terminal::bytes_text(report.store.journal_bytes))});

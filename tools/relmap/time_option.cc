@@ -1,17 +1,11 @@
 #include "tools/relmap/time_option.h"
 
-#include <chrono>
 #include <cmath>
 #include <regex>
 
 #include "proto/base/time_text.h"
 
 namespace relmap::cli {
-
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 Result<std::int64_t> parse_time(const std::string& text, std::int64_t now_us) {
   static const std::regex kTime(R"((\d{4}-(\d\d)-(\d\d))(?:[T ](\d\d):(\d\d)(?::(\d\d(?:\.\d{1,6})?))?)?Z?)");

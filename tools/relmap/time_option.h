@@ -12,7 +12,4 @@ namespace relmap::cli {
 // "3d". Microseconds since 1970. INVALID_ARGUMENT.
 Result<std::int64_t> parse_time(const std::string& text, std::int64_t now_us);
 
-// Of this machine's clock, microseconds since 1970.
-std::int64_t now_us();
-
 }  // namespace relmap::cli

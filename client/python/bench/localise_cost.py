@@ -43,7 +43,7 @@ def measure(calls: int) -> dict[str, float]:
 
 def compare(client: relmap.Client, server: str, calls: int) -> dict[str, float]:
     """The same, of a daemon that runs."""
-    command = [str(conftest.BIN / "relmap_localise_loop"), server, str(FRAME)]
+    command = [str(conftest.BIN.parent / "tests" / "relmap_localise_loop"), server, str(FRAME)]
     loop = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert loop.stdin and loop.stdout
     view = relmap.View(frame=FRAME)

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include "proto/base/markup.h"
 #include "proto/base/quantile.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
@@ -14,19 +15,6 @@ namespace relmap::bench {
 
 namespace {
 
-std::string escaped(const std::string& text) {
-  std::string html;
-  for (const char letter : text) {
-    if (letter == '<')
-      html += "&lt;";
-    else if (letter == '&')
-      html += "&amp;";
-    else
-      html += letter;
-  }
-  return html;
-}
-
 // A plot as an <svg> element.
 std::string drawn(const Plot& plot) {
   const storage::TemporaryFolder folder;
@@ -35,7 +23,7 @@ std::string drawn(const Plot& plot) {
 }
 
 std::string figure(const std::string& svg, const std::string& caption) {
-  return "<figure>" + svg + "<figcaption>" + escaped(caption) + "</figcaption></figure>\n";
+  return "<figure>" + svg + "<figcaption>" + markup_text(caption) + "</figcaption></figure>\n";
 }
 
 struct Row {
@@ -141,7 +129,7 @@ void write_page(const VastOptions& options, const VastProgress& progress, const 
                 "Of the daemon, the most since its start.");
   std::ostringstream table;
   report.print_table(table);
-  out << "<h2>All figures</h2>\n<pre>" << escaped(table.str()) << "</pre>\n";
+  out << "<h2>All figures</h2>\n<pre>" << markup_text(table.str()) << "</pre>\n";
   if (!out.flush()) throw StatusError(Status(Reason::IO_ERROR, options.page + " cannot be written"));
 }
 
