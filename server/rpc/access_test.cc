@@ -131,9 +131,10 @@ std::vector<Method> all_methods() {
 // Written out here, so that a method that is opened to others by mistake is found.
 Role expected_role(const std::string& method) {
   static const std::set<std::string> readers{
-      "Map.Localise",   "Map.MatchImage",   "Map.FindRoute", "Map.GetNeighbourhood", "Map.TransformBetween",
-      "Map.GetFrame",   "Map.ListSessions", "Map.ListEdges", "Map.FindLabels",       "Map.WatchMap",
-      "Map.ListRobots", "Map.GetStatus",    "Map.Export"};
+      "Map.Localise",         "Map.MatchImage", "Map.FindRoute",    "Map.GetNeighbourhood",
+      "Map.TransformBetween", "Map.GetFrame",   "Map.ListSessions", "Map.ListEdges",
+      "Map.ExplainEdge",      "Map.FindLabels", "Map.WatchMap",     "Map.ListRobots",
+      "Map.GetStatus",        "Map.Export"};
   if (readers.contains(method)) return Role::kReader;
   return method.starts_with("Ingest.") ? Role::kRobot : Role::kOperator;
 }
