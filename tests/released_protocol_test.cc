@@ -332,7 +332,9 @@ TEST_P(OldDaemon, AnswersEveryCallOfTheClient) {
       EXPECT_EQ(matrix->size(), 1u);
     }
     // Made up, its arrays do not have the lengths that belong together, and the client sees that.
-    if (old_.method("/relmap.v1.Map/GetSkeleton")) EXPECT_EQ(client->skeleton().reason(), Reason::CORRUPT);
+    if (old_.method("/relmap.v1.Map/GetSkeleton")) {
+      EXPECT_EQ(client->skeleton().reason(), Reason::CORRUPT);
+    }
     if (old_.method("/relmap.v1.Admin/ListAudit")) {
       client::AuditFilter one;
       one.limit = 1;
