@@ -17,7 +17,7 @@ from relmap.v1 import reason_pb2 as relmap_dot_v1_dot_reason__pb2
 from relmap.v1 import status_pb2 as relmap_dot_v1_dot_status__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x15relmap/v1/watch.proto\x12\trelmap.v1\x1a\x16relmap/v1/common.proto\x1a\x15relmap/v1/graph.proto\x1a\x16relmap/v1/reason.proto\x1a\x16relmap/v1/status.proto\"p\n\x0fWatchMapRequest\x12\x10\n\x08sessions\x18\x01 \x03(\r\x12\x14\n\x0cresume_token\x18\x02 \x01(\t\x12\"\n\x04\x66rom\x18\x03 \x01(\x0e\x32\x14.relmap.v1.WatchFrom\x12\x11\n\tno_frames\x18\x04 \x01(\x08\"\xd2\x06\n\x08MapEvent\x12-\n\x0fsession_changed\x18\x01 \x01(\x0b\x32\x12.relmap.v1.SessionH\x00\x12-\n\x0b\x66rame_added\x18\x02 \x01(\x0b\x32\x12.relmap.v1.FrameIdB\x02\x18\x01H\x00\x12\'\n\x0c\x65\x64ge_changed\x18\x03 \x01(\x0b\x32\x0f.relmap.v1.EdgeH\x00\x12.\n\x0c\x66rames_moved\x18\x04 \x01(\x0b\x32\x16.relmap.v1.FramesMovedH\x00\x12\x36\n\rlabel_changed\x18\x05 \x01(\x0b\x32\x19.relmap.v1.LabelledFramesB\x02\x18\x01H\x00\x12.\n\x0c\x66rames_added\x18\x08 \x01(\x0b\x32\x16.relmap.v1.FramesAddedH\x00\x12.\n\x07skipped\x18\t \x01(\x0b\x32\x1b.relmap.v1.SkippedSequencesH\x00\x12\x32\n\x0e\x66rames_removed\x18\n \x01(\x0b\x32\x18.relmap.v1.FramesRemovedH\x00\x12\x34\n\x0fsession_deleted\x18\x0b \x01(\x0b\x32\x19.relmap.v1.SessionDeletedH\x00\x12.\n\x0c\x65\x64ge_removed\x18\x0c \x01(\x0b\x32\x16.relmap.v1.EdgeRemovedH\x00\x12.\n\x0c\x66rame_labels\x18\r \x01(\x0b\x32\x16.relmap.v1.FrameLabelsH\x00\x12)\n\rrobot_changed\x18\x0e \x01(\x0b\x32\x10.relmap.v1.RobotH\x00\x12\x32\n\x0fstorage_changed\x18\x0f \x01(\x0b\x32\x17.relmap.v1.StorageStateH\x00\x12#\n\x06resync\x18\x10 \x01(\x0b\x32\x11.relmap.v1.ResyncH\x00\x12(\n\tcaught_up\x18\x11 \x01(\x0b\x32\x13.relmap.v1.CaughtUpH\x00\x12\x14\n\x0cresume_token\x18\x06 \x01(\t\x12\x17\n\x0bmap_version\x18\x07 \x01(\x04\x42\x02\x18\x01\x12\x0f\n\x07time_us\x18\x12 \x01(\x03\x12\x0e\n\x06\x61uthor\x18\x13 \x01(\t\x12\x18\n\x10journal_sequence\x18\x14 \x01(\x04\x12\x0c\n\x04note\x18\x15 \x01(\tB\x07\n\x05\x65vent\"E\n\x0b\x46ramesAdded\x12\x0f\n\x07session\x18\x01 \x01(\r\x12%\n\x06\x66rames\x18\x02 \x03(\x0b\x32\x15.relmap.v1.AddedFrame\"\x87\x01\n\nAddedFrame\x12\r\n\x05index\x18\x01 \x01(\r\x12\x0f\n\x07time_us\x18\x02 \x01(\x03\x12\x30\n\x12previous_from_this\x18\x03 \x01(\x0b\x32\x14.relmap.v1.Transform\x12\'\n\x06source\x18\x04 \x01(\x0e\x32\x17.relmap.v1.MotionSource\"\\\n\x0b\x46ramesMoved\x12&\n\x06\x66rames\x18\x01 \x03(\x0b\x32\x12.relmap.v1.FrameIdB\x02\x18\x01\x12%\n\x06ranges\x18\x02 \x03(\x0b\x32\x15.relmap.v1.FrameRange\":\n\nFrameRange\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\r\n\x05\x66irst\x18\x02 \x01(\r\x12\x0c\n\x04last\x18\x03 \x01(\r\"t\n\x10SkippedSequences\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\r\n\x05\x66irst\x18\x02 \x01(\r\x12\x0c\n\x04last\x18\x03 \x01(\r\x12!\n\x06reason\x18\x04 \x01(\x0e\x32\x11.relmap.v1.Reason\x12\x0f\n\x07refused\x18\x05 \x01(\x08\"/\n\rFramesRemoved\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\r\n\x05\x66irst\x18\x02 \x01(\r\"/\n\x0eSessionDeleted\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\x0c\n\x04uuid\x18\x02 \x01(\t\".\n\x0b\x45\x64geRemoved\x12\x1f\n\x04\x65\x64ge\x18\x01 \x01(\x0b\x32\x11.relmap.v1.EdgeId\"@\n\x0b\x46rameLabels\x12!\n\x05\x66rame\x18\x01 \x01(\x0b\x32\x12.relmap.v1.FrameId\x12\x0e\n\x06labels\x18\x02 \x03(\t\"B\n\x0cStorageState\x12!\n\x06reason\x18\x01 \x01(\x0e\x32\x11.relmap.v1.Reason\x12\x0f\n\x07message\x18\x02 \x01(\t\"i\n\x06Resync\x12!\n\x06reason\x18\x01 \x01(\x0e\x32\x11.relmap.v1.Reason\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x14\n\x0cmissed_after\x18\x03 \x01(\x04\x12\x15\n\rmissed_before\x18\x04 \x01(\x04\"5\n\x08\x43\x61ughtUp\x12\x18\n\x10journal_sequence\x18\x01 \x01(\x04\x12\x0f\n\x07time_us\x18\x02 \x01(\x03*R\n\tWatchFrom\x12\x1a\n\x16WATCH_FROM_UNSPECIFIED\x10\x00\x12\x12\n\x0eWATCH_FROM_NOW\x10\x01\x12\x15\n\x11WATCH_FROM_OLDEST\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x15relmap/v1/watch.proto\x12\trelmap.v1\x1a\x16relmap/v1/common.proto\x1a\x15relmap/v1/graph.proto\x1a\x16relmap/v1/reason.proto\x1a\x16relmap/v1/status.proto\"p\n\x0fWatchMapRequest\x12\x10\n\x08sessions\x18\x01 \x03(\r\x12\x14\n\x0cresume_token\x18\x02 \x01(\t\x12\"\n\x04\x66rom\x18\x03 \x01(\x0e\x32\x14.relmap.v1.WatchFrom\x12\x11\n\tno_frames\x18\x04 \x01(\x08\"\xd2\x06\n\x08MapEvent\x12-\n\x0fsession_changed\x18\x01 \x01(\x0b\x32\x12.relmap.v1.SessionH\x00\x12-\n\x0b\x66rame_added\x18\x02 \x01(\x0b\x32\x12.relmap.v1.FrameIdB\x02\x18\x01H\x00\x12\'\n\x0c\x65\x64ge_changed\x18\x03 \x01(\x0b\x32\x0f.relmap.v1.EdgeH\x00\x12.\n\x0c\x66rames_moved\x18\x04 \x01(\x0b\x32\x16.relmap.v1.FramesMovedH\x00\x12\x36\n\rlabel_changed\x18\x05 \x01(\x0b\x32\x19.relmap.v1.LabelledFramesB\x02\x18\x01H\x00\x12.\n\x0c\x66rames_added\x18\x08 \x01(\x0b\x32\x16.relmap.v1.FramesAddedH\x00\x12.\n\x07skipped\x18\t \x01(\x0b\x32\x1b.relmap.v1.SkippedSequencesH\x00\x12\x32\n\x0e\x66rames_removed\x18\n \x01(\x0b\x32\x18.relmap.v1.FramesRemovedH\x00\x12\x34\n\x0fsession_deleted\x18\x0b \x01(\x0b\x32\x19.relmap.v1.SessionDeletedH\x00\x12.\n\x0c\x65\x64ge_removed\x18\x0c \x01(\x0b\x32\x16.relmap.v1.EdgeRemovedH\x00\x12.\n\x0c\x66rame_labels\x18\r \x01(\x0b\x32\x16.relmap.v1.FrameLabelsH\x00\x12)\n\rrobot_changed\x18\x0e \x01(\x0b\x32\x10.relmap.v1.RobotH\x00\x12\x32\n\x0fstorage_changed\x18\x0f \x01(\x0b\x32\x17.relmap.v1.StorageStateH\x00\x12#\n\x06resync\x18\x10 \x01(\x0b\x32\x11.relmap.v1.ResyncH\x00\x12(\n\tcaught_up\x18\x11 \x01(\x0b\x32\x13.relmap.v1.CaughtUpH\x00\x12\x14\n\x0cresume_token\x18\x06 \x01(\t\x12\x17\n\x0bmap_version\x18\x07 \x01(\x04\x42\x02\x18\x01\x12\x0f\n\x07time_us\x18\x12 \x01(\x03\x12\x0e\n\x06\x61uthor\x18\x13 \x01(\t\x12\x18\n\x10journal_sequence\x18\x14 \x01(\x04\x12\x0c\n\x04note\x18\x15 \x01(\tB\x07\n\x05\x65vent\"4\n\x0b\x46ramesAdded\x12%\n\x06\x66rames\x18\x01 \x03(\x0b\x32\x15.relmap.v1.AddedFrame\"\x9b\x01\n\nAddedFrame\x12!\n\x05\x66rame\x18\x01 \x01(\x0b\x32\x12.relmap.v1.FrameId\x12\x0f\n\x07time_us\x18\x02 \x01(\x03\x12\x30\n\x12previous_from_this\x18\x03 \x01(\x0b\x32\x14.relmap.v1.Transform\x12\'\n\x06source\x18\x04 \x01(\x0e\x32\x17.relmap.v1.MotionSource\"\\\n\x0b\x46ramesMoved\x12&\n\x06\x66rames\x18\x01 \x03(\x0b\x32\x12.relmap.v1.FrameIdB\x02\x18\x01\x12%\n\x06ranges\x18\x02 \x03(\x0b\x32\x15.relmap.v1.FrameRange\":\n\nFrameRange\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\r\n\x05\x66irst\x18\x02 \x01(\r\x12\x0c\n\x04last\x18\x03 \x01(\r\"t\n\x10SkippedSequences\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\r\n\x05\x66irst\x18\x02 \x01(\r\x12\x0c\n\x04last\x18\x03 \x01(\r\x12!\n\x06reason\x18\x04 \x01(\x0e\x32\x11.relmap.v1.Reason\x12\x0f\n\x07refused\x18\x05 \x01(\x08\"/\n\rFramesRemoved\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\r\n\x05\x66irst\x18\x02 \x01(\r\"/\n\x0eSessionDeleted\x12\x0f\n\x07session\x18\x01 \x01(\r\x12\x0c\n\x04uuid\x18\x02 \x01(\t\".\n\x0b\x45\x64geRemoved\x12\x1f\n\x04\x65\x64ge\x18\x01 \x01(\x0b\x32\x11.relmap.v1.EdgeId\"@\n\x0b\x46rameLabels\x12!\n\x05\x66rame\x18\x01 \x01(\x0b\x32\x12.relmap.v1.FrameId\x12\x0e\n\x06labels\x18\x02 \x03(\t\"B\n\x0cStorageState\x12!\n\x06reason\x18\x01 \x01(\x0e\x32\x11.relmap.v1.Reason\x12\x0f\n\x07message\x18\x02 \x01(\t\"i\n\x06Resync\x12!\n\x06reason\x18\x01 \x01(\x0e\x32\x11.relmap.v1.Reason\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x14\n\x0cmissed_after\x18\x03 \x01(\x04\x12\x15\n\rmissed_before\x18\x04 \x01(\x04\"5\n\x08\x43\x61ughtUp\x12\x18\n\x10journal_sequence\x18\x01 \x01(\x04\x12\x0f\n\x07time_us\x18\x02 \x01(\x03*R\n\tWatchFrom\x12\x1a\n\x16WATCH_FROM_UNSPECIFIED\x10\x00\x12\x12\n\x0eWATCH_FROM_NOW\x10\x01\x12\x15\n\x11WATCH_FROM_OLDEST\x10\x02\x62\x06proto3')
 
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, globals())
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'relmap.v1.watch_pb2', globals())
@@ -32,34 +32,34 @@ if _descriptor._USE_C_DESCRIPTORS == False:
   _MAPEVENT.fields_by_name['map_version']._serialized_options = b'\030\001'
   _FRAMESMOVED.fields_by_name['frames']._options = None
   _FRAMESMOVED.fields_by_name['frames']._serialized_options = b'\030\001'
-  _WATCHFROM._serialized_start=2021
-  _WATCHFROM._serialized_end=2103
+  _WATCHFROM._serialized_start=2024
+  _WATCHFROM._serialized_end=2106
   _WATCHMAPREQUEST._serialized_start=131
   _WATCHMAPREQUEST._serialized_end=243
   _MAPEVENT._serialized_start=246
   _MAPEVENT._serialized_end=1096
   _FRAMESADDED._serialized_start=1098
-  _FRAMESADDED._serialized_end=1167
-  _ADDEDFRAME._serialized_start=1170
-  _ADDEDFRAME._serialized_end=1305
-  _FRAMESMOVED._serialized_start=1307
-  _FRAMESMOVED._serialized_end=1399
-  _FRAMERANGE._serialized_start=1401
-  _FRAMERANGE._serialized_end=1459
-  _SKIPPEDSEQUENCES._serialized_start=1461
-  _SKIPPEDSEQUENCES._serialized_end=1577
-  _FRAMESREMOVED._serialized_start=1579
-  _FRAMESREMOVED._serialized_end=1626
-  _SESSIONDELETED._serialized_start=1628
-  _SESSIONDELETED._serialized_end=1675
-  _EDGEREMOVED._serialized_start=1677
-  _EDGEREMOVED._serialized_end=1723
-  _FRAMELABELS._serialized_start=1725
-  _FRAMELABELS._serialized_end=1789
-  _STORAGESTATE._serialized_start=1791
-  _STORAGESTATE._serialized_end=1857
-  _RESYNC._serialized_start=1859
-  _RESYNC._serialized_end=1964
-  _CAUGHTUP._serialized_start=1966
-  _CAUGHTUP._serialized_end=2019
+  _FRAMESADDED._serialized_end=1150
+  _ADDEDFRAME._serialized_start=1153
+  _ADDEDFRAME._serialized_end=1308
+  _FRAMESMOVED._serialized_start=1310
+  _FRAMESMOVED._serialized_end=1402
+  _FRAMERANGE._serialized_start=1404
+  _FRAMERANGE._serialized_end=1462
+  _SKIPPEDSEQUENCES._serialized_start=1464
+  _SKIPPEDSEQUENCES._serialized_end=1580
+  _FRAMESREMOVED._serialized_start=1582
+  _FRAMESREMOVED._serialized_end=1629
+  _SESSIONDELETED._serialized_start=1631
+  _SESSIONDELETED._serialized_end=1678
+  _EDGEREMOVED._serialized_start=1680
+  _EDGEREMOVED._serialized_end=1726
+  _FRAMELABELS._serialized_start=1728
+  _FRAMELABELS._serialized_end=1792
+  _STORAGESTATE._serialized_start=1794
+  _STORAGESTATE._serialized_end=1860
+  _RESYNC._serialized_start=1862
+  _RESYNC._serialized_end=1967
+  _CAUGHTUP._serialized_start=1969
+  _CAUGHTUP._serialized_end=2022
 # @@protoc_insertion_point(module_scope)

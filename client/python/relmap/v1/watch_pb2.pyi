@@ -14,16 +14,16 @@ WATCH_FROM_OLDEST: WatchFrom
 WATCH_FROM_UNSPECIFIED: WatchFrom
 
 class AddedFrame(_message.Message):
-    __slots__ = ["index", "previous_from_this", "source", "time_us"]
-    INDEX_FIELD_NUMBER: _ClassVar[int]
+    __slots__ = ["frame", "previous_from_this", "source", "time_us"]
+    FRAME_FIELD_NUMBER: _ClassVar[int]
     PREVIOUS_FROM_THIS_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
     TIME_US_FIELD_NUMBER: _ClassVar[int]
-    index: int
+    frame: _common_pb2.FrameId
     previous_from_this: _common_pb2.Transform
     source: _graph_pb2.MotionSource
     time_us: int
-    def __init__(self, index: _Optional[int] = ..., time_us: _Optional[int] = ..., previous_from_this: _Optional[_Union[_common_pb2.Transform, _Mapping]] = ..., source: _Optional[_Union[_graph_pb2.MotionSource, str]] = ...) -> None: ...
+    def __init__(self, frame: _Optional[_Union[_common_pb2.FrameId, _Mapping]] = ..., time_us: _Optional[int] = ..., previous_from_this: _Optional[_Union[_common_pb2.Transform, _Mapping]] = ..., source: _Optional[_Union[_graph_pb2.MotionSource, str]] = ...) -> None: ...
 
 class CaughtUp(_message.Message):
     __slots__ = ["journal_sequence", "time_us"]
@@ -58,12 +58,10 @@ class FrameRange(_message.Message):
     def __init__(self, session: _Optional[int] = ..., first: _Optional[int] = ..., last: _Optional[int] = ...) -> None: ...
 
 class FramesAdded(_message.Message):
-    __slots__ = ["frames", "session"]
+    __slots__ = ["frames"]
     FRAMES_FIELD_NUMBER: _ClassVar[int]
-    SESSION_FIELD_NUMBER: _ClassVar[int]
     frames: _containers.RepeatedCompositeFieldContainer[AddedFrame]
-    session: int
-    def __init__(self, session: _Optional[int] = ..., frames: _Optional[_Iterable[_Union[AddedFrame, _Mapping]]] = ...) -> None: ...
+    def __init__(self, frames: _Optional[_Iterable[_Union[AddedFrame, _Mapping]]] = ...) -> None: ...
 
 class FramesMoved(_message.Message):
     __slots__ = ["frames", "ranges"]
