@@ -8,10 +8,11 @@ Thread-safe, but for its iterators and ingest sessions, of which each belongs to
 
 from __future__ import annotations
 
+import math
 import time
 import uuid as uuids
 from types import TracebackType
-from typing import Any, Iterator, Callable, List, Optional, Sequence, Type, TypeVar, Union
+from typing import Any, Iterator, Callable, List, Optional, Sequence, Set, Type, TypeVar, Union
 
 from relmap.calls import Caller
 from relmap.ingest import IngestSession
@@ -19,7 +20,7 @@ from relmap.camera import RawStereo, StereoCamera
 from relmap.connection import Connection
 from relmap.credentials import PathLike, credentials_of
 from relmap.drawing.picture import Drawing, draw_map
-from relmap.errors import DaemonError, DeadlineExceeded, Unreachable, ViewExpired
+from relmap.errors import ClientClosed, DaemonError, Unreachable, ViewExpired
 from relmap.events import MapEvent, StorageChanged, read_event
 from relmap.evidence import ClosureMatrix, EdgeEdit, Explanation, read_count, read_edit, read_explanation
 from relmap.exports import ExportedFrame, ExportFormat, TrajectoryFile, read_exported_frame
@@ -92,7 +93,6 @@ LONG_S = 24 * 3600.0
 """Seconds that calls may take which read or write the whole map, unless they are given a timeout."""
 
 _MAX_RESTARTS = 5  # of a list whose version of the map expired
-_WATCH_S = 300.0  # a stream of events is opened again so often, so that a dead connection is noticed
 _FIRST_PAUSE_S, _MAX_PAUSE_S = 0.1, 2.0
 
 
@@ -143,6 +143,7 @@ class Client:
         self._map = caller.stubs.map
         self._admin = caller.stubs.admin
         self._ingest = caller.stubs.ingest
+        self._own: Set[Caller] = set()  # of watchers that connected again
 
     def __enter__(self) -> "Client":
         return self
@@ -155,6 +156,8 @@ class Client:
     def close(self) -> None:
         """Closes the connection; calls under way fail."""
         self._caller.close()
+        for caller in tuple(self._own):
+            self._forget(caller)
 
     def connect_again(self) -> "Client":
         """Another client of the same server, since a restarted daemon may use another port. Raises as connect()."""
@@ -580,6 +583,7 @@ class Client:
         resume_token: str = "",
         no_frames: bool = False,
         patience: Optional[float] = 60.0,
+        silence: float = 45.0,
     ) -> Iterator[MapEvent]:
         """What happens to the map, without end. Goes on where it was after a broken connection and a restarted daemon.
 
@@ -592,24 +596,27 @@ class Client:
             resume_token: MapEvent.origin.resume_token of an event that was seen: goes on after it.
             no_frames: without frames that are added, moved or skipped, which are most events.
             patience: seconds for which it tries to reach a daemon that is gone; None: for ever.
+            silence: seconds without a message after which the daemon counts as gone; it sends one at least every 15 s.
 
         Raises:
             Unreachable: the daemon was gone for longer than `patience`.
-            RequestError: the token is none, NO_SUCH_SESSION.
+            RequestError: the token is none, NO_SUCH_SESSION. ClientClosed.
             DaemonError: BUDGET_EXCEEDED: too many watch already.
         """
+        if not silence > 0:
+            raise ValueError(f"silence is {silence}; must be above 0")
         start = watch_pb2.WATCH_FROM_OLDEST if oldest else watch_pb2.WATCH_FROM_NOW
         request = watch_pb2.WatchMapRequest(
             sessions=sessions, resume_token=resume_token, no_frames=no_frames, **{"from": start}
         )
-        caller, own = self._caller, False
+        caller = self._caller
         gone_since: Optional[float] = None
         pause = _FIRST_PAUSE_S
         storage: Optional[StorageChanged] = None
         try:
             while True:
                 try:
-                    for message in caller.stream(caller.stubs.map.WatchMap, request, _WATCH_S):
+                    for message in caller.stream(caller.stubs.map.WatchMap, request, math.inf, silence):
                         gone_since, pause = None, _FIRST_PAUSE_S
                         request.resume_token = message.resume_token or request.resume_token
                         event = read_event(message)
@@ -619,27 +626,32 @@ class Client:
                             storage = event
                         yield event
                     raise Unreachable(Reason.UNREACHABLE, "the daemon has ended the stream")
-                except DeadlineExceeded:
-                    continue  # _WATCH_S is over
                 except DaemonError as error:
                     if not isinstance(error, Unreachable) and error.reason != Reason.SHUTTING_DOWN:
                         raise
-                    now = time.monotonic()
-                    gone_since = now if gone_since is None else gone_since
-                    if patience is not None and now - gone_since > patience:
-                        raise
-                time.sleep(pause)
-                pause = min(2 * pause, _MAX_PAUSE_S)
-                try:
-                    again = Caller.open(self._connection)
-                except DaemonError:
-                    continue  # told by the next try of the stream
-                if own:
-                    caller.close()
-                caller, own = again, True
+                    lost = error
+                gone_since = time.monotonic() if gone_since is None else gone_since
+                again: Optional[Caller] = None
+                while again is None:
+                    left = math.inf if patience is None else gone_since + patience - time.monotonic()
+                    if left <= 0:
+                        raise lost
+                    time.sleep(min(pause, left))
+                    pause = min(2 * pause, _MAX_PAUSE_S)
+                    if self._caller.closed:
+                        raise ClientClosed
+                    try:
+                        limit = min(self._connection.timeout, silence, left)
+                        again = Caller.open(self._connection.with_timeout(limit))
+                    except DaemonError as error:
+                        lost = error if isinstance(error, Unreachable) else lost
+                self._forget(caller)
+                caller = again
+                self._own.add(caller)
+                if self._caller.closed:
+                    raise ClientClosed  # in the meantime
         finally:
-            if own:
-                caller.close()
+            self._forget(caller)
 
     # ---- Pictures of the map, and exports
 
@@ -944,6 +956,11 @@ class Client:
         return read_session_status(self._ask(self._ingest.GetAcknowledgement, request, timeout))
 
     # ---- What the methods share
+
+    def _forget(self, caller: Caller) -> None:
+        if caller is not self._caller:
+            self._own.discard(caller)
+            caller.close()
 
     def _ask(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
         return self._caller.ask(method, request, timeout)

@@ -41,6 +41,15 @@ class RequestError(RelmapError):
     """What was asked for cannot be answered: NO_SUCH_FRAME, NOT_CONNECTED, NOT_A_PICTURE, NO_CALIBRATION, ..."""
 
 
+class ClientClosed(RequestError):
+    """The client was closed (INVALID_ARGUMENT)."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            Reason.INVALID_ARGUMENT, "the client is closed; call connect() again, or connect_again() of the closed one"
+        )
+
+
 class PlaceNotRecognised(RelmapError):
     """The map does not recognise what the view shows: NEW_PLACE, AMBIGUOUS_PLACE, TOO_FEW_INLIERS, EMPTY_MAP, ..."""
 
@@ -105,6 +114,13 @@ def error_of(reason: Reason, message: str, request_id: str = "") -> RelmapError:
     """The exception of a reason, of the class that its group has. It is returned, not raised."""
     kind: Type[RelmapError] = _BY_REASON.get(reason) or _BY_GROUP.get(reason.group) or RelmapError
     return kind(reason, message, request_id)
+
+
+def silent(seconds: float) -> Unreachable:
+    """The exception of a stream on which nothing came for so long. It is returned, not raised."""
+    return Unreachable(
+        Reason.UNREACHABLE, f"nothing was heard for {seconds:g} s: the connection is cut, or the daemon is stopped"
+    )
 
 
 def error_of_rpc(error: Any) -> RelmapError:
