@@ -14,7 +14,7 @@ import math
 import time
 import uuid as uuids
 from types import TracebackType
-from typing import Any, AsyncIterator, Callable, List, Optional, Sequence, Set, Type, TypeVar, Union
+from typing import Any, AsyncIterator, Awaitable, Callable, List, Optional, Sequence, Set, Type, TypeVar, Union
 
 from relmap.aio_calls import AioCaller
 from relmap.aio_ingest import AsyncIngestSession
@@ -96,6 +96,12 @@ LONG_S = 24 * 3600.0
 
 _MAX_RESTARTS = 5  # of a list whose version of the map expired
 _FIRST_PAUSE_S, _MAX_PAUSE_S = 0.1, 2.0
+
+
+def _copy(request: Any) -> Any:
+    copy = type(request)()
+    copy.CopyFrom(request)
+    return copy
 
 
 async def connect(
@@ -254,7 +260,8 @@ class AsyncClient:
         alternatives: int = 0,
         timeout: Optional[float] = None,
     ) -> Route:
-        """The cheapest route. A stream that breaks is resumed with the same version of the map.
+        """The cheapest route, of one version of the map. A stream that breaks is resumed; if the version expires meanwhile,
+        the route is sought again.
 
         Args:
             start, goal: a FrameId or its text "3:120", a Label or its text, a View, or a Robot.
@@ -269,12 +276,13 @@ class AsyncClient:
         Raises:
             RequestError: NOT_CONNECTED, OUT_OF_REACH, COST_LIMIT, NO_SUCH_FRAME, NO_SUCH_LABEL.
             PlaceNotRecognised: for an end that is a view.
+            ViewExpired: the version expired again and again: try again when the daemon is less busy.
         """
         request = route_request(
             start, goal, by, weights, count_standing, max_cost, or_from, or_to, filter, covariance, alternatives
         )
         parts: List[RouteParts] = []
-        async for reply in self._caller.resumed(self._map.FindRoute, request, timeout):
+        for reply in await self._replies(self._map.FindRoute, request, timeout):
             while len(parts) <= reply.route:
                 parts.append(RouteParts())
             parts[reply.route].add(reply)
@@ -397,6 +405,15 @@ class AsyncClient:
         states: Sequence[EdgeState] = (),
         kinds: Sequence[EdgeKind] = (),
         session: int = 0,
+        other_session: int = 0,
+        frame: Optional[FrameLike] = None,
+        since: Optional[TimeLike] = None,
+        until: Optional[TimeLike] = None,
+        min_suspicion: float = 0.0,
+        around: Optional[FrameLike] = None,
+        around_edges: int = 0,
+        around_metres: float = 0.0,
+        order: EdgeOrder = EdgeOrder.ID,
         page_size: int = 0,
         timeout: Optional[float] = None,
     ) -> AsyncIterator[Edge]:
@@ -404,10 +421,18 @@ class AsyncClient:
 
         All are of one version of the map. If it expires before the first edge was given out, the list begins again by
         itself; afterwards ViewExpired is raised, since edges of two versions do not go together: begin again.
+
+        Args:
+            states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges, around_metres,
+                order: as in edges().
+            page_size: how many are asked for at once; 0: as many as the daemon likes.
         """
 
         def request() -> map_pb2.ListEdgesRequest:
-            made = edges_request(states, kinds, session, 0, None, None, None, 0.0, None, 0, 0.0, EdgeOrder.ID)
+            made = edges_request(
+                states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges,
+                around_metres, order,
+            )  # fmt: skip
             made.page_size = page_size
             return made
 
@@ -665,12 +690,17 @@ class AsyncClient:
         candidates: bool = False,
         timeout: Optional[float] = None,
     ) -> Skeleton:
-        """The shape of the map, small enough to draw. RequestError: NO_SUCH_SESSION. ValueError: the level.
+        """The shape of the map, small enough to draw; of one version: if that expires meanwhile, it is read again.
 
         Args:
             level: beside junctions, of 64 consecutive frames about 1 (0), 4 (1), 16 (2), or all (3); 1 is for drawing.
             sessions: only these; empty: all.
             candidates: with closures that are not in force.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION.
+            ViewExpired: the version expired again and again; ask for a lower level, or for fewer sessions.
+            ValueError: the level.
         """
         if level not in (0, 1, 2, 3):
             raise ValueError(f"level is {level!r}; must be 0, 1, 2 or 3")
@@ -678,7 +708,7 @@ class AsyncClient:
         chains: List[SkeletonChain] = []
         closures: List[skeleton_pb2.SkeletonClosures] = []
         total, version = 0, 0
-        async for reply in self._caller.resumed(self._map.GetSkeleton, request, timeout):
+        for reply in await self._replies(self._map.GetSkeleton, request, timeout):
             chains.extend(read_chain(chain) for chain in reply.chains)
             closures.append(reply.closures)
             total, version = reply.frames_total, reply.map_version
@@ -705,6 +735,10 @@ class AsyncClient:
             candidates: with closures that are not in force.
             labels: with labels.
             width: of the picture, points.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION.
+            ViewExpired: as skeleton().
         """
         try:
             skeleton = await self.skeleton(level, sessions=sessions, candidates=candidates, timeout=timeout)
@@ -723,7 +757,8 @@ class AsyncClient:
         *,
         timeout: Optional[float] = LONG_S,
     ) -> tuple[TrajectoryFile, ...]:
-        """The trajectory of each session as a file: its odometry edges, chained. Closures do not bend it.
+        """The trajectory of each session as a file: its odometry edges, chained. Closures do not bend it. All are of one
+        version of the map: if that expires meanwhile, they are read again.
 
         Args:
             format: TUM ("time tx ty tz qx qy qz qw") or KITTI (the upper three rows of the pose matrix).
@@ -731,12 +766,13 @@ class AsyncClient:
 
         Raises:
             RequestError: NO_SUCH_SESSION, NOT_STEREO: a mono session, which has no motion.
+            ViewExpired: the version expired again and again; export one session at a time.
         """
         if format not in (ExportFormat.TUM, ExportFormat.KITTI):
             raise ValueError(f"format is {format!r}; must be TUM or KITTI")
         request = map_pb2.ExportRequest(format=int(format), sessions=sessions)  # type: ignore[arg-type]
         files: List[TrajectoryFile] = []
-        async for reply in self._caller.resumed(self._map.Export, request, timeout):
+        for reply in await self._replies(self._map.Export, request, timeout):
             doubtful = Edges(read_edge(edge) for edge in reply.unmeasured)
             if files and files[-1].session == reply.session:
                 last = files[-1]
@@ -755,13 +791,24 @@ class AsyncClient:
         self, sessions: Sequence[int] = (), *, landmarks: bool = False, timeout: Optional[float] = LONG_S
     ) -> AsyncIterator[ExportedFrame]:
         """The frames of each session, ascending, with their landmarks if `landmarks` is set. A stream that breaks goes on.
-        RequestError: NO_SUCH_SESSION, NOT_STEREO."""
+
+        All are of one version of the map. If it expires before the first frame was given out, the export begins again by
+        itself; afterwards ViewExpired is raised, since frames of two versions do not go together: begin again.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION, NOT_STEREO.
+            ViewExpired: as above; the message says how many frames were given out.
+        """
         request = map_pb2.ExportRequest(
             format=map_pb2.EXPORT_FORMAT_FRAMES, sessions=sessions, landmarks=landmarks
         )
-        async for reply in self._caller.resumed(self._map.Export, request, timeout):
-            for frame in reply.frames:
-                yield read_exported_frame(frame)
+        until = self._until(timeout)
+
+        def replies() -> AsyncIterator[Any]:
+            return self._caller.resumed(self._map.Export, _copy(request), until - time.monotonic())
+
+        async for frame in self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export"):
+            yield frame
 
     # ---- For operators
 
@@ -891,7 +938,7 @@ class AsyncClient:
         limit: int = 1000,
         timeout: Optional[float] = None,
     ) -> AuditLog:
-        """What operators did and tried, the newest first. DaemonError: UNSUPPORTED: the daemon keeps no audit log.
+        """What operators did and tried, the newest first. If entries are deleted while it is read, it is read again.
 
         Args:
             since, until: entries since then, and before then.
@@ -899,6 +946,10 @@ class AsyncClient:
             method: of this method, such as "Map.SetEdgeState"; empty: of all.
             failed: only what did not succeed.
             limit: at most so many.
+
+        Raises:
+            DaemonError: UNSUPPORTED: the daemon keeps no audit log.
+            ViewExpired: entries were deleted again and again; ask for fewer, by `limit` or `since`.
         """
         request = admin_pb2.ListAuditRequest(
             from_us=0 if since is None else as_us(since),
@@ -908,14 +959,18 @@ class AsyncClient:
             failed=failed,
             page_size=min(limit, 1000),
         )
-        entries: List[Any] = []
-        while len(entries) < limit:
-            reply = await self._ask(self._admin.ListAudit, request, timeout)
-            entries.extend(read_audit_entry(entry) for entry in reply.entries)
-            if not reply.next_page_token:
-                break
-            request.page_token = reply.next_page_token
-        return AuditLog(entries[:limit])
+        until_s = self._until(timeout)
+
+        async def read() -> AuditLog:
+            entries: List[Any] = []
+            if limit > 0:
+                async for reply in self._pages(self._admin.ListAudit, _copy(request), until_s):
+                    entries.extend(read_audit_entry(entry) for entry in reply.entries)
+                    if len(entries) >= limit:
+                        break
+            return AuditLog(entries[:limit])
+
+        return await self._restarted(read)
 
     # ---- Keyframes
 
@@ -1011,12 +1066,28 @@ class AsyncClient:
     ) -> List[T]:
         """All pages of a list; if its version of the map expires, once more from the beginning."""
         until = self._until(timeout)
-        for _ in range(_MAX_RESTARTS):
+
+        async def whole() -> List[T]:
             found: List[T] = []
+            async for reply in self._pages(method, request(), until):
+                found.extend(read(item) for item in items(reply))
+            return found
+
+        return await self._restarted(whole)
+
+    async def _replies(self, method: Any, request: Any, timeout: Optional[float]) -> List[Any]:
+        """All replies of a stream; if its version of the map expires, once more from the beginning."""
+        until = self._until(timeout)
+
+        async def whole() -> List[Any]:
+            return [reply async for reply in self._caller.resumed(method, _copy(request), until - time.monotonic())]
+
+        return await self._restarted(whole)
+
+    async def _restarted(self, attempt: Callable[[], Awaitable[T]]) -> T:
+        for _ in range(_MAX_RESTARTS):
             try:
-                async for reply in self._pages(method, request(), until):
-                    found.extend(read(item) for item in items(reply))
-                return found
+                return await attempt()
             except ViewExpired as error:
                 last = error
         raise last
@@ -1029,12 +1100,28 @@ class AsyncClient:
         read: Callable[[Any], T],
         timeout: Optional[float],
     ) -> AsyncIterator[T]:
-        """The items of a list, page by page; begins again only while nothing was given out."""
+        """The items of a list, page by page."""
         until = self._until(timeout)
+
+        def replies() -> AsyncIterator[Any]:
+            return self._pages(method, request(), until)
+
+        async for item in self._given(replies, items, read, "items", "list"):
+            yield item
+
+    async def _given(
+        self,
+        replies: Callable[[], AsyncIterator[Any]],
+        items: Callable[[Any], Any],
+        read: Callable[[Any], T],
+        what: str,
+        whole: str,
+    ) -> AsyncIterator[T]:
+        """The items of replies; begins again only while nothing was given out."""
         given = 0
         for attempt in range(_MAX_RESTARTS):
             try:
-                async for reply in self._pages(method, request(), until):
+                async for reply in replies():
                     for item in items(reply):
                         given += 1
                         yield read(item)
@@ -1043,7 +1130,7 @@ class AsyncClient:
                 if given:
                     raise ViewExpired(
                         error.reason,
-                        f"{error.message} ({given} items of it were given out; begin the list again)",
+                        f"{error.message} ({given} {what} of it were given out; begin the {whole} again)",
                         error.request_id,
                     ) from None
                 if attempt + 1 == _MAX_RESTARTS:

@@ -71,7 +71,7 @@ class DeadlineExceeded(DaemonError, TimeoutError):
 
 
 class ViewExpired(DaemonError):
-    """The version of the map that a list was read from is gone (VIEW_EXPIRED): begin the list again."""
+    """The version of the map that a list or stream was read from is gone (VIEW_EXPIRED): begin it again."""
 
 
 class AccessError(RelmapError):

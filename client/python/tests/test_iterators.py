@@ -10,7 +10,7 @@ import pytest
 import relmap
 import relmap.aio
 from fake_daemon import FakeDaemon, edge, refuse
-from relmap.v1 import common_pb2, map_pb2, reason_pb2
+from relmap.v1 import common_pb2, map_pb2, reason_pb2, skeleton_pb2
 
 EXPIRED = (grpc.StatusCode.ABORTED, reason_pb2.REASON_VIEW_EXPIRED, "the version is gone")
 
@@ -105,6 +105,86 @@ def test_a_stream_that_always_breaks_ends() -> None:
         with pytest.raises(relmap.Unreachable):
             client.find_route("1:0", "1:5")
         assert len(daemon.calls["FindRoute"]) == 1  # there was nothing to resume
+
+
+def _expiring(replies: list[Any], *expires: int) -> Any:
+    """A stream of replies. `expires`: the calls (from 0) that find the version gone before the last reply."""
+    calls = iter(range(1000))
+
+    def method(request: Any, context: Any) -> Iterator[Any]:
+        expired = next(calls) in expires
+        assert not request.resume_token
+        yield from replies[:-1]
+        if expired:
+            refuse(context, *EXPIRED)
+        yield replies[-1]
+
+    return method
+
+
+def _steps() -> list[Any]:
+    replies = [map_pb2.FindRouteReply(resume_token=str(i)) for i in range(3)]
+    for i, reply in enumerate(replies):
+        reply.steps.add(frame=common_pb2.FrameId(session=1, index=i))
+    return replies
+
+
+def _chains() -> list[Any]:
+    chain = {"session": 1, "index": [1, 1], "time_ms": [5, 1], "step": [1.0] + [0.0] * 5, "variance": [1, 1], "frames": [1]}
+    reply = skeleton_pb2.GetSkeletonReply(resume_token="a", map_version=7)
+    reply.chains.add(**chain)
+    return [reply, skeleton_pb2.GetSkeletonReply(resume_token="b", map_version=7, frames_total=2)]
+
+
+FILES = [map_pb2.ExportReply(session=1, data=text, resume_token="r") for text in (b"ab", b"cd")]
+
+
+def test_what_is_given_out_at_its_end_begins_again() -> None:
+    methods = dict(
+        FindRoute=_expiring(_steps(), 0, 1), GetSkeleton=_expiring(_chains(), 0, 2), Export=_expiring(FILES, 0),
+        ListSessions=lambda r, c: map_pb2.ListSessionsReply(), FindLabels=lambda r, c: map_pb2.FindLabelsReply(),
+    )  # fmt: skip
+    with FakeDaemon(**methods) as daemon, relmap.connect(daemon.address) as client:
+        assert [f.index for f in client.find_route("1:0", "1:2").frames] == [0, 1, 2]
+        skeleton = client.skeleton()
+        assert [len(chain) for chain in skeleton.chains] == [2] and skeleton.frames_total == 2
+        assert "2 frames" in client.draw_map().svg
+        assert [file.data for file in client.export_trajectories()] == [b"abcd"]
+        assert {name: len(daemon.calls[name]) for name in methods} == {
+            "FindRoute": 3, "GetSkeleton": 4, "Export": 2, "ListSessions": 1, "FindLabels": 1
+        }  # fmt: skip
+    always = range(1000)
+    methods = dict(FindRoute=_expiring(_steps(), *always), GetSkeleton=_expiring(_chains(), *always))
+    with FakeDaemon(**methods) as daemon, relmap.connect(daemon.address) as client:
+        for call in (lambda: client.find_route("1:0", "1:2"), client.skeleton, client.draw_map):
+            with pytest.raises(relmap.ViewExpired):
+                call()
+
+
+def test_exported_frames_begin_again_only_while_none_was_given_out() -> None:
+    frames = [map_pb2.ExportReply(resume_token="r") for _ in range(3)]
+    for index, reply in enumerate(frames[1:]):
+        reply.frames.add(id=common_pb2.FrameId(session=1, index=index))
+    with FakeDaemon(Export=_expiring(frames[::2], 0, 1)) as daemon, relmap.connect(daemon.address) as client:
+        assert [f.id.index for f in client.export_frames()] == [1]
+        assert len(daemon.calls["Export"]) == 3
+    with FakeDaemon(Export=_expiring(frames, 0)) as daemon, relmap.connect(daemon.address) as client:
+        given = client.export_frames()
+        assert next(given).id.index == 0
+        with pytest.raises(relmap.ViewExpired, match="1 frames of it were given out; begin the export again"):
+            next(given)
+
+
+def test_an_iterator_takes_the_filters_of_the_list() -> None:
+    filters: dict[str, Any] = dict(
+        states=[relmap.EdgeState.ACCEPTED], kinds=[relmap.EdgeKind.LOOP], session=1, other_session=2, frame="1:3",
+        since=5, until=9, min_suspicion=0.25, around="1:4", around_edges=3, around_metres=2.5,
+        order=relmap.EdgeOrder.SUSPICION,
+    )  # fmt: skip
+    with FakeDaemon(ListEdges=Pages()) as daemon, relmap.connect(daemon.address) as client:
+        assert _indices(client.edges(**filters)) == _indices(client.iter_edges(**filters))
+        requests = daemon.calls["ListEdges"]
+        assert requests[:3] == requests[3:] and requests[0].region.max_edges == 3 and requests[0].until_us == 9
 
 
 def test_edits_are_sent_again_with_the_same_key() -> None:
