@@ -81,7 +81,7 @@ from relmap.routes import (
     read_neighbourhood,
     read_transform_between,
 )
-from relmap.skeleton import Skeleton, SkeletonChain, read_chain, read_closures, skeleton_of_edges
+from relmap.skeleton import Skeleton, SkeletonChain, joined_chains, read_chain, read_closures, skeleton_of_edges
 from relmap.status import DaemonStatus, Robots, read_robot, read_status
 from relmap.times import TimeLike, as_us
 from relmap.v1 import admin_pb2, evidence_pb2, ingest_pb2, map_pb2, skeleton_pb2, status_pb2, watch_pb2
@@ -710,7 +710,7 @@ class Client:
             chains.extend(read_chain(chain) for chain in reply.chains)
             closures.append(reply.closures)
             total, version = reply.frames_total, reply.map_version
-        return Skeleton(tuple(chains), read_closures(closures), total, version)
+        return Skeleton(joined_chains(chains), read_closures(closures), total, version)
 
     def draw_map(
         self,

@@ -5,12 +5,15 @@ Wrong arguments that can be judged without a daemon raise ValueError or TypeErro
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Type
+import functools
+from typing import Any, Callable, Mapping, Type, TypeVar, cast
 
 import grpc
 
 from relmap.reason import Reason, ReasonGroup
 from relmap.v1 import reason_pb2
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class RelmapError(Exception):
@@ -59,7 +62,8 @@ class ClosureStateError(RelmapError):
 
 
 class DaemonError(RelmapError):
-    """The daemon or its disk cannot do it now: UNREACHABLE, READ_ONLY, BUDGET_EXCEEDED, DISK_FULL, UNIMPLEMENTED, ..."""
+    """The daemon or its disk cannot do it now: UNREACHABLE, READ_ONLY, BUDGET_EXCEEDED, DISK_FULL, UNIMPLEMENTED, ...; or
+    its reply is malformed (CORRUPT)."""
 
 
 class Unreachable(DaemonError, ConnectionError):
@@ -114,6 +118,20 @@ def error_of(reason: Reason, message: str, request_id: str = "") -> RelmapError:
     """The exception of a reason, of the class that its group has. It is returned, not raised."""
     kind: Type[RelmapError] = _BY_REASON.get(reason) or _BY_GROUP.get(reason.group) or RelmapError
     return kind(reason, message, request_id)
+
+
+def reads_reply(read: F) -> F:
+    """Makes a function that reads a daemon's message raise a DaemonError (CORRUPT) where the message makes no sense: a bare
+    ValueError would say that the caller's arguments are wrong."""
+
+    @functools.wraps(read)
+    def checked(*args: Any, **named: Any) -> Any:
+        try:
+            return read(*args, **named)
+        except (ValueError, LookupError, ArithmeticError) as error:
+            raise DaemonError(Reason.CORRUPT, f"the daemon's reply is malformed: {error}") from error
+
+    return cast(F, checked)
 
 
 def silent(seconds: float) -> Unreachable:
