@@ -15,6 +15,7 @@ from relmap.drawing.picture import Drawing
 from relmap.errors import (
     AccessError,
     CameraError,
+    ClientClosed,
     ClosureStateError,
     DaemonError,
     DeadlineExceeded,
@@ -42,6 +43,7 @@ __all__ = [
     "AccessError",
     "CameraError",
     "Client",
+    "ClientClosed",
     "ClosureStateError",
     "DaemonError",
     "DeadlineExceeded",

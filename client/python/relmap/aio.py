@@ -10,10 +10,11 @@ here, and iterators are asynchronous.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 import uuid as uuids
 from types import TracebackType
-from typing import Any, AsyncIterator, Callable, List, Optional, Sequence, Type, TypeVar, Union
+from typing import Any, AsyncIterator, Awaitable, Callable, List, Optional, Sequence, Set, Type, TypeVar, Union
 
 from relmap.aio_calls import AioCaller
 from relmap.aio_ingest import AsyncIngestSession
@@ -21,7 +22,7 @@ from relmap.camera import RawStereo, StereoCamera
 from relmap.connection import Connection
 from relmap.credentials import PathLike, credentials_of
 from relmap.drawing.picture import Drawing, draw_map
-from relmap.errors import DaemonError, DeadlineExceeded, Unreachable, ViewExpired
+from relmap.errors import ClientClosed, DaemonError, Unreachable, ViewExpired
 from relmap.events import MapEvent, StorageChanged, read_event
 from relmap.evidence import ClosureMatrix, EdgeEdit, Explanation, read_count, read_edit, read_explanation
 from relmap.exports import ExportedFrame, ExportFormat, TrajectoryFile, read_exported_frame
@@ -82,7 +83,7 @@ from relmap.routes import (
     read_neighbourhood,
     read_transform_between,
 )
-from relmap.skeleton import Skeleton, SkeletonChain, read_chain, read_closures, skeleton_of_edges
+from relmap.skeleton import Skeleton, SkeletonChain, joined_chains, read_chain, read_closures, skeleton_of_edges
 from relmap.status import DaemonStatus, Robots, read_robot, read_status
 from relmap.times import TimeLike, as_us
 from relmap.v1 import admin_pb2, evidence_pb2, ingest_pb2, map_pb2, skeleton_pb2, status_pb2, watch_pb2
@@ -94,8 +95,13 @@ LONG_S = 24 * 3600.0
 """Seconds that calls may take which read or write the whole map, unless they are given a timeout."""
 
 _MAX_RESTARTS = 5  # of a list whose version of the map expired
-_WATCH_S = 300.0  # a stream of events is opened again so often, so that a dead connection is noticed
 _FIRST_PAUSE_S, _MAX_PAUSE_S = 0.1, 2.0
+
+
+def _copy(request: Any) -> Any:
+    copy = type(request)()
+    copy.CopyFrom(request)
+    return copy
 
 
 async def connect(
@@ -145,6 +151,7 @@ class AsyncClient:
         self._map = caller.stubs.map
         self._admin = caller.stubs.admin
         self._ingest = caller.stubs.ingest
+        self._own: Set[AioCaller] = set()  # of watchers that connected again
 
     async def __aenter__(self) -> "AsyncClient":
         return self
@@ -157,6 +164,8 @@ class AsyncClient:
     async def close(self) -> None:
         """Closes the connection; calls under way fail."""
         await self._caller.close()
+        for caller in tuple(self._own):
+            await self._forget(caller)
 
     async def connect_again(self) -> "AsyncClient":
         """Another client of the same server, since a restarted daemon may use another port. Raises as connect()."""
@@ -251,7 +260,8 @@ class AsyncClient:
         alternatives: int = 0,
         timeout: Optional[float] = None,
     ) -> Route:
-        """The cheapest route. A stream that breaks is resumed with the same version of the map.
+        """The cheapest route, of one version of the map. A stream that breaks is resumed; if the version expires meanwhile,
+        the route is sought again.
 
         Args:
             start, goal: a FrameId or its text "3:120", a Label or its text, a View, or a Robot.
@@ -266,12 +276,13 @@ class AsyncClient:
         Raises:
             RequestError: NOT_CONNECTED, OUT_OF_REACH, COST_LIMIT, NO_SUCH_FRAME, NO_SUCH_LABEL.
             PlaceNotRecognised: for an end that is a view.
+            ViewExpired: the version expired again and again: try again when the daemon is less busy.
         """
         request = route_request(
             start, goal, by, weights, count_standing, max_cost, or_from, or_to, filter, covariance, alternatives
         )
         parts: List[RouteParts] = []
-        async for reply in self._caller.resumed(self._map.FindRoute, request, timeout):
+        for reply in await self._replies(self._map.FindRoute, request, timeout):
             while len(parts) <= reply.route:
                 parts.append(RouteParts())
             parts[reply.route].add(reply)
@@ -394,6 +405,15 @@ class AsyncClient:
         states: Sequence[EdgeState] = (),
         kinds: Sequence[EdgeKind] = (),
         session: int = 0,
+        other_session: int = 0,
+        frame: Optional[FrameLike] = None,
+        since: Optional[TimeLike] = None,
+        until: Optional[TimeLike] = None,
+        min_suspicion: float = 0.0,
+        around: Optional[FrameLike] = None,
+        around_edges: int = 0,
+        around_metres: float = 0.0,
+        order: EdgeOrder = EdgeOrder.ID,
         page_size: int = 0,
         timeout: Optional[float] = None,
     ) -> AsyncIterator[Edge]:
@@ -401,10 +421,18 @@ class AsyncClient:
 
         All are of one version of the map. If it expires before the first edge was given out, the list begins again by
         itself; afterwards ViewExpired is raised, since edges of two versions do not go together: begin again.
+
+        Args:
+            states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges, around_metres,
+                order: as in edges().
+            page_size: how many are asked for at once; 0: as many as the daemon likes.
         """
 
         def request() -> map_pb2.ListEdgesRequest:
-            made = edges_request(states, kinds, session, 0, None, None, None, 0.0, None, 0, 0.0, EdgeOrder.ID)
+            made = edges_request(
+                states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges,
+                around_metres, order,
+            )  # fmt: skip
             made.page_size = page_size
             return made
 
@@ -582,6 +610,7 @@ class AsyncClient:
         resume_token: str = "",
         no_frames: bool = False,
         patience: Optional[float] = 60.0,
+        silence: float = 45.0,
     ) -> AsyncIterator[MapEvent]:
         """What happens to the map, without end. Goes on where it was after a broken connection and a restarted daemon.
 
@@ -594,24 +623,27 @@ class AsyncClient:
             resume_token: MapEvent.origin.resume_token of an event that was seen: goes on after it.
             no_frames: without frames that are added, moved or skipped, which are most events.
             patience: seconds for which it tries to reach a daemon that is gone; None: for ever.
+            silence: seconds without a message after which the daemon counts as gone; it sends one at least every 15 s.
 
         Raises:
             Unreachable: the daemon was gone for longer than `patience`.
-            RequestError: the token is none, NO_SUCH_SESSION.
+            RequestError: the token is none, NO_SUCH_SESSION. ClientClosed.
             DaemonError: BUDGET_EXCEEDED: too many watch already.
         """
+        if not silence > 0:
+            raise ValueError(f"silence is {silence}; must be above 0")
         start = watch_pb2.WATCH_FROM_OLDEST if oldest else watch_pb2.WATCH_FROM_NOW
         request = watch_pb2.WatchMapRequest(
             sessions=sessions, resume_token=resume_token, no_frames=no_frames, **{"from": start}
         )
-        caller, own = self._caller, False
+        caller = self._caller
         gone_since: Optional[float] = None
         pause = _FIRST_PAUSE_S
         storage: Optional[StorageChanged] = None
         try:
             while True:
                 try:
-                    async for message in caller.stream(caller.stubs.map.WatchMap, request, _WATCH_S):
+                    async for message in caller.stream(caller.stubs.map.WatchMap, request, math.inf, silence):
                         gone_since, pause = None, _FIRST_PAUSE_S
                         request.resume_token = message.resume_token or request.resume_token
                         event = read_event(message)
@@ -621,27 +653,32 @@ class AsyncClient:
                             storage = event
                         yield event
                     raise Unreachable(Reason.UNREACHABLE, "the daemon has ended the stream")
-                except DeadlineExceeded:
-                    continue  # _WATCH_S is over
                 except DaemonError as error:
                     if not isinstance(error, Unreachable) and error.reason != Reason.SHUTTING_DOWN:
                         raise
-                    now = time.monotonic()
-                    gone_since = now if gone_since is None else gone_since
-                    if patience is not None and now - gone_since > patience:
-                        raise
-                await asyncio.sleep(pause)
-                pause = min(2 * pause, _MAX_PAUSE_S)
-                try:
-                    again = await AioCaller.open(self._connection)
-                except DaemonError:
-                    continue  # told by the next try of the stream
-                if own:
-                    await caller.close()
-                caller, own = again, True
+                    lost = error
+                gone_since = time.monotonic() if gone_since is None else gone_since
+                again: Optional[AioCaller] = None
+                while again is None:
+                    left = math.inf if patience is None else gone_since + patience - time.monotonic()
+                    if left <= 0:
+                        raise lost
+                    await asyncio.sleep(min(pause, left))
+                    pause = min(2 * pause, _MAX_PAUSE_S)
+                    if self._caller.closed:
+                        raise ClientClosed
+                    try:
+                        limit = min(self._connection.timeout, silence, left)
+                        again = await AioCaller.open(self._connection.with_timeout(limit))
+                    except DaemonError as error:
+                        lost = error if isinstance(error, Unreachable) else lost
+                await self._forget(caller)
+                caller = again
+                self._own.add(caller)
+                if self._caller.closed:
+                    raise ClientClosed  # in the meantime
         finally:
-            if own:
-                await caller.close()
+            await self._forget(caller)
 
     # ---- Pictures of the map, and exports
 
@@ -653,12 +690,17 @@ class AsyncClient:
         candidates: bool = False,
         timeout: Optional[float] = None,
     ) -> Skeleton:
-        """The shape of the map, small enough to draw. RequestError: NO_SUCH_SESSION. ValueError: the level.
+        """The shape of the map, small enough to draw; of one version: if that expires meanwhile, it is read again.
 
         Args:
             level: beside junctions, of 64 consecutive frames about 1 (0), 4 (1), 16 (2), or all (3); 1 is for drawing.
             sessions: only these; empty: all.
             candidates: with closures that are not in force.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION.
+            ViewExpired: the version expired again and again; ask for a lower level, or for fewer sessions.
+            ValueError: the level.
         """
         if level not in (0, 1, 2, 3):
             raise ValueError(f"level is {level!r}; must be 0, 1, 2 or 3")
@@ -666,11 +708,11 @@ class AsyncClient:
         chains: List[SkeletonChain] = []
         closures: List[skeleton_pb2.SkeletonClosures] = []
         total, version = 0, 0
-        async for reply in self._caller.resumed(self._map.GetSkeleton, request, timeout):
+        for reply in await self._replies(self._map.GetSkeleton, request, timeout):
             chains.extend(read_chain(chain) for chain in reply.chains)
             closures.append(reply.closures)
             total, version = reply.frames_total, reply.map_version
-        return Skeleton(tuple(chains), read_closures(closures), total, version)
+        return Skeleton(joined_chains(chains), read_closures(closures), total, version)
 
     async def draw_map(
         self,
@@ -693,6 +735,10 @@ class AsyncClient:
             candidates: with closures that are not in force.
             labels: with labels.
             width: of the picture, points.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION.
+            ViewExpired: as skeleton().
         """
         try:
             skeleton = await self.skeleton(level, sessions=sessions, candidates=candidates, timeout=timeout)
@@ -711,7 +757,8 @@ class AsyncClient:
         *,
         timeout: Optional[float] = LONG_S,
     ) -> tuple[TrajectoryFile, ...]:
-        """The trajectory of each session as a file: its odometry edges, chained. Closures do not bend it.
+        """The trajectory of each session as a file: its odometry edges, chained. Closures do not bend it. All are of one
+        version of the map: if that expires meanwhile, they are read again.
 
         Args:
             format: TUM ("time tx ty tz qx qy qz qw") or KITTI (the upper three rows of the pose matrix).
@@ -719,12 +766,13 @@ class AsyncClient:
 
         Raises:
             RequestError: NO_SUCH_SESSION, NOT_STEREO: a mono session, which has no motion.
+            ViewExpired: the version expired again and again; export one session at a time.
         """
         if format not in (ExportFormat.TUM, ExportFormat.KITTI):
             raise ValueError(f"format is {format!r}; must be TUM or KITTI")
         request = map_pb2.ExportRequest(format=int(format), sessions=sessions)  # type: ignore[arg-type]
         files: List[TrajectoryFile] = []
-        async for reply in self._caller.resumed(self._map.Export, request, timeout):
+        for reply in await self._replies(self._map.Export, request, timeout):
             doubtful = Edges(read_edge(edge) for edge in reply.unmeasured)
             if files and files[-1].session == reply.session:
                 last = files[-1]
@@ -743,13 +791,24 @@ class AsyncClient:
         self, sessions: Sequence[int] = (), *, landmarks: bool = False, timeout: Optional[float] = LONG_S
     ) -> AsyncIterator[ExportedFrame]:
         """The frames of each session, ascending, with their landmarks if `landmarks` is set. A stream that breaks goes on.
-        RequestError: NO_SUCH_SESSION, NOT_STEREO."""
+
+        All are of one version of the map. If it expires before the first frame was given out, the export begins again by
+        itself; afterwards ViewExpired is raised, since frames of two versions do not go together: begin again.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION, NOT_STEREO.
+            ViewExpired: as above; the message says how many frames were given out.
+        """
         request = map_pb2.ExportRequest(
             format=map_pb2.EXPORT_FORMAT_FRAMES, sessions=sessions, landmarks=landmarks
         )
-        async for reply in self._caller.resumed(self._map.Export, request, timeout):
-            for frame in reply.frames:
-                yield read_exported_frame(frame)
+        until = self._until(timeout)
+
+        def replies() -> AsyncIterator[Any]:
+            return self._caller.resumed(self._map.Export, _copy(request), until - time.monotonic())
+
+        async for frame in self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export"):
+            yield frame
 
     # ---- For operators
 
@@ -879,7 +938,7 @@ class AsyncClient:
         limit: int = 1000,
         timeout: Optional[float] = None,
     ) -> AuditLog:
-        """What operators did and tried, the newest first. DaemonError: UNSUPPORTED: the daemon keeps no audit log.
+        """What operators did and tried, the newest first. If entries are deleted while it is read, it is read again.
 
         Args:
             since, until: entries since then, and before then.
@@ -887,6 +946,10 @@ class AsyncClient:
             method: of this method, such as "Map.SetEdgeState"; empty: of all.
             failed: only what did not succeed.
             limit: at most so many.
+
+        Raises:
+            DaemonError: UNSUPPORTED: the daemon keeps no audit log.
+            ViewExpired: entries were deleted again and again; ask for fewer, by `limit` or `since`.
         """
         request = admin_pb2.ListAuditRequest(
             from_us=0 if since is None else as_us(since),
@@ -896,14 +959,18 @@ class AsyncClient:
             failed=failed,
             page_size=min(limit, 1000),
         )
-        entries: List[Any] = []
-        while len(entries) < limit:
-            reply = await self._ask(self._admin.ListAudit, request, timeout)
-            entries.extend(read_audit_entry(entry) for entry in reply.entries)
-            if not reply.next_page_token:
-                break
-            request.page_token = reply.next_page_token
-        return AuditLog(entries[:limit])
+        until_s = self._until(timeout)
+
+        async def read() -> AuditLog:
+            entries: List[Any] = []
+            if limit > 0:
+                async for reply in self._pages(self._admin.ListAudit, _copy(request), until_s):
+                    entries.extend(read_audit_entry(entry) for entry in reply.entries)
+                    if len(entries) >= limit:
+                        break
+            return AuditLog(entries[:limit])
+
+        return await self._restarted(read)
 
     # ---- Keyframes
 
@@ -946,6 +1013,11 @@ class AsyncClient:
         return read_session_status(await self._ask(self._ingest.GetAcknowledgement, request, timeout))
 
     # ---- What the methods share
+
+    async def _forget(self, caller: AioCaller) -> None:
+        if caller is not self._caller:
+            self._own.discard(caller)
+            await caller.close()
 
     async def _ask(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
         return await self._caller.ask(method, request, timeout)
@@ -994,12 +1066,28 @@ class AsyncClient:
     ) -> List[T]:
         """All pages of a list; if its version of the map expires, once more from the beginning."""
         until = self._until(timeout)
-        for _ in range(_MAX_RESTARTS):
+
+        async def whole() -> List[T]:
             found: List[T] = []
+            async for reply in self._pages(method, request(), until):
+                found.extend(read(item) for item in items(reply))
+            return found
+
+        return await self._restarted(whole)
+
+    async def _replies(self, method: Any, request: Any, timeout: Optional[float]) -> List[Any]:
+        """All replies of a stream; if its version of the map expires, once more from the beginning."""
+        until = self._until(timeout)
+
+        async def whole() -> List[Any]:
+            return [reply async for reply in self._caller.resumed(method, _copy(request), until - time.monotonic())]
+
+        return await self._restarted(whole)
+
+    async def _restarted(self, attempt: Callable[[], Awaitable[T]]) -> T:
+        for _ in range(_MAX_RESTARTS):
             try:
-                async for reply in self._pages(method, request(), until):
-                    found.extend(read(item) for item in items(reply))
-                return found
+                return await attempt()
             except ViewExpired as error:
                 last = error
         raise last
@@ -1012,12 +1100,28 @@ class AsyncClient:
         read: Callable[[Any], T],
         timeout: Optional[float],
     ) -> AsyncIterator[T]:
-        """The items of a list, page by page; begins again only while nothing was given out."""
+        """The items of a list, page by page."""
         until = self._until(timeout)
+
+        def replies() -> AsyncIterator[Any]:
+            return self._pages(method, request(), until)
+
+        async for item in self._given(replies, items, read, "items", "list"):
+            yield item
+
+    async def _given(
+        self,
+        replies: Callable[[], AsyncIterator[Any]],
+        items: Callable[[Any], Any],
+        read: Callable[[Any], T],
+        what: str,
+        whole: str,
+    ) -> AsyncIterator[T]:
+        """The items of replies; begins again only while nothing was given out."""
         given = 0
         for attempt in range(_MAX_RESTARTS):
             try:
-                async for reply in self._pages(method, request(), until):
+                async for reply in replies():
                     for item in items(reply):
                         given += 1
                         yield read(item)
@@ -1026,7 +1130,7 @@ class AsyncClient:
                 if given:
                     raise ViewExpired(
                         error.reason,
-                        f"{error.message} ({given} items of it were given out; begin the list again)",
+                        f"{error.message} ({given} {what} of it were given out; begin the {whole} again)",
                         error.request_id,
                     ) from None
                 if attempt + 1 == _MAX_RESTARTS:

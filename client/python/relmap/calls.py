@@ -8,8 +8,9 @@ from typing import Any, Iterator, Optional
 
 import grpc
 
+from relmap.silence import Heard
 from relmap.connection import Connection, Stubs, check_boot, unreachable
-from relmap.errors import RelmapError, Unreachable, error_of_rpc
+from relmap.errors import ClientClosed, RelmapError, Unreachable, error_of_rpc
 from relmap.v1 import status_pb2
 
 MAX_RESUMPTIONS = 3
@@ -22,11 +23,13 @@ class Caller:
     Attributes:
         connection: what it was connected with.
         stubs: of the services.
+        closed: whether close() was called; every call then raises ClientClosed.
     """
 
     def __init__(self, connection: Connection, channel: Any) -> None:
         self.connection = connection
         self.stubs = Stubs(channel)
+        self.closed = False
         self._channel = channel
         self._metadata = connection.metadata
 
@@ -45,7 +48,16 @@ class Caller:
 
     def close(self) -> None:
         """Closes the channel; calls under way fail."""
+        self.closed = True
         self._channel.close()
+
+    def _call(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+        if self.closed:
+            raise ClientClosed
+        return method(request, timeout=self._limit(timeout), metadata=self._metadata)
+
+    def _failed(self, error: Any) -> RelmapError:
+        return ClientClosed() if self.closed else error_of_rpc(error)
 
     def _limit(self, timeout: Optional[float]) -> Optional[float]:
         if timeout is None:
@@ -55,18 +67,21 @@ class Caller:
     def ask(self, method: Any, request: Any, timeout: Optional[float] = None) -> Any:
         """The reply to a request. RelmapError: why there is none."""
         try:
-            return method(request, timeout=self._limit(timeout), metadata=self._metadata)
+            return self._call(method, request, timeout)
         except grpc.RpcError as error:
-            raise error_of_rpc(error) from None
+            raise self._failed(error) from None
 
-    def stream(self, method: Any, request: Any, timeout: Optional[float] = None) -> Iterator[Any]:
-        """The replies to a request; not resumed. The timeout is for all of them; None: that of the connection, inf: none."""
-        call = method(request, timeout=self._limit(timeout), metadata=self._metadata)
+    def stream(
+        self, method: Any, request: Any, timeout: Optional[float] = None, silence: Optional[float] = None
+    ) -> Iterator[Any]:
+        """The replies to a request; not resumed. The timeout is for all of them; None: that of the connection, inf: none.
+        With `silence`, Unreachable is raised if no reply comes for so many seconds."""
+        call = self._call(method, request, timeout)
         try:
-            for reply in call:
+            for reply in call if silence is None else Heard(call, silence):
                 yield reply
         except grpc.RpcError as error:
-            raise error_of_rpc(error) from None
+            raise self._failed(error) from None
         finally:
             call.cancel()
 

@@ -5,12 +5,15 @@ Wrong arguments that can be judged without a daemon raise ValueError or TypeErro
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Type
+import functools
+from typing import Any, Callable, Mapping, Type, TypeVar, cast
 
 import grpc
 
 from relmap.reason import Reason, ReasonGroup
 from relmap.v1 import reason_pb2
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class RelmapError(Exception):
@@ -41,6 +44,15 @@ class RequestError(RelmapError):
     """What was asked for cannot be answered: NO_SUCH_FRAME, NOT_CONNECTED, NOT_A_PICTURE, NO_CALIBRATION, ..."""
 
 
+class ClientClosed(RequestError):
+    """The client was closed (INVALID_ARGUMENT)."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            Reason.INVALID_ARGUMENT, "the client is closed; call connect() again, or connect_again() of the closed one"
+        )
+
+
 class PlaceNotRecognised(RelmapError):
     """The map does not recognise what the view shows: NEW_PLACE, AMBIGUOUS_PLACE, TOO_FEW_INLIERS, EMPTY_MAP, ..."""
 
@@ -50,7 +62,8 @@ class ClosureStateError(RelmapError):
 
 
 class DaemonError(RelmapError):
-    """The daemon or its disk cannot do it now: UNREACHABLE, READ_ONLY, BUDGET_EXCEEDED, DISK_FULL, UNIMPLEMENTED, ..."""
+    """The daemon or its disk cannot do it now: UNREACHABLE, READ_ONLY, BUDGET_EXCEEDED, DISK_FULL, UNIMPLEMENTED, ...; or
+    its reply is malformed (CORRUPT)."""
 
 
 class Unreachable(DaemonError, ConnectionError):
@@ -62,7 +75,7 @@ class DeadlineExceeded(DaemonError, TimeoutError):
 
 
 class ViewExpired(DaemonError):
-    """The version of the map that a list was read from is gone (VIEW_EXPIRED): begin the list again."""
+    """The version of the map that a list or stream was read from is gone (VIEW_EXPIRED): begin it again."""
 
 
 class AccessError(RelmapError):
@@ -105,6 +118,27 @@ def error_of(reason: Reason, message: str, request_id: str = "") -> RelmapError:
     """The exception of a reason, of the class that its group has. It is returned, not raised."""
     kind: Type[RelmapError] = _BY_REASON.get(reason) or _BY_GROUP.get(reason.group) or RelmapError
     return kind(reason, message, request_id)
+
+
+def reads_reply(read: F) -> F:
+    """Makes a function that reads a daemon's message raise a DaemonError (CORRUPT) where the message makes no sense: a bare
+    ValueError would say that the caller's arguments are wrong."""
+
+    @functools.wraps(read)
+    def checked(*args: Any, **named: Any) -> Any:
+        try:
+            return read(*args, **named)
+        except (ValueError, LookupError, ArithmeticError) as error:
+            raise DaemonError(Reason.CORRUPT, f"the daemon's reply is malformed: {error}") from error
+
+    return cast(F, checked)
+
+
+def silent(seconds: float) -> Unreachable:
+    """The exception of a stream on which nothing came for so long. It is returned, not raised."""
+    return Unreachable(
+        Reason.UNREACHABLE, f"nothing was heard for {seconds:g} s: the connection is cut, or the daemon is stopped"
+    )
 
 
 def error_of_rpc(error: Any) -> RelmapError:

@@ -6,6 +6,7 @@ import datetime
 from dataclasses import dataclass
 from typing import Callable, Optional
 
+from relmap.errors import reads_reply
 from relmap.geometry import Array, read_transform
 from relmap.graph import Edge, MotionSource, SessionState, read_edge
 from relmap.ids import EdgeId, FrameId, read_edge_id, read_frame_id
@@ -261,6 +262,7 @@ _READ: dict[str, _Read] = {
 }
 
 
+@reads_reply
 def read_event(message: watch_pb2.MapEvent) -> MapEvent:
     """The event of a message."""
     origin = EventOrigin(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence
 
 import numpy as np
 
+from relmap.errors import reads_reply
 from relmap.geometry import Array, frozen, read_covariance, read_transform
 from relmap.graph import (
     CarriedStretch,
@@ -217,6 +218,7 @@ class EdgeEdit(Record):
         return edit_html(self)
 
 
+@reads_reply
 def read_explanation(message: evidence_pb2.ExplainEdgeReply, pictures: bool) -> Explanation:
     """The explanation of a message; `pictures` says whether they were asked for."""
     motion = message.motion
@@ -249,6 +251,7 @@ def read_explanation(message: evidence_pb2.ExplainEdgeReply, pictures: bool) -> 
     )
 
 
+@reads_reply
 def read_count(message: evidence_pb2.ClosureMatrixCell) -> ClosureCount:
     """The cell of a message."""
     return ClosureCount(
@@ -279,6 +282,7 @@ def _read_change(message: map_pb2.ClosureChange) -> ClosureChange:
     )
 
 
+@reads_reply
 def read_edit(message: Any) -> EdgeEdit:
     """The result of a SetEdgeStateReply or ProposeEdgeReply."""
     return EdgeEdit(

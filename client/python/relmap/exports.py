@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relmap.errors import reads_reply
 from relmap.geometry import Array, frozen
 from relmap.graph import Edges
 from relmap.ids import FrameId, read_frame_id
@@ -55,6 +56,7 @@ class ExportedFrame(Record):
     observers: Array
 
 
+@reads_reply
 def read_exported_frame(message: map_pb2.ExportedFrame) -> ExportedFrame:
     """The frame of a message."""
     return ExportedFrame(

@@ -10,6 +10,7 @@ from typing import Any, Iterable, Mapping, Optional, Sequence, TypeVar
 import numpy as np
 
 from relmap.camera import RawStereo, StereoCamera, read_camera, read_raw
+from relmap.errors import reads_reply
 from relmap.geometry import Array, frozen, read_covariance, read_transform
 from relmap.ids import EdgeId, FrameId, LandmarkId, read_edge_id, read_frame_id
 from relmap.measurements import Features, read_feature_set
@@ -521,6 +522,7 @@ def _read_suspicion(message: graph_pb2.Suspicion) -> Suspicion:
     return Suspicion(message.value, doubts, message.remark)
 
 
+@reads_reply
 def read_edge(message: graph_pb2.Edge) -> Edge:
     """The edge of a message."""
     return Edge(
@@ -554,6 +556,7 @@ def read_edge(message: graph_pb2.Edge) -> Edge:
     )
 
 
+@reads_reply
 def read_session(message: graph_pb2.Session) -> Session:
     """The session of a message."""
     return Session(
@@ -606,6 +609,7 @@ def _read_observations(messages: Sequence[graph_pb2.Observation]) -> Observation
     )
 
 
+@reads_reply
 def read_frame(message: graph_pb2.Frame, landmarks: bool, observations: bool, appearance: bool, picture: bool) -> Frame:
     """The frame of a message; the flags say what was asked for."""
     return Frame(

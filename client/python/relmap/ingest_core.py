@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Deque, Dict, List, Optional, Tuple
 
-from relmap.errors import RobotDataError
+from relmap.errors import RobotDataError, reads_reply
 from relmap.geometry import Array, read_covariance, read_transform
 from relmap.ids import FrameId, read_frame_id
 from relmap.reason import Reason
@@ -100,8 +100,9 @@ class KeyframeLocalisation(Record):
     candidate: bool
 
 
+@reads_reply
 def read_session_status(message: ingest_pb2.Acknowledgement) -> SessionStatus:
-    """What an acknowledgement says. ValueError: it makes no sense."""
+    """What an acknowledgement says. DaemonError: CORRUPT: it makes no sense."""
     return SessionStatus(
         uuids.UUID(bytes=message.session_uuid),
         message.session,

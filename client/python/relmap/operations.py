@@ -6,6 +6,7 @@ import datetime
 from dataclasses import dataclass
 from typing import Any, Callable, Mapping, Optional, Sequence
 
+from relmap.errors import reads_reply
 from relmap.ids import FrameId, read_frame_id
 from relmap.reason import Reason
 from relmap.status import DaemonStatus, read_status
@@ -160,17 +161,20 @@ class AuditLog(Table[AuditEntry]):
         return "time_us who role address method request message seconds outcome".split()
 
 
+@reads_reply
 def read_progress(message: admin_pb2.Progress) -> Progress:
     """The progress of a message."""
     return Progress(message.step, message.done, message.total, message.unit)
 
 
+@reads_reply
 def read_finding(message: admin_pb2.Finding) -> Finding:
     """The finding of a message."""
     frame = read_frame_id(message.frame) if message.frame.session else None
     return Finding(Reason(message.reason), message.message, frame)
 
 
+@reads_reply
 def read_verify_summary(message: admin_pb2.VerifySummary, findings: tuple[Finding, ...]) -> VerifySummary:
     """The summary of a message, with the findings that came before it."""
     return VerifySummary(
@@ -185,6 +189,7 @@ def read_verify_summary(message: admin_pb2.VerifySummary, findings: tuple[Findin
     )
 
 
+@reads_reply
 def read_stats(message: admin_pb2.GetStatsReply) -> StoreStats:
     """The sizes of a message."""
     return StoreStats(
@@ -199,6 +204,7 @@ def read_stats(message: admin_pb2.GetStatsReply) -> StoreStats:
     )
 
 
+@reads_reply
 def read_audit_entry(message: admin_pb2.AuditEntry) -> AuditEntry:
     """The entry of a message."""
     return AuditEntry(

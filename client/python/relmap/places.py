@@ -7,6 +7,7 @@ from typing import Any, Mapping, Optional, Sequence
 
 import numpy as np
 
+from relmap.errors import reads_reply
 from relmap.geometry import Array, PoseKind, frozen, read_covariance, read_transform
 from relmap.graph import Verification
 from relmap.ids import FrameId, read_frame_id
@@ -159,6 +160,7 @@ def read_correspondences(messages: Sequence[evidence_pb2.Correspondence]) -> Cor
     )
 
 
+@reads_reply
 def read_localisation(message: map_pb2.LocaliseReply, correspondences: bool = False) -> Localisation:
     """The localisation of a message."""
     return Localisation(
@@ -196,6 +198,7 @@ def _read_match(message: map_pb2.PlaceMatch, correspondences: bool) -> PlaceMatc
     )
 
 
+@reads_reply
 def read_matches(message: map_pb2.MatchImageReply, correspondences: bool = False) -> PlaceMatches:
     """The matches of a message."""
     matches = PlaceMatches(_read_match(place, correspondences) for place in message.places)

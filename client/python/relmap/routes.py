@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Union
 
 import numpy as np
 
+from relmap.errors import reads_reply
 from relmap.geometry import (
     Array,
     PoseKind,
@@ -364,6 +365,7 @@ class RouteParts:
             self.summary = message.summary
         self.steps.extend(message.steps)
 
+    @reads_reply
     def route(self, alternatives: tuple[Route, ...] = ()) -> Route:
         """The route that was collected."""
         s, steps = self.summary, self.steps
@@ -402,6 +404,7 @@ class RouteParts:
         )
 
 
+@reads_reply
 def read_transform_between(message: map_pb2.TransformBetweenReply) -> TransformBetween:
     """The transform of a message."""
     return TransformBetween(
@@ -421,6 +424,7 @@ def _points(messages: Any) -> Array:
     return frozen(np.array([(p.x, p.y, p.z) for p in messages], dtype=float).reshape(-1, 3))
 
 
+@reads_reply
 def read_neighbourhood(message: map_pb2.GetNeighbourhoodReply) -> Neighbourhood:
     """The neighbourhood of a message."""
     frames = message.frames
@@ -439,6 +443,7 @@ def read_neighbourhood(message: map_pb2.GetNeighbourhoodReply) -> Neighbourhood:
     )
 
 
+@reads_reply
 def parse_tum(session: int, text: bytes) -> Trajectory:
     """The trajectory of a session's file in the format TUM: "time tx ty tz qx qy qz qw", time in seconds."""
     times, poses = [], []

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Iterable
+from typing import TYPE_CHECKING, Iterable, Sequence
 
 import numpy as np
 
+from relmap.errors import reads_reply
 from relmap.geometry import Array, frozen, so3_log
 from relmap.graph import Edge, EdgeKind
 from relmap.ids import EdgeId, FrameId
@@ -115,30 +116,76 @@ def _undelta(values: Iterable[int]) -> Array:
     return np.cumsum(np.fromiter(values, np.int64))
 
 
-def _marked(places: Iterable[int], count: int) -> Array:
-    marked = np.zeros(count, bool)
-    marked[np.fromiter(places, np.int64) - 1] = True
+def _marked(places: Iterable[int], steps: int) -> Array:
+    marked = np.zeros(steps, bool)
+    for place in places:
+        if not 1 <= place <= steps:
+            raise ValueError(f"point {place} of a chain of {steps + 1} points is marked; must be 1..{steps}")
+        marked[place - 1] = True
     return frozen(marked)
 
 
+def _numbers(what: str, values: Iterable[float], rows: int, columns: int) -> Array:
+    numbers = np.array(values, float).reshape(rows, columns)
+    if not np.isfinite(numbers).all() or (what == "variance" and (numbers < 0).any()):
+        raise ValueError(f"a {what} that is none")
+    return frozen(numbers)
+
+
+@reads_reply
 def read_chain(message: skeleton_pb2.SkeletonChain) -> SkeletonChain:
-    """The chain of a message. ValueError: its arrays do not fit together."""
+    """The chain of a message. DaemonError: CORRUPT: its arrays do not fit together."""
     index = _undelta(message.index)
-    steps = max(len(index) - 1, 0)
+    steps = len(index) - 1
+    if steps < 0 or 0 in message.index[1:] or index[-1] >= 2**32:
+        raise ValueError("the indices of a chain do not ascend")
     return SkeletonChain(
         message.session,
         frozen(index),
-        frozen(_undelta(message.time_ms)),
-        frozen(np.array(message.step, float).reshape(steps, 6)),
-        frozen(np.array(message.variance, float).reshape(steps, 2)),
+        frozen(_undelta(message.time_ms).reshape(steps + 1)),
+        _numbers("step", message.step, steps, 6),
+        _numbers("variance", message.variance, steps, 2),
         frozen(np.array(message.frames, np.int64).reshape(steps)),
         _marked(message.unmeasured, steps),
         _marked(message.carried, steps),
     )
 
 
+def _follows(before: SkeletonChain, chain: SkeletonChain) -> bool:
+    return before.session == chain.session and bool(before.index[-1] == chain.index[0])
+
+
+def _joined(pieces: Sequence[SkeletonChain]) -> SkeletonChain:
+    if len(pieces) == 1:
+        return pieces[0]
+
+    def points(name: str) -> Array:
+        return frozen(np.concatenate([getattr(piece, name)[k > 0 :] for k, piece in enumerate(pieces)]))
+
+    def steps(name: str) -> Array:
+        return frozen(np.concatenate([getattr(piece, name) for piece in pieces]))
+
+    return SkeletonChain(
+        pieces[0].session, points("index"), points("time_ms"), steps("step"), steps("variance"), steps("frames"),
+        steps("unmeasured"), steps("carried"),
+    )  # fmt: skip
+
+
+def joined_chains(chains: Iterable[SkeletonChain]) -> tuple[SkeletonChain, ...]:
+    """The chains of consecutive messages, of which one that goes over several is one: there the first point of the later
+    part is the last of the part before."""
+    pieces: list[list[SkeletonChain]] = []
+    for chain in chains:
+        if pieces and _follows(pieces[-1][-1], chain):
+            pieces[-1].append(chain)
+        else:
+            pieces.append([chain])
+    return tuple(_joined(whole) for whole in pieces)
+
+
+@reads_reply
 def read_closures(messages: Iterable[skeleton_pb2.SkeletonClosures]) -> SkeletonClosures:
-    """The closures of messages, joined. ValueError: their arrays do not fit together."""
+    """The closures of messages, joined. DaemonError: CORRUPT: their arrays do not fit together."""
     joined = skeleton_pb2.SkeletonClosures()
     for message in messages:
         joined.MergeFrom(message)
@@ -147,14 +194,18 @@ def read_closures(messages: Iterable[skeleton_pb2.SkeletonClosures]) -> Skeleton
     def whole(values: Iterable[int]) -> Array:
         return frozen(np.fromiter(values, np.int64).reshape(n))
 
+    a = np.stack([whole(joined.session_a), whole(joined.index_a)], axis=1)
+    b = np.stack([whole(joined.session_b), whole(joined.index_b)], axis=1)
+    if (a == b).all(axis=1).any():
+        raise ValueError("a closure of a frame with itself")
     return SkeletonClosures(
-        frozen(np.stack([whole(joined.session_a), whole(joined.index_a)], axis=1)),
-        frozen(np.stack([whole(joined.session_b), whole(joined.index_b)], axis=1)),
+        frozen(a),
+        frozen(b),
         whole(joined.ordinal),
         whole(joined.state),
         frozen(np.array(joined.carries, bool).reshape(n)),
-        frozen(np.array(joined.a_from_b, float).reshape(n, 6)),
-        frozen(np.array(joined.variance, float).reshape(n, 2)),
+        _numbers("transform", joined.a_from_b, n, 6),
+        _numbers("variance", joined.variance, n, 2),
         frozen(np.array(joined.suspicion, float).reshape(n)),
         whole(joined.alike),
     )

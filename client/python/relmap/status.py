@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Mapping, Optional, Sequence
 
+from relmap.errors import reads_reply
 from relmap.reason import Reason
 from relmap.tables import Table
 from relmap.v1 import status_pb2
@@ -190,6 +191,7 @@ def _counts(messages: Sequence[status_pb2.ReasonCount]) -> Mapping[Reason, int]:
     return {Reason(m.reason): m.count for m in messages}
 
 
+@reads_reply
 def read_robot(message: status_pb2.Robot) -> RobotStatus:
     """The robot of a message."""
     return RobotStatus(
@@ -216,6 +218,7 @@ def read_robot(message: status_pb2.Robot) -> RobotStatus:
     )
 
 
+@reads_reply
 def read_status(m: status_pb2.GetStatusReply) -> DaemonStatus:
     """The status of a message."""
     return DaemonStatus(

@@ -1,13 +1,19 @@
-"""A real relmapd for the tests. RELMAP_BIN names the folder of the programs; default: build/release/bin."""
+"""A real relmapd for the tests. RELMAP_BIN names the folder of the programs; default: build/release/bin.
+
+Tests fail without mypy, nbclient, build and wheel (tools/packages.txt), unless RELMAP_TESTS_WITHOUT_TOOLS is set: then those
+that need them are skipped.
+"""
 
 from __future__ import annotations
 
+import importlib
 import os
 import pathlib
 import signal
 import subprocess
 import sys
 import time
+from types import ModuleType
 from typing import Iterator, List, Optional
 
 import pytest
@@ -24,6 +30,13 @@ import points_world  # noqa: E402
 import relmap  # noqa: E402
 
 PATIENCE_S = 600.0  # for what hangs; no test depends on it
+
+
+def needed(module: str) -> ModuleType:
+    """A module without which a test fails, or is skipped where that was asked for."""
+    if os.environ.get("RELMAP_TESTS_WITHOUT_TOOLS"):
+        pytest.importorskip(module)
+    return importlib.import_module(module)
 
 
 class Daemon:

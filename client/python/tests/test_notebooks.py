@@ -6,16 +6,16 @@ import html.parser
 import pathlib
 
 import pytest
-from conftest import PATIENCE_S, PYTHON, Daemon
+from conftest import PATIENCE_S, PYTHON, Daemon, needed
 
 FOLDER = PYTHON / "notebooks"
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in FOLDER.glob("*.ipynb")))
 def test_a_notebook_runs(name: str, own_daemon: Daemon, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("ipykernel")
-    nbclient = pytest.importorskip("nbclient")
-    nbformat = pytest.importorskip("nbformat")
+    needed("ipykernel")
+    nbclient = needed("nbclient")
+    nbformat = needed("nbformat")
     notebook = nbformat.read(FOLDER / name, as_version=4)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert all(not cell.outputs and cell.execution_count is None for cell in code), "clear the outputs"

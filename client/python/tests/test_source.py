@@ -14,7 +14,7 @@ import zipfile
 
 import pytest
 import relmap
-from conftest import PYTHON, SOURCE, program
+from conftest import PYTHON, SOURCE, needed, program
 
 
 def test_stubs_are_those_of_protoc(tmp_path: pathlib.Path) -> None:
@@ -31,7 +31,7 @@ def test_the_blocking_client_is_made_of_the_other() -> None:
 
 
 def test_types_are_strict(tmp_path: pathlib.Path) -> None:
-    pytest.importorskip("mypy")
+    needed("mypy")
     command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml", "--cache-dir", str(tmp_path)]
     for more in ([], ["tests/typed_program.py"]):
         result = subprocess.run(command + more, cwd=PYTHON, capture_output=True, text=True)
@@ -84,8 +84,8 @@ def test_the_version_is_that_of_the_project() -> None:
 
 
 def test_a_wheel_is_built_and_works(tmp_path: pathlib.Path) -> None:
-    pytest.importorskip("build")
-    pytest.importorskip("wheel")
+    needed("build")
+    needed("wheel")
     copy = tmp_path / "source"
     ignored = ["--exclude=__pycache__", "--exclude=build", "--exclude=*.egg-info"]
     copy.mkdir()
@@ -102,3 +102,13 @@ def test_a_wheel_is_built_and_works(tmp_path: pathlib.Path) -> None:
     path = f"import sys; sys.path.insert(0, {str(wheel)!r}); "
     done = subprocess.run([sys.executable, "-I", "-c", path + code], check=True, capture_output=True, text=True)
     assert done.stdout.strip() == relmap.__version__
+
+
+def test_a_tool_that_is_missing_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RELMAP_TESTS_WITHOUT_TOOLS", raising=False)
+    assert needed("json").__name__ == "json"
+    with pytest.raises(ModuleNotFoundError):
+        needed("no_such_tool")
+    monkeypatch.setenv("RELMAP_TESTS_WITHOUT_TOOLS", "1")
+    with pytest.raises(pytest.skip.Exception):
+        needed("no_such_tool")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import queue
 import threading
+import time
 from typing import Any, Callable, Iterator
 
 import grpc
@@ -14,7 +15,7 @@ import relmap.aio
 from conftest import PATIENCE_S, Daemon, ingest
 from fake_daemon import FakeDaemon, refuse
 from relmap import events
-from relmap.v1 import common_pb2, graph_pb2, reason_pb2, watch_pb2
+from relmap.v1 import common_pb2, graph_pb2, reason_pb2, status_pb2, watch_pb2
 
 
 class Watcher:
@@ -154,3 +155,88 @@ def test_a_watcher_gives_up_after_its_patience() -> None:
     with FakeDaemon(WatchMap=gone) as daemon, relmap.connect(daemon.address) as client:
         with pytest.raises(relmap.Unreachable):
             next(client.watch(patience=0.3))
+
+
+def _stopped(request: Any, context: Any) -> Iterator[watch_pb2.MapEvent]:
+    """Says something, then nothing, as a daemon whose network is cut."""
+    yield _event(int(request.resume_token.removeprefix("t") or 0) + 1)
+    while context.is_active():
+        time.sleep(0.02)
+
+
+def test_a_stream_that_falls_silent_is_broken() -> None:
+    with FakeDaemon(WatchMap=_stopped) as daemon, relmap.connect(daemon.address) as client:
+        watch = client.watch(silence=0.3)
+        seen = [next(watch) for _ in range(3)]
+        watch.close()
+        assert [e.origin.resume_token for e in seen] == ["t1", "t2", "t3"]
+        assert [r.resume_token for r in daemon.calls["WatchMap"]] == ["", "t1", "t2"]
+        with pytest.raises(ValueError):
+            next(client.watch(silence=0))
+
+
+def test_patience_ends_with_a_daemon_that_answers_nothing() -> None:
+    stopped = threading.Event()
+
+    def status(request: Any, context: Any) -> status_pb2.GetStatusReply:
+        while stopped.is_set() and context.is_active():
+            time.sleep(0.02)
+        return status_pb2.GetStatusReply()
+
+    with FakeDaemon(WatchMap=_stopped, GetStatus=status) as daemon, relmap.connect(daemon.address) as client:
+        watch = client.watch(silence=0.3, patience=0.5)
+        next(watch)
+        stopped.set()
+        with pytest.raises(relmap.Unreachable, match="nothing was heard for 0.3 s"):
+            next(watch)
+        assert len(daemon.calls["WatchMap"]) == 1 and len(daemon.calls["GetStatus"]) > 1
+        stopped.clear()
+
+
+def test_a_slow_watcher_is_not_a_silent_daemon() -> None:
+    def method(request: Any, context: Any) -> Iterator[watch_pb2.MapEvent]:
+        yield _event(1)
+        yield _event(2)
+        while context.is_active():
+            time.sleep(0.02)
+
+    with FakeDaemon(WatchMap=method) as daemon, relmap.connect(daemon.address) as client:
+        watch = client.watch(silence=5)
+        next(watch)
+        time.sleep(7)
+        assert next(watch).origin.resume_token == "t2" and len(daemon.calls["WatchMap"]) == 1
+        watch.close()
+
+
+def test_silence_is_noticed_by_asyncio_too() -> None:
+    async def run(address: str) -> list[str]:
+        seen = []
+        async with await relmap.aio.connect(address) as client:
+            async for event in client.watch(silence=0.3):
+                seen.append(event.origin.resume_token)
+                if len(seen) == 3:
+                    break
+            await client.close()
+            with pytest.raises(relmap.ClientClosed):
+                await client.watch().__anext__()
+            with pytest.raises(relmap.ClientClosed):
+                await client.status()
+        return seen
+
+    with FakeDaemon(WatchMap=_stopped) as daemon:
+        assert asyncio.run(run(daemon.address)) == ["t1", "t2", "t3"]
+
+
+def test_a_closed_client_says_so() -> None:
+    with FakeDaemon(WatchMap=_stopped) as daemon:
+        client = relmap.connect(daemon.address)
+        watch = client.watch(silence=0.3)
+        assert [next(watch).origin.resume_token for _ in range(2)] == ["t1", "t2"]  # by a connection of its own
+        client.close()
+        with pytest.raises(relmap.ClientClosed):
+            next(watch)
+        for call in (client.status, lambda: next(client.watch()), lambda: client.set_label("1:1", "a"), client.edges):
+            with pytest.raises(relmap.ClientClosed, match="the client is closed"):
+                call()
+        with client.connect_again() as again:
+            assert again.status() is not None
