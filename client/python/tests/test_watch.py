@@ -76,6 +76,8 @@ def test_everything_is_told_through_a_kill(own_daemon: Daemon) -> None:
 
 
 def test_asyncio_watches_too(client: relmap.Client, daemon: Daemon) -> None:
+    client.commit()  # what is not committed is not told
+
     async def run() -> list[events.MapEvent]:
         seen = []
         async with await relmap.aio.connect(daemon.server) as watching:
