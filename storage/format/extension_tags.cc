@@ -237,16 +237,18 @@ bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string&
 void add_submissions(Extensions& extensions, const std::vector<EdgeEvent>& history) {
   ByteWriter times, authors;
   std::uint64_t timed = 0, authored = 0;  // the last event of each list
-  std::int64_t time_before = 0;
+  std::uint64_t time_before = 0;
   const std::string* author_before = nullptr;
   for (std::size_t i = 0; i < history.size(); ++i) {
     const EdgeEvent& event = history[i];
     if (i > 0 && event.journal_sequence == history[i - 1].journal_sequence) continue;
     if (event.time_us != 0) {
       varint::put_unsigned(times, event.journal_sequence - timed);
-      varint::put_signed(times, event.time_us - time_before);
+      // Modulo 2^64, as it is read.
+      const auto time = static_cast<std::uint64_t>(event.time_us);
+      varint::put_signed(times, static_cast<std::int64_t>(time - time_before));
       timed = event.journal_sequence;
-      time_before = event.time_us;
+      time_before = time;
     }
     if (!event.author.empty()) {
       const bool same = author_before && *author_before == event.author;
