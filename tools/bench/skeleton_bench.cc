@@ -122,7 +122,7 @@ void run(const SkeletonBenchOptions& options, Report& report) {
     report.add("digests_s", median(scans), "to read all digests, by storage's own API, median");
   }
   testing::RunningDaemon daemon(
-      {.data = folder, .lcm = "", .memory_budget_mb = options.memory_budget_mb, .more = {"--log-level", "warn"}});
+      {.data = folder, .lcm = "", .memory_budget_mb = options.memory_budget_mb, .more = {"--log-level", "warning"}});
   const auto quiet = Clock::now();
   wait_until_quiet(daemon.process().pid());
   report.add("quiet_s", seconds_since(quiet), "until the daemon had made its index of routes");
