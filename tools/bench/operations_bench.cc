@@ -7,6 +7,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -18,6 +19,7 @@
 #include "tests/support/http_get.h"
 #include "tests/support/running_daemon.h"
 #include "tools/bench/stopwatch.h"
+#include "tools/bench/streaming_robots.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -27,7 +29,6 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using testing::built_program;
 using testing::FaultKind;
 using testing::http_get;
 using testing::RunningDaemon;
@@ -45,21 +46,14 @@ struct OperationsOptions {
 class WatchedDaemon {
  public:
   WatchedDaemon(const std::string& folder, std::uint32_t robots)
-      : folder_(folder), faults_(made(folder + "/disk"), folder + "/notes", testing::Recording::kOff) {
+      : faults_(made(folder + "/disk"), folder + "/notes", testing::Recording::kOff) {
     daemon_ = std::make_unique<RunningDaemon>(testing::DaemonOptions{.data = folder + "/disk/map",
                                                                      .lcm = "",
                                                                      .memory_budget_mb = 1024,
                                                                      .more = {"--http", "0"},
                                                                      .environment = faults_.environment()});
     http_ = daemon_->http();
-    for (std::uint32_t i = 0; i < robots; ++i) {
-      const std::string name = "robot-" + std::to_string(i);
-      robots_.push_back(std::make_unique<testing::Process>(
-          std::vector<std::string>{built_program("relmap-frontend"), drive(i % 4), "--robot", name, "--session", name,
-                                   "--server", folder + "/disk/map", "--spool", "none", "--quiet", "--rate",
-                                   std::to_string(kRobotRate_hz)},
-          testing::ProcessOptions{.standard_output = "", .standard_error = folder + "/" + name + ".log"}));
-    }
+    robots_.emplace(folder, folder + "/disk/map", robots, kRobotRate_hz);
     const auto begin = Clock::now();
     while (sample("relmap_robots") < robots || sample("relmap_frames") < 2 * robots) {
       if (seconds_since(begin) > 120) throw std::runtime_error("the robots do not send: " + daemon_->log());
@@ -81,21 +75,10 @@ class WatchedDaemon {
     fs::create_directories(path);
     return path;
   }
-  std::string drive(std::uint32_t seed) const {
-    const std::string path = folder_ + "/drive-" + std::to_string(seed);
-    if (fs::exists(path)) return path;
-    const testing::Finished done =
-        testing::run_program({built_program("relmap-sim"), "points", "--out", path, "--frames", "2000",
-                              "--frames-per-lap", "300", "--appearance", "100", "--seed", std::to_string(seed + 1)});
-    if (done.exit_code != 0) throw std::runtime_error(done.standard_error);
-    return path;
-  }
-
-  const std::string folder_;
   testing::FileFaults faults_;
   std::unique_ptr<RunningDaemon> daemon_;
   std::string http_;
-  std::vector<std::unique_ptr<testing::Process>> robots_;
+  std::optional<StreamingRobots> robots_;
 };
 
 // Seconds until it holds; throws after a minute.

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -22,9 +23,9 @@
 #include "proto/base/quantile.h"
 #include "relmap/v1/map.grpc.pb.h"
 #include "storage/testing/temporary_folder.h"
-#include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 #include "tools/bench/stopwatch.h"
+#include "tools/bench/streaming_robots.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -33,12 +34,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
-using testing::built_program;
 using testing::RunningDaemon;
 
-constexpr double kSentEach_hz = 2;    // keyframes a second of each robot
-constexpr std::uint32_t kDrives = 4;  // different ones, which robots share
-constexpr double kSettle_s = 2;       // of each phase, not measured
+constexpr double kSentEach_hz = 2;  // keyframes a second of each robot
+constexpr double kSettle_s = 2;     // of each phase, not measured
 
 struct WatchBenchOptions {
   std::uint32_t robots = 20, watchers = 50, stalled = 10;
@@ -57,14 +56,7 @@ class WatchedFleet {
                  .lcm = "",
                  .memory_budget_mb = options.memory_budget_mb,
                  .more = {"--no-closures"}}) {
-    for (std::uint32_t i = 0; i < options.robots; ++i) {
-      const std::string name = "robot-" + std::to_string(i);
-      robots_.push_back(std::make_unique<testing::Process>(
-          std::vector<std::string>{built_program("relmap-frontend"), drive(i % kDrives), "--robot", name, "--session",
-                                   name, "--server", data(), "--spool", "none", "--quiet", "--rate",
-                                   std::to_string(kSentEach_hz)},
-          testing::ProcessOptions{.standard_output = "", .standard_error = folder + "/" + name + ".log"}));
-    }
+    robots_.emplace(folder, data(), options.robots, kSentEach_hz);
     const auto begin = Clock::now();
     const auto client = daemon_.client();
     while (client->status().or_throw().frames < 4 * options.robots) {
@@ -88,19 +80,9 @@ class WatchedFleet {
   }
 
  private:
-  std::string drive(std::uint32_t seed) const {
-    const std::string path = folder_ + "/drive-" + std::to_string(seed);
-    if (fs::exists(path)) return path;
-    const testing::Finished done =
-        testing::run_program({built_program("relmap-sim"), "points", "--out", path, "--frames", "2000",
-                              "--frames-per-lap", "300", "--appearance", "100", "--seed", std::to_string(seed + 1)});
-    if (done.exit_code != 0) throw std::runtime_error(done.standard_error);
-    return path;
-  }
-
   const std::string folder_;
   RunningDaemon daemon_;
-  std::vector<std::unique_ptr<testing::Process>> robots_;
+  std::optional<StreamingRobots> robots_;
 };
 
 // Watchers who read, each in a thread of its own, and others who do not.
