@@ -1,7 +1,6 @@
 #include "server/rpc/audit_reader.h"
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
 #include <string_view>
 #include <tuple>
@@ -11,6 +10,7 @@
 #include "proto/base/hex.h"
 #include "proto/base/json.h"
 #include "proto/base/json_object.h"
+#include "proto/base/read_number.h"
 #include "proto/base/time_text.h"
 #include "relmap/v1/reason.pb.h"
 
@@ -219,10 +219,8 @@ class PageReader {
   Result<std::pair<std::size_t, std::uint64_t>> find(const std::string& token) const {
     constexpr std::size_t kName = 8;
     std::uint64_t end = 0;
-    const char* const digits_end = token.data() + token.size();
     if (token.size() <= kName + 1 || token[kName] != '-') return not_ours(token);
-    const auto [rest, error] = std::from_chars(token.data() + kName + 1, digits_end, end);
-    if (error != std::errc{} || rest != digits_end || end == 0) return not_ours(token);
+    if (!read_number(std::string_view(token).substr(kName + 1), end) || end == 0) return not_ours(token);
     for (std::size_t number = 0; number < files_.size(); ++number) {
       const auto name = name_of(*files_[number]);
       if (!name.ok()) return name.status();

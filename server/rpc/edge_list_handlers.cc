@@ -1,11 +1,12 @@
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "proto/base/read_number.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/evidence.pb.h"
 #include "server/map/closure_list.h"
@@ -20,7 +21,6 @@ namespace relmap::rpc {
 namespace {
 
 constexpr std::uint32_t kEdgesPerPage = 1000, kMaxEdgesPerPage = 5000;
-constexpr std::uint32_t kCellsPerPage = 1000, kMaxCellsPerPage = 10'000;
 constexpr std::size_t kMaxRegionFrames = 100'000;
 
 Result<storage::FrameSet> frames_of_region(const storage::MapView& view, const v1::Region& region,
@@ -101,13 +101,13 @@ Result<std::optional<map::ClosureOrder>> order_of(v1::EdgeOrder order) {
   }
 }
 
-// Where a page in an order begins: "s", the bits of the suspicion, and the id of the closure before; or "t" and the
-// time.
+// Where a page in an order begins: "s" or "t", the bits of the suspicion or of the time, and the id of the closure
+// before.
 std::string position_of(map::ClosureOrder order, const map::ListedClosure& last) {
   const bool by_time = order == map::ClosureOrder::kTime;
-  return (by_time ? "t" + std::to_string(last.time_us)
-                  : "s" + std::to_string(std::bit_cast<std::uint64_t>(last.suspicion))) +
-         "," + last.id.to_string();
+  const std::uint64_t bits =
+      by_time ? static_cast<std::uint64_t>(last.time_us) : std::bit_cast<std::uint64_t>(last.suspicion);
+  return (by_time ? "t" : "s") + std::to_string(bits) + "," + last.id.to_string();
 }
 std::optional<map::ListedClosure> closure_at(map::ClosureOrder order, const std::string& position) {
   const bool by_time = order == map::ClosureOrder::kTime;
@@ -118,11 +118,11 @@ std::optional<map::ListedClosure> closure_at(map::ClosureOrder order, const std:
   if (!id) return std::nullopt;
   last.id = *id;
   std::uint64_t bits = 0;
-  const char* const begin = position.data() + 1;
-  const char* const end = position.data() + comma;
-  const auto [rest, error] = by_time ? std::from_chars(begin, end, last.time_us) : std::from_chars(begin, end, bits);
-  if (error != std::errc{} || rest != end) return std::nullopt;
-  last.suspicion = std::bit_cast<double>(bits);
+  if (!read_number(std::string_view(position).substr(1, comma - 1), bits)) return std::nullopt;
+  if (by_time)
+    last.time_us = static_cast<std::int64_t>(bits);
+  else
+    last.suspicion = std::bit_cast<double>(bits);
   return std::isnan(last.suspicion) ? std::nullopt : std::optional(last);
 }
 
@@ -228,55 +228,6 @@ Result<v1::ListEdgesReply> list_edges(const v1::ListEdgesRequest& request, const
                            : list_by_id(view, *choice, opened->position, work.limit(), proceed, page);
   if (!next.ok()) return next.status();
   if (!next->empty()) reply.set_next_page_token(views.token(opened->kept, *next));
-  return reply;
-}
-
-Result<v1::GetClosureMatrixReply> get_closure_matrix(const v1::GetClosureMatrixRequest& request,
-                                                     const Deadline& deadline, map::Mapper& mapper, ViewKeeper& views) {
-  const auto opened = views.open(request.page_token(), mapper.view());
-  if (!opened.ok()) return opened.status();
-  const storage::MapView& view = *opened->kept;
-  if (request.sessions_size() > kMaxNamedSessions)
-    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxNamedSessions) + " sessions"};
-  std::vector<SessionNumber> sessions(request.sessions().begin(), request.sessions().end());
-  std::sort(sessions.begin(), sessions.end());
-  for (const SessionNumber number : sessions)
-    if (const auto session = storage::existing_session(view, number); !session.ok()) return session.status();
-  std::pair<SessionNumber, SessionNumber> after{0, 0};
-  if (const std::string& position = opened->position; !position.empty()) {
-    const char* const end = position.data() + position.size();
-    const auto first = std::from_chars(position.data(), end, after.first);
-    if (first.ec != std::errc{} || first.ptr == end || *first.ptr != ',') return foreign_token();
-    const auto second = std::from_chars(first.ptr + 1, end, after.second);
-    if (second.ec != std::errc{} || second.ptr != end) return foreign_token();
-  }
-  const std::uint32_t max_cells = page_size(request.page_size(), kCellsPerPage, kMaxCellsPerPage);
-  Charge charge(mapper.budget(), storage::Share::kReplies);
-  constexpr std::size_t kBytesPerCell = 256;  // as it is counted and as it is sent
-  if (Status charged = charge.grow_to(max_cells * kBytesPerCell); !charged.ok()) return charged;
-  const auto cells =
-      map::closure_cells(view, sessions, after, std::size_t{max_cells} + 1, [&] { return deadline.check(); });
-  if (!cells.ok()) return cells.status();
-  v1::GetClosureMatrixReply reply;
-  reply.set_map_version(view.version());
-  for (const map::ClosureCell& cell : *cells) {
-    if (static_cast<std::uint32_t>(reply.cells_size()) == max_cells) {
-      const v1::ClosureMatrixCell& last = reply.cells(reply.cells_size() - 1);
-      reply.set_next_page_token(
-          views.token(opened->kept, std::to_string(last.session_a()) + "," + std::to_string(last.session_b())));
-      break;
-    }
-    v1::ClosureMatrixCell& added = *reply.add_cells();
-    added.set_session_a(cell.session_a);
-    added.set_session_b(cell.session_b);
-    added.set_candidate(cell.candidate);
-    added.set_accepted(cell.accepted);
-    added.set_quarantined(cell.quarantined);
-    added.set_removed(cell.removed);
-    if (!cell.most_suspicious.valid()) continue;
-    *added.mutable_most_suspicious() = to_wire(cell.most_suspicious);
-    added.set_suspicion(cell.suspicion);
-  }
   return reply;
 }
 

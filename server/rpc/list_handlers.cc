@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <charconv>
 
+#include "proto/base/read_number.h"
 #include "proto/wire/convert.h"
 #include "server/map/label_words.h"
 #include "server/rpc/handlers.h"
@@ -21,9 +21,7 @@ Result<v1::ListSessionsReply> list_sessions(const v1::ListSessionsRequest& reque
   const auto opened = views.open(request.page_token(), mapper.view());
   if (!opened.ok()) return opened.status();
   SessionNumber after = 0;
-  const std::string& position = opened->position;
-  if (!position.empty() && std::from_chars(position.data(), position.data() + position.size(), after).ec != std::errc{})
-    return foreign_token();
+  if (!opened->position.empty() && !read_number(opened->position, after)) return foreign_token();
 
   const std::uint32_t max_sessions = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
   v1::ListSessionsReply reply;

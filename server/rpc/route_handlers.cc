@@ -1,10 +1,11 @@
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <vector>
 
+#include "proto/base/read_number.h"
 #include "proto/wire/convert.h"
 #include "server/route/overlay/route_search.h"
 #include "server/rpc/charge.h"
@@ -50,15 +51,12 @@ struct RoutePosition {
   }
   static std::optional<RoutePosition> parse(const std::string& text) {
     RoutePosition position;
-    const char* at = text.data();
-    const char* const end = at + text.size();
-    const auto read = [&](auto& number, bool last) {
-      const auto [rest, error] = std::from_chars(at, end, number);
-      if (error != std::errc{} || (last ? rest != end : rest == end || *rest != ',')) return false;
-      at = rest + 1;
-      return true;
-    };
-    if (!read(position.route, false) || !read(position.step, false) || !read(position.fingerprint, true))
+    const std::string_view numbers = text;
+    const std::size_t first = numbers.find(',');
+    const std::size_t second = first == std::string_view::npos ? first : numbers.find(',', first + 1);
+    if (second == std::string_view::npos || !read_number(numbers.substr(0, first), position.route) ||
+        !read_number(numbers.substr(first + 1, second - first - 1), position.step) ||
+        !read_number(numbers.substr(second + 1), position.fingerprint))
       return std::nullopt;
     return position;
   }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <list>
@@ -11,6 +10,7 @@
 #include <string_view>
 
 #include "proto/base/mutex.h"
+#include "proto/base/read_number.h"
 #include "proto/base/status.h"
 #include "storage/map/map.h"
 
@@ -54,9 +54,7 @@ class TokenKeeper {
     const std::size_t second = first == std::string::npos ? first : token.find('-', first + 1);
     if (second == std::string::npos) return not_ours;
     std::uint64_t number = 0;
-    const char* const digits_end = token.data() + second;
-    const auto [end, error] = std::from_chars(token.data() + first + 1, digits_end, number);
-    if (error != std::errc{} || end != digits_end) return not_ours;
+    if (!read_number(std::string_view(token).substr(first + 1, second - first - 1), number)) return not_ours;
 
     const MutexLock lock(mutex_);
     expire_locked();

@@ -1,12 +1,12 @@
 #include "server/rpc/watch_token.h"
 
 #include <array>
-#include <charconv>
 #include <cstdint>
 
 #include "proto/base/bytes.h"
 #include "proto/base/crc32c.h"
 #include "proto/base/hex.h"
+#include "proto/base/read_number.h"
 
 namespace relmap::rpc {
 
@@ -18,12 +18,6 @@ constexpr std::size_t kParts = 7;
 
 std::string check_of(std::string_view text) {
   return hex(crc32c(ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
-}
-
-template <typename Number>
-bool read_number(std::string_view text, Number& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc{} && end == text.data() + text.size();
 }
 
 }  // namespace
