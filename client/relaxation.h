@@ -31,6 +31,10 @@ struct RelaxationOptions {
   int max_iterations = 50;
   double relative_tolerance = 1e-7;  // stops when the cost falls by a smaller share
   double loop_huber = 4;             // Huber's width for loop edges, in sigmas; 0: quadratic
+  // The steps of a component with more frames, or with so many loops that a step would take seconds, are solved for
+  // iteratively, from a start in which its cycles are closed already (client/linear_start.h), in time proportional to
+  // its size. Then it converges slowly to the last digits, which no picture shows.
+  int max_direct = 20'000;
 };
 
 struct RelaxedPose {
@@ -43,9 +47,9 @@ struct Relaxation {
   std::vector<RelaxedPose> poses;  // in the order of the frames given
   int components = 0;
   // The cost is the sum over edges of rho(r' S^-1 r), r = Log(T_ab^-1 T_a^-1 T_b).
-  double initial_cost = 0;  // at the breadth-first start
+  double initial_cost = 0;  // at the start
   double final_cost = 0;    // after relaxation
-  int iterations = 0;       // maximum over the components
+  int iterations = 0;       // maximum over the components, with all their frames
   bool converged = true;    // false: max_iterations were not enough
 };
 
@@ -53,7 +57,7 @@ struct Relaxation {
 // or to itself. NOT_FINITE, BAD_ROTATION, BAD_COVARIANCE: for an edge.
 Status check_graph(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges);
 
-// Relaxes each connected component by Levenberg-Marquardt on SE(3) from a breadth-first start.
+// Relaxes each connected component by Levenberg-Marquardt on SE(3).
 // The reasons of check_graph(); NUMERICAL: the damped system is singular.
 Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges,
                          const RelaxationOptions& options = {});

@@ -4,8 +4,6 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "client/contraction.h"
-
 namespace relmap::client {
 namespace {
 
@@ -94,13 +92,12 @@ Result<RelaxedSkeleton> relax_skeleton(const Skeleton& skeleton, const SkeletonL
   if (graph.points.empty()) return {Reason::EMPTY_MAP, "the skeleton has no points"};
   if (layout.root && !graph.find(*layout.root))
     return {Reason::NO_SUCH_FRAME, "frame " + layout.root->to_string() + " is no point of the skeleton"};
-  const auto relaxed = relax_contracted(graph.points, graph.edges, layout.max_relaxed, layout.relaxation);
+  const auto relaxed = relax(graph.points, graph.edges, layout.relaxation);
   if (!relaxed.ok()) return relaxed.status();
   RelaxedSkeleton out;
-  out.relaxed = relaxed->kept;
-  out.converged = relaxed->relaxation.converged;
-  out.parts.resize(static_cast<std::size_t>(relaxed->relaxation.components));
-  for (const RelaxedPose& pose : relaxed->relaxation.poses) {
+  out.converged = relaxed->converged;
+  out.parts.resize(static_cast<std::size_t>(relaxed->components));
+  for (const RelaxedPose& pose : relaxed->poses) {
     RelaxedSkeleton::Part& part = out.parts[static_cast<std::size_t>(pose.component)];
     if (!part.root.valid() || pose.frame == layout.root) part.root = pose.frame;
     part.places.push_back({pose.frame, pose.T_component_frame});

@@ -29,16 +29,13 @@ struct RelaxedSkeleton {
   };
 
   std::vector<Part> parts;  // the one with the chosen root first, then the largest first
-  std::size_t relaxed = 0;  // points that were relaxed; the others follow from these along the motion
   bool converged = true;
 };
 
 struct SkeletonLayout {
   std::optional<FrameId> root = {};
-  // Of more points only about so many are relaxed, and the others follow from these (client/contraction.h).
-  std::size_t max_relaxed = 20'000;
   // A picture shows no more than this.
-  RelaxationOptions relaxation = {.max_iterations = 20, .relative_tolerance = 1e-4, .loop_huber = 4};
+  RelaxationOptions relaxation = {.max_iterations = 20, .relative_tolerance = 1e-3, .loop_huber = 4};
 };
 
 // NO_SUCH_FRAME: the root is no point of the skeleton. EMPTY_MAP: it has no points. The reasons of relax().

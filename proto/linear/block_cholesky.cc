@@ -89,6 +89,8 @@ BlockCholesky::BlockCholesky(int blocks, const std::vector<std::pair<int, int>>&
 
 BlockCholesky::~BlockCholesky() = default;
 
+double BlockCholesky::work() const { return state_->common.fl; }
+
 void BlockCholesky::set_zero() {
   std::fill_n(state_->values(state_->matrix), static_cast<const int*>(state_->matrix->p)[state_->matrix->ncol], 0.0);
 }

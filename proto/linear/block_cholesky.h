@@ -20,6 +20,9 @@ class BlockCholesky {
   BlockCholesky(const BlockCholesky&) = delete;
   BlockCholesky& operator=(const BlockCholesky&) = delete;
 
+  // Floating-point operations of a factorisation.
+  double work() const;
+
   void set_zero();
   // Adds `block` at (i, j) and, for i != j, its transpose at (j, i). Only the upper triangle of a block on the diagonal
   // is used.

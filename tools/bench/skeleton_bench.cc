@@ -33,7 +33,6 @@ struct SkeletonBenchOptions {
   testing::SkeletonCity city;
   std::string folder;
   std::uint32_t level = 1, rounds = 5;
-  std::size_t max_relaxed = client::SkeletonLayout().max_relaxed;
   std::size_t memory_budget_mb = 512;
 };
 
@@ -163,9 +162,8 @@ void run(const SkeletonBenchOptions& options, Report& report) {
   report.add("points", static_cast<double>(skeleton.points()), "");
   report.add("told_closures", static_cast<double>(skeleton.closures.size()), "");
   begin = Clock::now();
-  const auto relaxed = client::relax_skeleton(skeleton, {.max_relaxed = options.max_relaxed}).or_throw();
+  const auto relaxed = client::relax_skeleton(skeleton).or_throw();
   report.add("relax_s", seconds_since(begin), "to lay it out in one frame");
-  report.add("relaxed_points", static_cast<double>(relaxed.relaxed), "the others follow from these");
   report.add("parts", static_cast<double>(relaxed.parts.size()), "that nothing connects");
 
   // How far the points are from the truth, where their part's root is taken for true.
@@ -194,7 +192,6 @@ Run declare_skeleton(CLI::App& app) {
   app.add_option("--folder", options->folder, "Data folder that keeps the map; default: a temporary one")
       ->type_name("DIR");
   app.add_option("--level", options->level, "Level of the skeleton")->check(CLI::Range(0, 3))->capture_default_str();
-  app.add_option("--relaxed", options->max_relaxed, "Points that are relaxed at most")->capture_default_str();
   app.add_option("--rounds", options->rounds, "Calls")->check(CLI::Range(1, 1000))->capture_default_str();
   app.add_option("--memory-budget-mb", options->memory_budget_mb, "Of the daemon")->capture_default_str();
   return [options](Report& report) { run(*options, report); };

@@ -1,6 +1,5 @@
 // relmap export: writes the relaxed graph, or the chain of each session's odometry edges, as files for other programs.
 #include <algorithm>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <ostream>
@@ -24,7 +23,6 @@ struct ExportOptions {
   std::string format = "tum", out, root;
   std::vector<std::string> sessions;
   bool chain = false, landmarks = true;
-  std::size_t max_frames = kMaxRelaxedFrames;
   Geodetic place;
   bool placed = false;
 };
@@ -56,10 +54,7 @@ class Report {
     tell(part.tears, "tear ");
     tell(part.doubtful, "");
   }
-  void tell_relaxed(const RelaxedMap& map) {
-    relaxed_frames_ = map.relaxed_frames;
-    if (const std::string text = contraction_text(map); !text.empty()) advise(text);
-  }
+  void tell_relaxed(const RelaxedMap& map) { relaxed_frames_ = map.graph.frames.size(); }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
     if (json_)
       left_out_.push_back(Json().add("root", root).add("frames", frames));
@@ -193,7 +188,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
   if (graph->frames.empty()) return nothing_to_place(*graph, "export", "exported");
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
-  const auto map = relax_map(std::move(graph).value(), *labels, root, options.max_frames);
+  const auto map = relax_map(std::move(graph).value(), *labels, root);
   if (!map.ok()) return map.status();
 
   const std::size_t written = files.takes_one() ? 1 : map->parts.size();
@@ -358,11 +353,6 @@ void add_export(CLI::App& app, Action& action) {
                         "from its first frame; the chain does not close loops");
   chain->excludes(root);
   command->add_flag("!--no-landmarks", options->landmarks, "ply: write frames and edges only");
-  command
-      ->add_option("--max-frames", options->max_frames,
-                   "relax about so many frames at most; those of a larger map follow from these along the odometry")
-      ->check(CLI::Range(std::size_t{1}, std::numeric_limits<std::size_t>::max()))
-      ->capture_default_str();
   auto* latitude = command->add_option("--latitude", options->place.latitude, "geojson: latitude of the root, degrees")
                        ->check(CLI::Range(-85.0, 85.0));
   auto* longitude =

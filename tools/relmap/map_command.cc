@@ -89,7 +89,6 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
   console.err() << options.out << ": " << picture.subtitle;
   if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
   console.err() << '\n';
-  if (const std::string text = contraction_text(*map); !text.empty()) console.err() << text << '\n';
   if (const std::size_t mono = map->graph.mono_sessions; mono > 0)
     console.err() << not_placed_text(mono, "drawn") << '\n';
   if (options.tears) tell_tears(*map, console);

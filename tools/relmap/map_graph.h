@@ -24,9 +24,6 @@ struct MapGraph {
 
 inline bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }
 
-// To relax more takes minutes and gigabytes. Of a larger map about so many frames are relaxed (relaxed_map.h).
-inline constexpr std::size_t kMaxRelaxedFrames = 100000;
-
 // "3 mono sessions (photographs) have no scale of their own and are not drawn"; `done` is "drawn".
 std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
 // The refusal of a graph without frames (EMPTY_MAP): "there is nothing to draw", and how many mono sessions there are.

@@ -137,12 +137,6 @@ std::string DoubtfulStep::words() const {
   return text;
 }
 
-std::string contraction_text(const RelaxedMap& map) {
-  if (map.relaxed_frames == map.graph.frames.size()) return {};
-  return count_text(map.relaxed_frames) + " of " + count_text(map.graph.frames.size()) +
-         " frames were relaxed; the others follow from these along the odometry";
-}
-
 const SE3* MapPart::find(FrameId frame) const {
   const auto found = std::lower_bound(frames.begin(), frames.end(), frame,
                                       [](const PlacedFrame& placed, FrameId id) { return placed.frame < id; });
@@ -157,7 +151,7 @@ std::vector<SessionNumber> MapPart::sessions() const {
 }
 
 Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledFrames>& labels,
-                             std::optional<FrameId> root, std::size_t max_frames) {
+                             std::optional<FrameId> root) {
   if (graph.frames.empty()) return {Reason::EMPTY_MAP, "the graph has no frames"};
   if (root && !graph.frames.contains(*root))
     return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the chosen sessions"};
@@ -174,20 +168,19 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     edges.push_back(spring.relaxed);
     spring_of.push_back(&spring);
   }
-  const auto relaxed = client::relax_contracted({map.graph.frames.begin(), map.graph.frames.end()}, edges, max_frames);
+  const auto relaxed = client::relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
   if (!relaxed.ok()) return relaxed.status();
-  map.relaxed_frames = relaxed->kept;
-  map.parts = parts_of(relaxed->relaxation, root);
+  map.parts = parts_of(*relaxed, root);
 
   std::unordered_map<FrameId, MapPart*> part_of;
   for (MapPart& part : map.parts)
     for (const PlacedFrame& placed : part.frames) part_of[placed.frame] = &part;
   for (std::size_t i = 0; i < map.springs.size(); ++i) part_of.at(map.springs[i].relaxed.a)->edges.push_back(i);
-  for (std::size_t e = 0; e < relaxed->edges.size(); ++e) {
-    const RelaxedMap::Spring& spring = *spring_of[relaxed->stands_for[e]];
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const RelaxedMap::Spring& spring = *spring_of[e];
     if (spring.doubtful) continue;
     MapPart& part = *part_of.at(spring.relaxed.a);
-    const Tear strain = strain_of(relaxed->edges[e], spring, part);
+    const Tear strain = strain_of(edges[e], spring, part);
     if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
     if (spring.kind == client::EdgeKind::kLoop && strain.sigmas > 1) map.strained.push_back(strain);
   }

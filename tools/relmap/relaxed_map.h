@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "client/contraction.h"
+#include "client/relaxation.h"
 #include "tools/relmap/map_graph.h"
 
 namespace relmap::cli {
@@ -88,8 +88,7 @@ struct RelaxedMap {
     client::RelaxationEdge relaxed;
   };
   std::vector<Spring> springs;
-  std::size_t relaxed_frames = 0;  // fewer than the graph has, if it was too large: see client/contraction.h
-  std::vector<MapPart> parts;      // the one with the chosen root first, then the others, largest first
+  std::vector<MapPart> parts;  // the one with the chosen root first, then the others, largest first
   // The loop closures that the relaxed poses contradict most, by more than one standard deviation, whether or not they
   // are tears; the worst first, at most kMaxStrained.
   std::vector<Tear> strained;
@@ -97,13 +96,9 @@ struct RelaxedMap {
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
 };
 
-// "100,000 of 300,000 frames were relaxed; the others follow from these along the odometry"; empty if all were.
-std::string contraction_text(const RelaxedMap& map);
-
-// Relaxes the graph, or, if it has more frames than `max_frames`, relaxes about so many of them. `root` becomes the
-// root of its part; every other part has its first frame as root. NO_SUCH_FRAME if the graph does not have `root`;
-// EMPTY_MAP if it has no frames; and the reasons of client::relax().
+// Relaxes the graph. `root` becomes the root of its part; every other part has its first frame as root. NO_SUCH_FRAME
+// if the graph does not have `root`; EMPTY_MAP if it has no frames; and the reasons of client::relax().
 Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledFrames>& labels,
-                             std::optional<FrameId> root = {}, std::size_t max_frames = kMaxRelaxedFrames);
+                             std::optional<FrameId> root = {});
 
 }  // namespace relmap::cli
