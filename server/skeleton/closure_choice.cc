@@ -11,14 +11,14 @@ namespace relmap::skeleton {
 
 using storage::ClosureDigest;
 
-std::vector<ChosenClosure> choose_closures(const std::vector<const ClosureDigest*>& closures, std::uint32_t stride,
+std::vector<ChosenClosure> choose_closures(const std::vector<const ClosureDigest*>& closures, std::uint32_t stretch,
                                            const Suspicion& suspicion) {
   std::vector<ChosenClosure> chosen;
   if (closures.empty()) return chosen;
   const auto add = [&](const ClosureDigest& closure) {
     chosen.push_back({&closure, static_cast<float>(suspicion ? suspicion(closure) : 0), 1});
   };
-  if (stride == 1) {
+  if (stretch == 1) {
     for (const ClosureDigest* closure : closures) add(*closure);
     return chosen;
   }
@@ -32,17 +32,20 @@ std::vector<ChosenClosure> choose_closures(const std::vector<const ClosureDigest
   std::swap(all, chosen);
   std::vector<bool> told(closures.size(), false);
   for (const ClosureDigest* closure : closures) {
-    groups[{closure->a.session, closure->a.index / stride, closure->id.frame.index / stride, closure->state,
+    groups[{closure->a.session, closure->a.index / stretch, closure->id.frame.index / stretch, closure->state,
             closure->carries, closure->carried}]
         .push_back(all.size());
     all.push_back({closure, static_cast<float>(suspicion ? suspicion(*closure) : 0), 1});
-    told[all.size() - 1] = all.back().suspicion >= kSuspicious;
   }
   for (const auto& [key, members] : groups) {
     const std::size_t best = *std::min_element(members.begin(), members.end(), [&](std::size_t l, std::size_t r) {
       return uncertainty(*all[l].closure) < uncertainty(*all[r].closure);
     });
+    const std::size_t worst = *std::max_element(members.begin(), members.end(), [&](std::size_t l, std::size_t r) {
+      return all[l].suspicion < all[r].suspicion;
+    });
     told[best] = true;
+    if (all[worst].suspicion >= kSuspicious) told[worst] = true;
     for (const std::size_t member : members) all[best].alike += member != best && !told[member];
   }
   for (std::size_t i = 0; i < all.size(); ++i)

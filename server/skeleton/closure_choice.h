@@ -18,10 +18,12 @@ struct ChosenClosure {
   std::uint32_t alike = 1;  // closures that it stands for, itself included
 };
 
-// Of the closures of one chunk: all if `stride` is 1. Otherwise two are alike that join the same stretches of `stride`
-// frames (aligned to multiples of it) and have the same state, and of those that are alike the most certain one is
-// told, and every one that is suspicious (proto/base/suspicion.h). In the order given, which must be that of their ids.
+// Of the closures of one chunk: all if `stretch` is 1. Otherwise two are alike that join the same stretches of
+// `stretch` frames (aligned to multiples of it) and have the same state. Of those that are alike the most certain one
+// is told, and the most suspicious one if it is suspicious (proto/base/suspicion.h): so wherever something is doubtful
+// there is a doubtful closure to be seen, and yet a skeleton is small even of a map of which all is doubtful. In the
+// order given, which must be that of their ids.
 std::vector<ChosenClosure> choose_closures(const std::vector<const storage::ClosureDigest*>& closures,
-                                           std::uint32_t stride, const Suspicion& suspicion);
+                                           std::uint32_t stretch, const Suspicion& suspicion);
 
 }  // namespace relmap::skeleton

@@ -1,8 +1,8 @@
 #include "server/skeleton/skeleton.h"
 
 #include <algorithm>
-#include <charconv>
 
+#include "proto/base/read_number.h"
 #include "server/skeleton/level.h"
 
 namespace relmap::skeleton {
@@ -32,9 +32,7 @@ std::optional<Position> Position::parse(const std::string& text) {
   if (colon == std::string::npos) return std::nullopt;
   const auto frame = FrameId::parse(text.substr(0, colon));
   Position position;
-  const char* const end = text.data() + text.size();
-  const auto [at, error] = std::from_chars(text.data() + colon + 1, end, position.frames_done);
-  if (!frame || error != std::errc{} || at != end) return std::nullopt;
+  if (!frame || !read_number(std::string_view(text).substr(colon + 1), position.frames_done)) return std::nullopt;
   position.last = *frame;
   return position;
 }
@@ -89,7 +87,7 @@ std::vector<ChosenClosure> SkeletonReader::chosen_of(const ChunkDigest& chunk) c
       if (closure.kind == storage::EdgeKind::kLoop && (in_force(closure) || options_.candidates) &&
           is_chosen(closure.a.session) && closure.a != closure.id.frame)
         closures.push_back(&closure);
-  return choose_closures(closures, stride(options_.level), suspicion_);
+  return choose_closures(closures, closure_stretch(options_.level), suspicion_);
 }
 
 // Visits the chunks of the chosen sessions from `from` on.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <unordered_map>
 
@@ -18,7 +19,8 @@ constexpr double kCorner = 4;                            // metres over which a 
 constexpr double kStepSigma = 0.005, kTurnSigma = 2e-4;  // of a step: m, rad
 constexpr double kLoopSigma = 0.02, kLoopTurnSigma = 1e-3;
 constexpr std::uint32_t kLandmarks = 8, kObservers = 4, kFramesPerCommit = 4000;
-constexpr double kCandidates = 0.03;  // share of the closures that are not in force
+constexpr double kCandidates = 0.03;        // share of the closures that are not in force
+constexpr std::uint32_t kAgreeWithin = 40;  // frames: consecutive closures to one session agree
 constexpr std::int64_t kBegin_us = 1'700'000'000'000'000;
 
 // Corners that a robot passes, a block apart.
@@ -82,6 +84,7 @@ class Builder {
     std::uniform_real_distribution<double> share(0, 1);
     const auto known = map_.session(number);
     if (!known) begin(number);
+    std::optional<storage::Edge> last_closure;
     for (std::uint32_t i = 0; i < way.size(); ++i) {
       const FrameId id{number, i};
       const auto [before, fresh] = last_.try_emplace(place_of(way[i]), Seen{id, way[i]});
@@ -90,7 +93,9 @@ class Builder {
       if (!fresh && before->second.frame.session != number && share(random) < city_.closures)
         hot.edges.push_back(closure(id, before->second, way[i], share(random) < kCandidates, random));
       before->second = {id, way[i]};
-      if (!known || i >= known->next_sequence) add(id, std::move(hot));
+      if (known && i < known->next_sequence) continue;
+      if (hot.edges.size() > 1 || (i == 0 && !hot.edges.empty())) agree_with_last(hot.edges.back(), last_closure);
+      add(id, std::move(hot));
     }
     if (!known || known->next_sequence < way.size()) commit_if(true);
   }
@@ -101,6 +106,16 @@ class Builder {
     SE3 pose;
   };
 
+  // Closures that follow one another along two ways agree.
+  void agree_with_last(storage::Edge& edge, std::optional<storage::Edge>& last) {
+    if (last && last->a.session == edge.a.session && edge.b.index - last->b.index <= kAgreeWithin) {
+      edge.consistent_with.push_back(last->id);
+      if (map_.hot(last->b))
+        for (storage::Edge& before : map_.edit_hot(last->b).edges)
+          if (before.id == last->id) before.consistent_with.push_back(edge.id);
+    }
+    last = edge;
+  }
   void begin(SessionNumber number) {
     storage::Session session;
     session.number = number;
