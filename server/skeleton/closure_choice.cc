@@ -5,6 +5,8 @@
 #include <map>
 #include <tuple>
 
+#include "proto/base/suspicion.h"
+
 namespace relmap::skeleton {
 
 using storage::ClosureDigest;

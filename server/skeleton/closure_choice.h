@@ -12,9 +12,6 @@ namespace relmap::skeleton {
 // 0 (nothing speaks against it) to 1.
 using Suspicion = std::function<double(const storage::ClosureDigest& closure)>;
 
-// A closure that is at least so suspicious is always told.
-inline constexpr double kSuspicious = 0.5;
-
 struct ChosenClosure {
   const storage::ClosureDigest* closure = nullptr;
   float suspicion = 0;
@@ -23,7 +20,7 @@ struct ChosenClosure {
 
 // Of the closures of one chunk: all if `stride` is 1. Otherwise two are alike that join the same stretches of `stride`
 // frames (aligned to multiples of it) and have the same state, and of those that are alike the most certain one is
-// told, and every suspicious one. In the order given, which must be that of their ids.
+// told, and every one that is suspicious (proto/base/suspicion.h). In the order given, which must be that of their ids.
 std::vector<ChosenClosure> choose_closures(const std::vector<const storage::ClosureDigest*>& closures,
                                            std::uint32_t stride, const Suspicion& suspicion);
 

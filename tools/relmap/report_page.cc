@@ -7,6 +7,7 @@
 #include "proto/base/markup.h"
 #include "proto/base/printf_text.h"
 #include "proto/base/quantile.h"
+#include "proto/base/suspicion.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/terminal/console.h"
 
@@ -14,7 +15,6 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr double kSuspicious = 0.5;          // from here on a closure is named among the findings
 constexpr std::size_t kMatrixSessions = 24;  // with most closures; a larger table cannot be read
 constexpr std::size_t kMaxSessionRows = 200, kMaxDays = 60;
 
