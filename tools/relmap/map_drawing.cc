@@ -28,9 +28,12 @@ void count_keyframes(const MapShape& shape, MapPicture& picture) {
       {State::kCandidate, MapPicture::EdgeKind::kLoopCandidate},
       {State::kQuarantined, MapPicture::EdgeKind::kLoopQuarantined},
       {State::kRemoved, MapPicture::EdgeKind::kLoopRemoved}};
-  for (const Skeleton::Closure& closure : shape.skeleton.closures)
+  for (const Skeleton::Closure& closure : shape.skeleton.closures) {
+    const auto a = shape.at.find(closure.a), b = shape.at.find(closure.id.frame);
+    if (a == shape.at.end() || b == shape.at.end() || a->second.part != b->second.part) continue;  // not drawn
     for (const auto& [state, kind] : kKinds)
       if (closure.state == state) picture.alike[kind] += closure.alike - 1;
+  }
 }
 
 // Between the chains of a session lies motion of which nothing is known, so that the skeleton does not have it.
