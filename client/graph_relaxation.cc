@@ -19,6 +19,8 @@ constexpr double kMaxDirectWork = 1e9;
 // A step is solved for to this share of the residual: a better one gains nothing while the graph is not linear.
 constexpr double kForcing = 0.1;
 constexpr int kMaxInnerIterations = 100;
+// Solved for so, the cost falls slowly at last, by what bends the whole a little: more precision is not worth the time.
+constexpr double kIterativeTolerance = 1e-5;
 
 using Link = PoseGraph::Link;
 
@@ -196,7 +198,9 @@ Result<RelaxedGraph> relax_graph(const PoseGraph& graph, const RelaxationOptions
     if (BlockCholesky system(graph.frames - 1, pairs); system.work() <= kMaxDirectWork)
       return Relaxer(graph, options, start).relax(system);
   BlockConjugateGradient system(graph.frames - 1, pairs);
-  return Relaxer(graph, options, start_linearly(graph, start, options.loop_huber)).relax(system);
+  RelaxationOptions large = options;
+  large.relative_tolerance = std::max(options.relative_tolerance, kIterativeTolerance);
+  return Relaxer(graph, large, start_linearly(graph, start, options.loop_huber)).relax(system);
 }
 
 }  // namespace relmap::client

@@ -1,8 +1,16 @@
 #include "client/label_placement.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace relmap::client {
+
+std::pair<std::int32_t, std::int32_t> LabelPlacement::square_of(const Vector2& point) {
+  const auto square = [](double at) {
+    return static_cast<std::int32_t>(std::floor(std::clamp(at, -1e6, 1e6) / kCell));
+  };
+  return {square(point.x()), square(point.y())};
+}
 
 Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
   Box best{anchor, anchor + size};
@@ -35,8 +43,13 @@ double LabelPlacement::price(const Box& box, const Vector2& anchor) const {
   double sum = ((box.low + box.high) / 2 - anchor).norm();
   if (box.contains(anchor)) sum += 1500;
   const Box wide{box.low - Vector2(5, 4), box.high + Vector2(5, 4)};
-  for (const Vector2& p : points_)
-    if (wide.contains(p)) sum += 40;
+  const auto [left, top] = square_of(wide.low);
+  const auto [right, bottom] = square_of(wide.high);
+  for (std::int32_t x = left; x <= right; ++x)
+    for (std::int32_t y = top; y <= bottom; ++y)
+      if (const auto found = points_.find(cell(x, y)); found != points_.end())
+        for (const Vector2& p : found->second)
+          if (wide.contains(p)) sum += 40;
   for (const Box& other : boxes_)
     if (wide.overlaps(other)) sum += 1500;
   return sum;

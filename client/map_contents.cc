@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <set>
 
 #include "client/colour_scale.h"
 #include "client/map_colours.h"
@@ -10,11 +11,15 @@
 namespace relmap::client {
 
 MapContents::MapContents(const MapPicture& picture) : picture_(picture) {
-  for (std::size_t part = 0; part < picture.parts.size(); ++part)
+  for (std::size_t part = 0; part < picture.parts.size(); ++part) {
+    std::set<SessionNumber> in_part;
     for (const MapPicture::Frame& frame : picture.parts[part].frames) {
       places_[frame.id] = {part, &frame.T_root_frame, frame.value};
       sessions_[frame.id.session].push_back(frame.id);
+      in_part.insert(frame.id.session);
     }
+    sessions_in_part_.push_back(in_part.size());
+  }
   for (auto& [session, frames] : sessions_) std::sort(frames.begin(), frames.end());
   for (const MapPicture::Edge& edge : picture.edges) {
     const Place* const a = find(edge.a);
@@ -32,6 +37,11 @@ MapContents::MapContents(const MapPicture& picture) : picture_(picture) {
 const MapContents::Place* MapContents::find(FrameId frame) const {
   const auto found = places_.find(frame);
   return found == places_.end() ? nullptr : &found->second;
+}
+
+std::size_t MapContents::keyframes(SessionNumber session) const {
+  const auto told = picture_.session_keyframes.find(session);
+  return told == picture_.session_keyframes.end() ? sessions_.at(session).size() : told->second;
 }
 
 std::string MapContents::name(SessionNumber session) const {

@@ -28,6 +28,11 @@ class MapContents {
 
   // The frames of each session, ascending, over all parts.
   const std::map<SessionNumber, std::vector<FrameId>>& sessions() const { return sessions_; }
+  // Whether the sessions of a part are labelled, and their ends marked. The marks of hundreds would hide what they
+  // drove.
+  bool marks_sessions(std::size_t part) const { return sessions_in_part_[part] <= kMarkedSessions; }
+  // How many keyframes of the session the picture shows, or stands for.
+  std::size_t keyframes(SessionNumber session) const;
   // The name of a session, with its number if there are more sessions than colours.
   std::string name(SessionNumber session) const;
   // Grey, if frames are coloured by their values.
@@ -43,9 +48,12 @@ class MapContents {
   std::size_t count_between_parts(MapPicture::EdgeKind kind) const;
 
  private:
+  static constexpr std::size_t kMarkedSessions = 40;
+
   const MapPicture& picture_;
   std::unordered_map<FrameId, Place> places_;
   std::map<SessionNumber, std::vector<FrameId>> sessions_;
+  std::vector<std::size_t> sessions_in_part_;
   std::unordered_map<FrameId, const MapPicture::Edge*> steps_;
   std::map<MapPicture::EdgeKind, std::size_t> within_, between_;
 };

@@ -109,14 +109,17 @@ void MapLegend::add_sessions() {
                  motion_stroke(MapPicture::EdgeKind::kMotion, mix(first, full, k / 9.0)));
     };
     if (sessions.size() >= kTerseFrom)
-      add(contents_.name(session) + " (" + count_text(frames.size()) + ")", "", line);
+      add(contents_.name(session) + " (" + count_text(contents_.keyframes(session)) + ")", "", line);
     else
       add(contents_.name(session),
-          counted_text(frames.size(), "keyframe") +
+          counted_text(contents_.keyframes(session), "keyframe") +
               (single && !scaled && frames.size() > 1 ? ", light to dark in time" : ""),
           line);
   }
-  if (sessions.empty()) return;
+  bool marked = false;
+  for (std::size_t part = 0; part < contents_.picture().parts.size(); ++part)
+    marked = marked || contents_.marks_sessions(part);
+  if (!marked) return;
   const Colour first = contents_.colour(sessions.begin()->first);
   add("start and end", "", [first](Drawing& out, const Vector2& a, const Vector2& b) {
     draw_start(out, a + Vector2(5, 0), first);
@@ -146,9 +149,16 @@ void MapLegend::add_motion() {
 void MapLegend::add_closures() {
   const std::vector<ClosureStyle>& styles = closure_styles();
   for (auto style = styles.rbegin(); style != styles.rend(); ++style) {
-    if (const std::size_t count = contents_.count(style->kind); count > 0)
-      add(counted_text(count, style->name), style->meaning,
+    if (const std::size_t count = contents_.count(style->kind); count > 0) {
+      const auto behind = contents_.picture().alike.find(style->kind);
+      const std::size_t alike = behind == contents_.picture().alike.end() ? 0 : behind->second;
+      std::string meaning = style->meaning;
+      if (alike > 0)
+        meaning +=
+            (meaning.empty() ? "" : "; ") + count_text(count) + " drawn: of those that join the same stretches one";
+      add(counted_text(count + alike, style->name), meaning,
           [s = *style](Drawing& out, const Vector2& a, const Vector2& b) { draw_closure(out, s, a, b); });
+    }
     if (const std::size_t count = contents_.count_between_parts(style->kind); count > 0)
       add(counted_text(count, style->name) + " from part to part", "not drawn; " + std::string(style->meaning),
           no_sample);

@@ -165,7 +165,8 @@ class MapPanel::Pen {
     if (picture_.route) route();
     for (const auto& [session, frames] : frames_) trajectory(frames);
     closures();
-    for (const auto& [session, frames] : frames_) ends(session, frames);
+    if (marks_sessions())
+      for (const auto& [session, frames] : frames_) ends(session, frames);
     tears();
     texts();
     Vector2 at;
@@ -279,6 +280,7 @@ class MapPanel::Pen {
       out_.polyline(thinned(std::span(points).subspan(k, end - k + 1)),
                     motion_stroke(MapPicture::EdgeKind::kMotion, contents_.shade(run[k])));
     }
+    if (!marks_sessions()) return;  // so many arrows would hide the ways
     double travelled = 60;
     for (std::size_t k = 1; k < run.size(); ++k) {
       const Vector2 step = points[k] - points[k - 1];
@@ -316,6 +318,7 @@ class MapPanel::Pen {
       if (find(tear.a, a) && find(tear.b, b)) draw_tear(out_, a, b);
   }
 
+  bool marks_sessions() const { return contents_.marks_sessions(panel_.part_); }
   // Draws where the session began and ended, if that is in this part.
   void ends(SessionNumber session, const std::vector<FrameId>& frames) {
     const std::vector<FrameId>& all = contents_.sessions().at(session);
@@ -329,6 +332,7 @@ class MapPanel::Pen {
     if (picture_.query && find_query(at)) placement_.avoid(Box{at - Vector2(22, 22), at + Vector2(22, 22)});
     for (const auto& [session, frames] : frames_)
       for (const FrameId end : {frames.front(), frames.back()}) {
+        if (!marks_sessions()) break;
         const Vector2 mark = this->at(end);
         placement_.avoid(Box{mark - Vector2(8, 8), mark + Vector2(8, 8)});
       }
@@ -345,6 +349,7 @@ class MapPanel::Pen {
       leader((at + b) / 2, fixed(tear.sigmas, 1) + " sigmas",
              {.size = narrow_ ? 13.0 : 15.0, .colour = kQueryColour, .bold = true, .halo = 2});
     }
+    if (!marks_sessions()) return;
     const std::size_t sessions = contents_.sessions().size();
     for (const auto& [session, frames] : frames_) {
       const TextStyle style{

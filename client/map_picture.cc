@@ -31,6 +31,10 @@ std::vector<std::size_t> columns_of_rows(std::size_t shown) {
   return rows;
 }
 
+std::size_t keyframes_of(const MapPicture::Part& part) {
+  return part.keyframes > 0 ? part.keyframes : part.frames.size();
+}
+
 // Lays out and draws a page: title, panels of the parts, legend.
 class Composer {
  public:
@@ -87,7 +91,7 @@ class Composer {
           kNote, 24);
     if (parts > kMaxPanels)
       add(counted_text(parts - kMaxPanels, "part") + " of " +
-              counted_text(picture_.parts[kMaxPanels].frames.size(), "keyframe") + " or fewer are not drawn.",
+              counted_text(keyframes_of(picture_.parts[kMaxPanels]), "keyframe") + " or fewer are not drawn.",
           kNote, 24);
     top_ = y + (header_.empty() ? 0 : 6);
   }
@@ -102,7 +106,7 @@ class Composer {
     };
     const MapPicture::Part& shown = picture_.parts[part];
     add("Part " + std::to_string(part + 1) + " of " + std::to_string(picture_.parts.size()), kPartTitle);
-    add(counted_text(shown.frames.size(), "keyframe") + " in the frame of " + shown.root.to_string() +
+    add(counted_text(keyframes_of(shown), "keyframe") + " in the frame of " + shown.root.to_string() +
             "; position relative to the other parts unknown",
         kCaption);
     y += 2;
@@ -119,7 +123,10 @@ class Composer {
       if (!first && width_of_others_ == 0)
         width_of_others_ = (column_ - kPanelGap * static_cast<double>(columns - 1)) / static_cast<double>(columns);
       const double width = first || shown == 2 ? column_ : width_of_others_;
-      const double max_height = shown == 1 ? kMaxHeightAlone : first || shown == 2 ? kMaxHeightFirst : 0.75 * width;
+      // A plan that stands alone may be as high as the legend beside it.
+      const double max_height = shown == 1            ? std::max(kMaxHeightAlone, legend_.height() - 40)
+                                : first || shown == 2 ? kMaxHeightFirst
+                                                      : 0.75 * width;
       std::vector<Panel> row;
       double plans = kMinHeight, captions_end = y;
       for (std::size_t k = 0; k < columns; ++k, ++part) {

@@ -28,6 +28,7 @@ struct MapPicture {
   struct Part {
     FrameId root;
     std::vector<Frame> frames;
+    std::size_t keyframes = 0;  // that the frames stand for; 0: as many as there are
   };
   // How an edge is drawn.
   enum class EdgeKind : std::uint8_t {
@@ -84,6 +85,10 @@ struct MapPicture {
   bool turn_to_fit = true;
   double width = 1200;   // of the page, in points
   double png_scale = 2;  // pixels per point
+  // Of a picture that does not show everything: how many keyframes the frames of a session stand for (if it is not
+  // here: as many as are shown), and how many edges of a kind stand behind those that are shown.
+  std::map<SessionNumber, std::size_t> session_keyframes = {};
+  std::map<EdgeKind, std::size_t> alike = {};
 };
 
 inline bool is_motion(MapPicture::EdgeKind kind) { return kind <= MapPicture::EdgeKind::kCarriedMotion; }

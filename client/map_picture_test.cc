@@ -239,6 +239,37 @@ TEST_F(MapPictureFile, SessionsAreNumberedIfThereAreMoreThanColours) {
   expect_nothing_cut_off(svg);
 }
 
+// Their marks would hide what they drove.
+TEST_F(MapPictureFile, HundredsOfSessionsInOnePartAreNotMarked) {
+  MapPicture picture;
+  add_part(picture, 1, 30);
+  for (SessionNumber session = 2; session <= 41; ++session) {
+    MapPicture one;
+    add_part(one, session, 30);
+    for (MapPicture::Frame& frame : one.parts[0].frames) {
+      frame.T_root_frame.t.x() = session;
+      picture.parts[0].frames.push_back(frame);
+    }
+    picture.edges.insert(picture.edges.end(), one.edges.begin(), one.edges.end());
+  }
+  const std::string svg = draw_map_picture(picture, PictureFormat::kSvg).or_throw();
+  EXPECT_EQ(count_in(svg, "<circle"), 0);
+  EXPECT_THAT(said_in(svg), ::testing::Not(::testing::HasSubstr("start and end")));
+}
+
+TEST_F(MapPictureFile, CountsAreThoseOfTheMapWhereThePictureShowsLess) {
+  MapPicture picture = circle();
+  add_part(picture, 2, 9);
+  picture.edges.push_back({{1, 5}, {1, 40}, MapPicture::EdgeKind::kLoopAccepted});
+  picture.session_keyframes = {{1, 12'345}, {2, 678}};
+  picture.parts[0].keyframes = 12'345;
+  picture.alike[MapPicture::EdgeKind::kLoopAccepted] = 2'000;
+  const std::string said = said_in(draw_map_picture(picture, PictureFormat::kSvg).or_throw());
+  for (const char* text : {"12,345 keyframes in the frame of 1:0", "9 keyframes in the frame of 2:0", "678 keyframes",
+                           "2,001 loop closures 1 drawn: of those that join the same stretches one"})
+    EXPECT_THAT(said, ::testing::HasSubstr(text));
+}
+
 TEST_F(MapPictureFile, TheSmallestOfVeryManyPartsAreOnlyCounted) {
   MapPicture picture = circle();
   for (SessionNumber session = 2; session <= 60; ++session) add_part(picture, session, 2);

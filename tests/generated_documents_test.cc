@@ -1,9 +1,10 @@
-// What documents and samples say of settings and metrics is what the daemon has.
+// What documents and samples say and show of settings, metrics and suspicion is what the daemon has.
 #include <gtest/gtest.h>
 
 #include "server/monitor/metrics_page.h"
 #include "server/ops/settings.h"
 #include "tests/support/generated_part.h"
+#include "tests/suspicion_picture.h"
 
 namespace relmap::testing {
 namespace {
@@ -16,6 +17,8 @@ TEST(GeneratedDocuments, ListEverySetting) {
 TEST(GeneratedDocuments, ListEveryMetric) {
   expect_generated_part("docs/metrics.md", "metrics", monitor::metrics_table());
 }
+
+TEST(GeneratedDocuments, ShowTheCurvesOfSuspicion) { expect_generated("docs/suspicion.svg", suspicion_picture()); }
 
 }  // namespace
 }  // namespace relmap::testing

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <regex>
 
 #include "server/map/derived.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
+#include "tests/support/source_tree.h"
 #include "tests/support/stored_map.h"
 #include "tests/support/terminal.h"
 
@@ -66,6 +68,13 @@ class Operator : public ::testing::Test {
     for (const client::Edge& closure : daemon_->client()->edges(filter).or_throw())
       ids.push_back(closure.id.to_string());
     return ids;
+  }
+  // What a program reads is a contract: docs/operations.md names every key of the object.
+  static void expect_keys_are_documented(const std::string& object) {
+    const std::string document = content_of("docs/operations.md");
+    const std::regex key("\"([A-Za-z]+)\":");
+    for (std::sregex_iterator at(object.begin(), object.end(), key), end; at != end; ++at)
+      EXPECT_THAT(document, HasSubstr("`" + (*at)[1].str() + "`"));
   }
   static std::string contents(const std::string& file) {
     std::ifstream in(file, std::ios::binary);
@@ -333,6 +342,10 @@ TEST_F(Operator, DrawsRoutesAndMaps) {
   ASSERT_EQ(map.exit_code, 0) << map.standard_error;
   EXPECT_THAT(contents(folder_ / "map.svg"), HasSubstr("(one sigma)"));
   EXPECT_THAT(map.standard_error, HasSubstr("no tear: the picture stretches no edge by more than 6 sigmas"));
+  const Finished json = relmap({"--json", "map", "--tears", "--out", folder_ / "map.svg"});
+  EXPECT_THAT(json.standard_output, HasSubstr("\"keyframes\":"));
+  EXPECT_THAT(json.standard_output, HasSubstr("\"tears\":0"));
+  expect_keys_are_documented(json.standard_output);
   const Finished times = relmap({"map", "--colour", "time", "--out", folder_ / "map.svg"});
   ASSERT_EQ(times.exit_code, 0) << times.standard_error;
   EXPECT_THAT(contents(folder_ / "map.svg"), HasSubstr("colour: when it was"));
@@ -353,8 +366,12 @@ TEST_F(Operator, ReportsOnTheMap) {
   EXPECT_THAT(page, Not(HasSubstr("nan")));
   const Finished json = relmap({"--json", "report", "--out", folder_ / "report.html"});
   EXPECT_THAT(json.standard_output, ::testing::StartsWith("{\"out\":"));
-  for (const char* key : {"\"bytes\":", "\"findings\":[", "\"tears\":", "\"suspicious\":"})
+  for (const char* key : {"\"bytes\":", "\"findings\":[", "\"tears\":", "\"suspicious\":", "\"shown\":3"})
     EXPECT_THAT(json.standard_output, HasSubstr(key));
+  expect_keys_are_documented(json.standard_output);
+  const Finished without = relmap({"--json", "report", "--out", folder_ / "report.html", "--suspicious", "0"});
+  EXPECT_THAT(without.standard_output, HasSubstr("\"shown\":0"));
+  EXPECT_THAT(contents(folder_ / "report.html"), HasSubstr("of those in force")) << "how many are suspicious";
   EXPECT_EQ(relmap({"report", "--out", "-"}).standard_output.substr(0, 15), "<!DOCTYPE html>");
 }
 

@@ -294,8 +294,10 @@ std::vector<Setting> make_settings() {
           "commit_interval_ms",
           {read_commit_interval, [](const C& config) { return std::to_string(config.map.commit_interval.count()); }},
           "1 to 600,000", "a commit is due after so long"),
-      setting("events.max_mb", number(&C::events_max_mb, 1, 1 << 20), "1 to 1,048,576",
-              "of the log of what happens to the map, which has the last hour at most, on disk"),
+      setting(
+          "events.max_mb", number(&C::events_max_mb, 1, 1 << 20), "1 to 1,048,576",
+          "of the log of what happens to the map, which has the last hour at most, on disk; a watcher who is away for "
+          "longer than the log reaches back has to list again"),
       setting("rpc.threads", number([](C& c) -> int& { return c.rpc.threads; }, 1, 256), "1 to 256",
               "threads that run handlers"),
       setting("rpc.max_concurrent", number([](C& c) -> int& { return c.rpc.max_concurrent; }, 1, 100000),
@@ -323,7 +325,8 @@ std::vector<Setting> make_settings() {
               number([](C& c) -> int& { return c.rpc.max_ingest_streams_per_caller; }, 1, 100000), "1 to 100,000",
               "of these, of one caller"),
       setting("rpc.max_watchers", number([](C& c) -> int& { return c.rpc.max_watchers; }, 1, 100000), "1 to 100,000",
-              "watches of the map at once, not counted above"),
+              "watches of the map at once, not counted above; half of the memory for replies, a sixteenth of "
+              "memory_budget_mb, must hold them, so that 18 MB of the budget allow one more: 56 with 1,024 MB"),
       setting("rpc.max_watchers_per_caller",
               number([](C& c) -> int& { return c.rpc.max_watchers_per_caller; }, 1, 100000), "1 to 100,000",
               "of these, of one caller"),

@@ -17,6 +17,8 @@ using relmap::bench::Subcommand;
 const Subcommand kSubcommands[] = {
     {"answers", "Ask a running daemon about the drive it has mapped, and compare with the truth",
      relmap::bench::declare_answers},
+    {"by-eye", "Draw sheets of closures among which one is wrong, for people who try to find it by its pictures",
+     relmap::bench::declare_by_eye},
     {"capture", "A live stereo camera: what a pair costs until it is recorded, until it is tracked, and what gets lost",
      relmap::bench::declare_capture},
     {"closures", "Propose the loop closures of a pose graph, some of them false, to a map",

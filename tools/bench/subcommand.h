@@ -18,6 +18,7 @@ struct Subcommand {
 };
 
 Run declare_answers(CLI::App& app);
+Run declare_by_eye(CLI::App& app);
 Run declare_capture(CLI::App& app);
 Run declare_closures(CLI::App& app);
 Run declare_drive(CLI::App& app);

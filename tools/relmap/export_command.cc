@@ -6,6 +6,7 @@
 
 #include "proto/base/json.h"
 #include "proto/base/number_text.h"
+#include "tools/relmap/chosen_sessions.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
 #include "tools/relmap/output_files.h"
@@ -185,7 +186,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
   if (!begun.ok()) return begun.status();
   auto graph = read_map_graph(options.sessions, client, console);
   if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return nothing_to_place(*graph, "export", "exported");
+  if (graph->frames.empty()) return nothing_to_place(graph->mono_sessions, "export", "exported");
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
   const auto map = relax_map(std::move(graph).value(), *labels, root);

@@ -1,18 +1,21 @@
-// relmap map: draws the relaxed graph, each connected part by itself.
+// relmap map: draws the shape of the map, each connected part by itself.
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "client/map_picture.h"
+#include "proto/base/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/map_drawing.h"
 #include "tools/relmap/picture_output.h"
-#include "tools/relmap/relaxed_map.h"
 #include "tools/relmap/route_options.h"
 
 namespace relmap::cli {
 
 namespace {
+
+using client::MapPicture;
 
 struct MapOptions {
   std::string out, title = "relmap", query, query_right, colour = "session";
@@ -23,77 +26,104 @@ struct MapOptions {
   ViewOptions camera;
 };
 
-Status add_route_to(client::MapPicture& picture, const MapOptions& options, client::Client& client,
-                    terminal::Console& console) {
+Result<MapPicture::Route> find_route(const MapOptions& options, client::Client& client, terminal::Console& console) {
   const auto request = make_route_request(client, console, options.route, options.camera);
   if (!request.ok()) return request.status();
   const auto route = client.find_route(*request);
   if (!route.ok()) return route.status();
-  picture.route.emplace();
-  for (const client::RouteStep& step : route->steps) picture.route->frames.push_back(step.frame);
+  MapPicture::Route drawn;
+  for (const client::RouteStep& step : route->steps) drawn.frames.push_back(step.frame);
   const auto* label = request->or_to.empty() ? std::get_if<std::string>(&request->to) : nullptr;
-  picture.route->caption =
+  drawn.caption =
       "route to " + (label ? *label : route->to.to_string()) + ", " + fixed(route->distance_m, 1) + " m, " +
       (route->unmeasured.steps > 0 ? "of which " + fixed(route->unmeasured.distance_m, 1) + " m a guess, " : "") +
       terminal::duration_text(route->time_s);
-  return {};
+  return drawn;
 }
 
-Status add_query_to(client::MapPicture& picture, const MapOptions& options, client::Client& client,
-                    terminal::Console& console) {
+Result<MapPicture::Query> find_query(const MapOptions& options, client::Client& client, terminal::Console& console) {
   const auto view = make_view(client, console, options.query, options.query_right, options.camera);
   if (!view.ok()) return view.status();
   const auto found = client.localise(*view);
   if (!found.ok()) return found.status();
-  picture.query = client::MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
-  return {};
+  return MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
 }
 
-void tell_tears(const RelaxedMap& map, terminal::Console& console) {
-  std::size_t tears = 0;
-  for (const MapPart& part : map.parts) tears += part.tears.size();
-  if (tears == 0)
-    console.err() << "no tear: the picture stretches no edge by more than " << fixed(kTearSigmas, 0) << " sigmas\n";
-  for (const MapPart& part : map.parts)
-    for (std::size_t i = 0; i < std::min(part.tears.size(), kMaxListed); ++i)
-      console.err() << "tear: " << part.tears[i].words() << '\n';
-  if (tears > kMaxListed) console.err() << count_text(tears) << " tears in all\n";
-  for (std::size_t i = 0; i < std::min(map.strained.size(), kMaxListed); ++i)
-    console.err() << "stretched closure: " << map.strained[i].words() << '\n';
+void tell_tears(const std::vector<Tear>& tears, const std::vector<Tear>& strained, std::ostream& err) {
+  if (tears.empty())
+    err << "no tear: the picture stretches no edge by more than " << fixed(kTearSigmas, 0) << " sigmas\n";
+  for (std::size_t i = 0; i < std::min(tears.size(), kMaxListed); ++i) err << "tear: " << tears[i].words() << '\n';
+  if (tears.size() > kMaxListed) err << count_text(tears.size()) << " tears in all\n";
+  for (std::size_t i = 0; i < std::min(strained.size(), kMaxListed); ++i)
+    err << "stretched closure: " << strained[i].words() << '\n';
+}
+
+void tell(const MapOptions& options, const MapShape& shape, const MapPicture& picture, terminal::Console& console) {
+  std::ostream& err = console.err();
+  err << options.out << ": " << picture.subtitle;
+  if (picture.parts.size() > 1) err << ", in " << picture.parts.size() << " parts that nothing connects";
+  err << '\n';
+  if (const std::string text = shape_text(shape); !text.empty()) err << text << '\n';
+  if (picture.mono_sessions > 0) err << not_placed_text(picture.mono_sessions, "drawn") << '\n';
+  if (picture.query && !shape.find(picture.query->frame))
+    err << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
+  if (!console.json) return;
+  Json json;
+  json.add("out", options.out)
+      .add("sessions", shape.chosen.sessions.size())
+      .add("keyframes", shape.keyframes())
+      .add("points", shape.skeleton.points())
+      .add("loopClosures", shape.closures_in_force())
+      .add("parts", picture.parts.size())
+      .add("monoSessions", picture.mono_sessions);
+  if (options.tears) json.add("tears", picture.tears.size());
+  console.out() << json.text() << '\n';
 }
 
 Status draw(const MapOptions& options, client::Client& client, terminal::Console& console) {
   const auto format = client::picture_format(options.out);
   if (!format.ok()) return format.status();
   const terminal::Console::Aside aside(console);
-  auto graph = read_map_graph(options.sessions, client, console);
-  if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return nothing_to_place(*graph, "draw", "drawn");
+  ShapeChoice choice{options.sessions, options.removed};
+  std::optional<MapPicture::Route> route;
+  std::optional<MapPicture::Query> query;
+  if (!options.route.from.empty()) {
+    auto found = find_route(options, client, console);
+    if (!found.ok()) return found.status();
+    route = std::move(found).value();
+    choice.points = corners_of(route->frames);
+  }
+  if (!options.query.empty()) {
+    auto found = find_query(options, client, console);
+    if (!found.ok()) return found.status();
+    query = std::move(found).value();
+    choice.points.push_back(query->frame);
+  }
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
-  const auto map = relax_map(std::move(graph).value(), *labels);
-  if (!map.ok()) return map.status();
-  client::MapPicture picture = picture_of(*map, options.removed);
+  for (const client::LabelledFrames& label : *labels)
+    choice.points.insert(choice.points.end(), label.frames.begin(), label.frames.end());
+  auto shape = read_map_shape(choice, client, console);
+  if (!shape.ok()) return shape.status();
+  if (Status laid_out = lay_out(*shape); !laid_out.ok()) return laid_out;
+  MapPicture picture = picture_of(*shape, *labels);
   picture.title = options.title;
   picture.png_scale = options.width / picture.width;
-  if (options.tears) mark_tears(*map, picture);
-  if (options.colour == "time") colour_by_time(*map, picture);
-  if (options.colour == "uncertainty") colour_by_uncertainty(*map, picture);
-  Status status;
-  if (!options.route.from.empty()) status = add_route_to(picture, options, client, console);
-  if (status.ok() && !options.query.empty()) status = add_query_to(picture, options, client, console);
-  if (!status.ok()) return status;
+  picture.query = query;
+  if (route) {
+    std::erase_if(route->frames, [&](FrameId frame) { return !shape->find(frame); });
+    picture.route = route;
+  }
+  const std::vector<Tear> tears = options.tears ? tears_of(*shape) : std::vector<Tear>();
+  const std::vector<Tear> strained = options.tears ? strained_of(*shape) : std::vector<Tear>();
+  mark_tears(tears, strained, picture);
+  if (options.colour == "time") colour_by_time(*shape, picture);
+  if (options.colour == "uncertainty") colour_by_uncertainty(*shape, picture);
   const auto bytes = client::draw_map_picture(picture, *format);
   if (!bytes.ok()) return bytes.status();
   if (Status written = write_output(options.out, *bytes, console); !written.ok()) return written;
-  console.err() << options.out << ": " << picture.subtitle;
-  if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
-  console.err() << '\n';
-  if (const std::size_t mono = map->graph.mono_sessions; mono > 0)
-    console.err() << not_placed_text(mono, "drawn") << '\n';
-  if (options.tears) tell_tears(*map, console);
-  if (picture.query && !map->graph.frames.contains(picture.query->frame))
-    console.err() << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
+  tell(options, *shape, picture, console);
+  if (options.tears) tell_tears(tears, strained, console.err());
   return {};
 }
 

@@ -4,17 +4,11 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "proto/geometry/covariance.h"
 #include "proto/keyframe/motion_source_name.h"
-#include "tools/relmap/degrees.h"
 
 namespace relmap::cli {
 
 namespace {
-
-// The covariance of a step along which a lift or a train carried the robot: so large that the step does not matter
-// beside what closures measured, but finite, so that the solution is unique.
-const Matrix6 kCarriedCovariance = Vector6(1e4, 1e4, 1e4, 1, 1, 1).asDiagonal();
 
 client::RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
   switch (kind) {
@@ -31,44 +25,18 @@ client::RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
 bool is_doubtful(const client::Edge& edge) { return edge.unmeasured || !edge.carried_by.empty(); }
 bool holds_nothing(const client::Edge& edge) { return edge.unmeasured && edge.source == MotionSource::kUnsensed; }
 
-std::vector<RelaxedMap::Spring> springs_of(const MapGraph& graph) {
-  std::vector<RelaxedMap::Spring> springs;
+std::vector<Spring> springs_of(const MapGraph& graph) {
+  std::vector<Spring> springs;
   for (const client::Edge& edge : graph.edges) {
     if (!in_graph(edge) || holds_nothing(edge)) continue;
-    RelaxedMap::Spring& spring = springs.emplace_back();
+    Spring& spring = springs.emplace_back();
     spring.edge = edge.id;
     spring.kind = edge.kind;
     spring.doubtful = is_doubtful(edge);
-    spring.relaxed = {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : kCarriedCovariance,
+    spring.relaxed = {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : carried_covariance(),
                       relaxation_kind(edge.kind)};
   }
   return springs;
-}
-
-// The sets of frames that measured edges connect (union-find).
-class Measured {
- public:
-  Measured(const std::set<FrameId>& frames, const std::vector<RelaxedMap::Spring>& springs) {
-    for (const FrameId frame : frames) parent_.emplace(frame, frame);
-    for (const RelaxedMap::Spring& spring : springs)
-      if (!spring.doubtful) parent_[root(spring.relaxed.a)] = root(spring.relaxed.b);
-  }
-  bool join(FrameId a, FrameId b) { return root(a) == root(b); }
-
- private:
-  FrameId root(FrameId frame) {
-    while (parent_.at(frame) != frame) frame = parent_[frame] = parent_.at(parent_.at(frame));
-    return frame;
-  }
-  std::unordered_map<FrameId, FrameId> parent_;
-};
-
-// By how much the poses contradict an edge that was relaxed, and which stands for that of `spring`.
-Tear strain_of(const client::RelaxationEdge& edge, const RelaxedMap::Spring& spring, const MapPart& part) {
-  const SE3 off = edge.T_ab.inverse() * (part.find(edge.a)->inverse() * *part.find(edge.b));
-  const Vector6 xi = off.log();
-  const double sigmas = std::sqrt(std::max(0.0, mahalanobis_squared(xi, edge.covariance)));
-  return {spring.edge, spring.relaxed.a, spring.relaxed.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
 }
 
 // One part for each component of the relaxation, with frames and root only.
@@ -106,11 +74,6 @@ DoubtfulStep doubtful_step(const client::Edge& edge) {
   step.guess = edge.reason == Reason::DECLARED_GAP ? "gap" : name_of(edge.source);
   step.sigma_m = std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace() / 3);
   return step;
-}
-
-std::string Tear::words() const {
-  return edge.to_string() + " from " + a.to_string() + " to " + b.to_string() + ": " + fixed(metres, 3) + " m, " +
-         fixed(degrees, 2) + " degrees, " + fixed(sigmas, 1) + " sigmas";
 }
 
 std::string DoubtfulStep::words() const {
@@ -159,11 +122,10 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   map.graph = std::move(graph);
   map.springs = springs_of(map.graph);
   std::vector<client::RelaxationEdge> edges;
-  std::vector<const RelaxedMap::Spring*> spring_of;  // by edge
+  std::vector<const Spring*> spring_of;  // by edge
   edges.reserve(map.springs.size());
-  Measured measured(map.graph.frames, map.springs);
-  for (RelaxedMap::Spring& spring : map.springs) {
-    spring.pulls = !spring.doubtful || !measured.join(spring.relaxed.a, spring.relaxed.b);
+  MeasuredSets measured = choose_pulling(map.springs);
+  for (const Spring& spring : map.springs) {
     if (!spring.pulls) continue;
     edges.push_back(spring.relaxed);
     spring_of.push_back(&spring);
@@ -177,12 +139,11 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     for (const PlacedFrame& placed : part.frames) part_of[placed.frame] = &part;
   for (std::size_t i = 0; i < map.springs.size(); ++i) part_of.at(map.springs[i].relaxed.a)->edges.push_back(i);
   for (std::size_t e = 0; e < edges.size(); ++e) {
-    const RelaxedMap::Spring& spring = *spring_of[e];
+    const Spring& spring = *spring_of[e];
     if (spring.doubtful) continue;
     MapPart& part = *part_of.at(spring.relaxed.a);
-    const Tear strain = strain_of(edges[e], spring, part);
+    const Tear strain = strain_of(spring, edges[e], *part.find(edges[e].a), *part.find(edges[e].b));
     if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
-    if (spring.kind == client::EdgeKind::kLoop && strain.sigmas > 1) map.strained.push_back(strain);
   }
   for (const client::Edge& edge : map.graph.edges) {
     if (!in_graph(edge) || !is_doubtful(edge)) continue;
@@ -195,10 +156,7 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     part->doubtful.push_back(step);
     if (part != other) other->doubtful.push_back(step);
   }
-  const auto worse = [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; };
-  for (MapPart& part : map.parts) std::stable_sort(part.tears.begin(), part.tears.end(), worse);
-  std::stable_sort(map.strained.begin(), map.strained.end(), worse);
-  if (map.strained.size() > kMaxStrained) map.strained.resize(kMaxStrained);
+  for (MapPart& part : map.parts) sort_worst_first(part.tears);
   for (const client::LabelledFrames& label : labels)
     for (const FrameId frame : label.frames)
       if (const auto part = part_of.find(frame); part != part_of.end())

@@ -18,6 +18,7 @@
 
 #include "client/relaxation.h"
 #include "tools/relmap/map_graph.h"
+#include "tools/relmap/springs.h"
 
 namespace relmap::cli {
 
@@ -25,17 +26,6 @@ struct PlacedFrame {
   FrameId frame;
   SE3 T_root_frame;
 };
-
-// An edge that the relaxed poses contradict by more than kTearSigmas standard deviations.
-struct Tear {
-  EdgeId edge;
-  FrameId a, b;
-  double metres = 0, degrees = 0, sigmas = 0;
-
-  std::string words() const;  // "3:120/1 from 1:4 to 3:120: 0.031 m, 0.10 degrees, 7.3 sigmas"
-};
-inline constexpr double kTearSigmas = 6;
-inline constexpr std::size_t kMaxStrained = 10;
 
 // A step of a robot that nothing measured, or along which it was carried.
 struct DoubtfulStep {
@@ -79,19 +69,8 @@ struct MapPart {
 
 struct RelaxedMap {
   MapGraph graph;
-  // The edges of the graph that may count in the relaxation, with the covariance that they count with.
-  struct Spring {
-    EdgeId edge;
-    client::EdgeKind kind = client::EdgeKind::kOdometry;
-    bool doubtful = false;  // a step that nothing measured, or along which the robot was carried
-    bool pulls = true;      // false: a doubtful step that does not count, since measured edges connect its ends
-    client::RelaxationEdge relaxed;
-  };
-  std::vector<Spring> springs;
-  std::vector<MapPart> parts;  // the one with the chosen root first, then the others, largest first
-  // The loop closures that the relaxed poses contradict most, by more than one standard deviation, whether or not they
-  // are tears; the worst first, at most kMaxStrained.
-  std::vector<Tear> strained;
+  std::vector<Spring> springs;  // the edges of the graph that may count in the relaxation
+  std::vector<MapPart> parts;   // the one with the chosen root first, then the others, largest first
 
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
 };

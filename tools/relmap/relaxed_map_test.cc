@@ -199,8 +199,6 @@ TEST(RelaxedMap, TearsAreListedInMetresWorstFirst) {
   EXPECT_GT(worst.sigmas, kTearSigmas);
   EXPECT_THAT(worst.words(), HasSubstr("1:10/1 from 1:0 to 1:10: "));
   EXPECT_NEAR(worst.metres, map.parts[0].find(at(10))->t.z() - 4, 1e-6);
-  ASSERT_EQ(map.strained.size(), 1u) << "of closures only";
-  EXPECT_EQ(map.strained[0].edge, worst.edge);
 }
 
 }  // namespace

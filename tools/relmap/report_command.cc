@@ -24,7 +24,10 @@ Status write_report(const ReportOptions& options, client::Client& client, termin
                       .add("bytes", page.size())
                       .add("findings", findings)
                       .add("tears", report->tears.size())
-                      .add("suspicious", report->suspicious.size())
+                      .add("suspicious", report->suspicious_count())
+                      .add("shown", report->shown())
+                      .add("parts", report->parts)
+                      .add("monoSessions", report->mono_sessions)
                       .text());
     return {};
   }
@@ -43,12 +46,13 @@ void add_report(CLI::App& app, Action& action) {
       ->required();
   command->add_option("--title", options->title, "title of the page")->capture_default_str();
   command
-      ->add_option("--suspicious", options->suspicious, "show the pictures of so many of the most suspicious closures")
+      ->add_option("--suspicious", options->suspicious,
+                   "show the pictures of so many of the most suspicious closures; their number is told in any case")
       ->check(CLI::Range(0, 50))
       ->capture_default_str();
   bool* const map = &options->map;
   command->add_flag_callback(
-      "--no-map", [map] { *map = false; }, "do not draw the map, which of a large one takes minutes");
+      "--no-map", [map] { *map = false; }, "do not draw the map");
   command->footer(
       "The page is one file of HTML without scripts; its pictures are part of it. What the daemon does not tell the\n"
       "caller, as the audit log to a reader, is left out, with the reason. Prints what to look at first.\n"

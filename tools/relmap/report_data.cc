@@ -5,6 +5,7 @@
 
 #include "client/pair_picture.h"
 #include "proto/base/clock.h"
+#include "proto/base/suspicion.h"
 #include "tools/relmap/map_drawing.h"
 #include "tools/relmap/pairs.h"
 
@@ -14,51 +15,68 @@ namespace {
 
 constexpr std::size_t kSampledFrames = 120, kAuditEntries = 40;
 
-Status draw_map(MapReport& report, client::Client& client, terminal::Console& console) {
-  auto graph = read_map_graph({}, client, console);
-  if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return nothing_to_place(*graph, "draw", "drawn");
-  for (const auto& [frame, time] : frame_times(*graph)) ++report.keyframes_by_day[time_text(time).substr(0, 10)];
+// Whether it is drawn or not, the shape tells when keyframes were taken.
+Status draw_map(bool drawn, MapReport& report, client::Client& client, terminal::Console& console) {
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
-  const auto map = relax_map(std::move(graph).value(), *labels);
-  if (!map.ok()) return map.status();
-  report.parts = map->parts.size();
-  for (const MapPart& part : map->parts) report.tears.insert(report.tears.end(), part.tears.begin(), part.tears.end());
-  std::stable_sort(report.tears.begin(), report.tears.end(),
-                   [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; });
-  report.strained = map->strained;
-  report.sigmas_root = map->parts[0].root;
-  for (const double sigma : uncertainty_of(*map, map->parts[0]))
+  ShapeChoice choice;
+  for (const client::LabelledFrames& label : *labels)
+    choice.points.insert(choice.points.end(), label.frames.begin(), label.frames.end());
+  auto shape = read_map_shape(choice, client, console);
+  if (!shape.ok()) return shape.status();
+  report.keyframes_by_day = keyframes_by_day(shape->skeleton);
+  report.mono_sessions = shape->chosen.mono_sessions;
+  if (!drawn) return {Reason::OUT_OF_REACH, "--no-map was given"};
+  if (Status laid_out = lay_out(*shape); !laid_out.ok()) return laid_out;
+  report.parts = shape->layout.parts.size();
+  report.map_text = shape_text(*shape);
+  report.tears = tears_of(*shape);
+  report.sigmas_root = shape->layout.parts[0].root;
+  const std::vector<std::vector<double>> sigmas = uncertainty_of(*shape);
+  for (const double sigma : sigmas[0])
     if (std::isfinite(sigma)) report.sigmas_m.push_back(sigma);
   std::sort(report.sigmas_m.begin(), report.sigmas_m.end());
-  client::MapPicture picture = picture_of(*map, false);
-  mark_tears(*map, picture);
+  client::MapPicture picture = picture_of(*shape, *labels);
+  mark_tears(report.tears, strained_of(*shape), picture);
   auto svg = client::draw_map_picture(picture, client::PictureFormat::kSvg);
   if (!svg.ok()) return svg.status();
   report.map_svg = std::move(svg).value();
   return {};
 }
 
-Status show_suspicious(std::size_t count, MapReport& report, client::Client& client, terminal::Console& console) {
-  if (count == 0) return {};
+Status find_suspicious(std::size_t shown, MapReport& report, client::Client& client, terminal::Console& console) {
   client::EdgeFilter filter;
   filter.kinds = {client::EdgeKind::kLoop};
   filter.states = {client::EdgeState::kAccepted};
   filter.order = client::EdgeOrder::kSuspicion;
-  filter.limit = count;
-  const auto edges = client.edges(filter);
+  filter.min_suspicion = kSuspicious;
+  filter.limit = MapReport::kMaxSuspicious;
+  auto edges = client.edges(filter);
   if (!edges.ok()) return edges.status();
+  // A map without a suspicious closure has some that are the most suspicious.
+  if (edges->size() < shown) {
+    filter.min_suspicion = 0;
+    filter.limit = shown;
+    edges = client.edges(filter);
+    if (!edges.ok()) return edges.status();
+  }
   if (!edges->empty() && !edges->front().suspicion)
     return {Reason::UNIMPLEMENTED, "this relmapd does not tell how suspicious closures are; it is an older one"};
+  for (client::Edge& edge : *edges) report.suspicious.push_back({std::move(edge)});
   const auto sessions = read_sessions(client, console);
   if (!sessions.ok()) return sessions.status();
-  for (const client::Edge& edge : *edges) {
-    const auto explained = client.explain_edge(edge.id, /*with_pictures=*/true);
-    if (!explained.ok()) return explained.status();
+  for (std::size_t i = 0; i < std::min(shown, report.suspicious.size()); ++i) {
+    MapReport::Suspicious& closure = report.suspicious[i];
+    const auto explained = client.explain_edge(closure.edge.id, /*with_pictures=*/true);
+    if (!explained.ok()) {
+      closure.not_shown = explained.status();
+      continue;
+    }
     auto svg = client::draw_pair(pair_of(*explained, *sessions, client), client::PictureFormat::kSvg);
-    if (!svg.ok()) return svg.status();
-    report.suspicious.push_back({explained->edge, std::move(svg).value()});
+    if (svg.ok())
+      closure.svg = std::move(svg).value();
+    else
+      closure.not_shown = svg.status();
   }
   return {};
 }
@@ -95,6 +113,17 @@ void take(Result<Value> answer, Value& into, Status& missing) {
 
 }  // namespace
 
+std::size_t MapReport::suspicious_count() const {
+  return static_cast<std::size_t>(std::count_if(suspicious.begin(), suspicious.end(), [](const Suspicious& closure) {
+    return closure.edge.suspicion && closure.edge.suspicion->value >= kSuspicious;
+  }));
+}
+
+std::size_t MapReport::shown() const {
+  return static_cast<std::size_t>(std::count_if(suspicious.begin(), suspicious.end(),
+                                                [](const Suspicious& closure) { return !closure.svg.empty(); }));
+}
+
 Result<MapReport> gather_report(const ReportOptions& options, client::Client& client, terminal::Console& console) {
   const terminal::Console::Aside aside(console);
   MapReport report;
@@ -106,12 +135,9 @@ Result<MapReport> gather_report(const ReportOptions& options, client::Client& cl
   auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   report.sessions = std::move(sessions).value();
-  if (options.map)
-    report.map_missing = draw_map(report, client, console);
-  else
-    report.map_missing = {Reason::OUT_OF_REACH, "--no-map was given"};
+  report.map_missing = draw_map(options.map, report, client, console);
   take(client.closure_matrix(), report.matrix, report.matrix_missing);
-  report.suspicious_missing = show_suspicious(options.suspicious, report, client, console);
+  report.suspicious_missing = find_suspicious(options.suspicious, report, client, console);
   sample_errors(report, client);
   take(client.robots(), report.robots, report.robots_missing);
   take(client.stats(), report.store, report.store_missing);

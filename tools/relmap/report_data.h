@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/relmap_client.h"
-#include "tools/relmap/relaxed_map.h"
+#include "tools/relmap/springs.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::cli {
@@ -23,17 +23,25 @@ struct MapReport {
   std::string map_svg;
   Status map_missing;
   std::size_t parts = 0;
-  std::vector<Tear> tears, strained;  // the worst first
+  std::vector<Tear> tears;        // the worst first
+  std::string map_text;           // how much of the map the picture shows; empty: every keyframe
+  std::size_t mono_sessions = 0;  // which the picture does not show
 
   std::vector<client::ClosureMatrixCell> matrix;
   Status matrix_missing;
-  // Closures in force, the most suspicious first, each with the pictures of its ends.
+  // Closures in force, the most suspicious first: all whose suspicion is kSuspicious or more, as long as there are no
+  // more than kMaxSuspicious, and those that are shown.
   struct Suspicious {
     client::Edge edge;
-    std::string svg;
+    std::string svg = {};   // the pictures of its ends; empty: they are not shown
+    Status not_shown = {};  // not ok: they should be, and cannot
   };
+  static constexpr std::size_t kMaxSuspicious = 1000;
   std::vector<Suspicious> suspicious;
-  Status suspicious_missing;
+  Status suspicious_missing;  // not ok: why they are not known
+  // Those whose suspicion is kSuspicious or more.
+  std::size_t suspicious_count() const;
+  std::size_t shown() const;  // with pictures
 
   // Mean reprojection errors of some frames, chosen evenly, pixels, ascending.
   struct SessionErrors {
@@ -56,7 +64,7 @@ struct MapReport {
 struct ReportOptions {
   std::string out, title = "relmap report";
   std::size_t suspicious = 5;  // closures that are shown
-  bool map = true;             // false: the map is not drawn, which of a large one takes minutes
+  bool map = true;             // false: the map is not drawn
 };
 
 // Asks the daemon for all that a report tells. What it refuses is left out, with its reason; only if it tells neither

@@ -16,7 +16,8 @@ namespace relmap::cli {
 namespace {
 
 constexpr std::size_t kMatrixSessions = 24;  // with most closures; a larger table cannot be read
-constexpr std::size_t kMaxSessionRows = 200, kMaxDays = 60;
+constexpr std::size_t kMaxSessionRows = 200, kMaxDays = 60, kMaxTears = 10;
+constexpr std::size_t kNamedClosures = 5;  // suspicious ones, among the findings
 
 constexpr char kStyle[] = R"(
 :root{color-scheme:light dark;--ink:#26282e;--faint:#6a7078;--paper:#fcfcfa;--card:#fff;--rule:#dcdcd6;--heat:213,94,0;--bad:#c0125e}
@@ -146,6 +147,7 @@ std::string map_part(const MapReport& report) {
   if (report.parts > 1)
     html += paragraph_html(count_text(report.parts) + " parts that nothing connects; each is drawn by itself.");
   html += "<figure>" + report.map_svg + "</figure>\n";
+  if (!report.map_text.empty()) html += paragraph_html(markup_text(report.map_text) + ".");
   if (report.tears.empty()) {
     html += paragraph_html("No tear: relaxing the map for this picture stretches no edge by more than " +
                            fixed(kTearSigmas, 0) + " sigmas.");
@@ -153,9 +155,9 @@ std::string map_part(const MapReport& report) {
     html += paragraph_html(counted_text(report.tears.size(), "edge") + " had to be stretched by more than " +
                            fixed(kTearSigmas, 0) + " sigmas: measurements contradict each other there.");
     Table table({"edge", "from", "to", ">metres", ">degrees", ">sigmas"});
-    for (std::size_t i = 0; i < std::min<std::size_t>(report.tears.size(), 10); ++i) {
+    for (std::size_t i = 0; i < std::min(report.tears.size(), kMaxTears); ++i) {
       const Tear& tear = report.tears[i];
-      table.row({code_html(tear.edge.to_string()), tear.a.to_string(), tear.b.to_string(), fixed(tear.metres, 3),
+      table.row({code_html(tear.name()), tear.a.to_string(), tear.b.to_string(), fixed(tear.metres, 3),
                  fixed(tear.degrees, 2), fixed(tear.sigmas, 1)});
     }
     html += table.html();
@@ -219,6 +221,20 @@ std::string matrix(const MapReport& report) {
   return html;
 }
 
+// Those whose pictures were asked for.
+std::size_t to_be_shown(const MapReport& report) {
+  return static_cast<std::size_t>(std::count_if(
+      report.suspicious.begin(), report.suspicious.end(),
+      [](const MapReport::Suspicious& closure) { return !closure.svg.empty() || !closure.not_shown.ok(); }));
+}
+
+// "12 of those in force have"
+std::string suspicious_text(const MapReport& report) {
+  const std::size_t count = report.suspicious_count();
+  return count_text(count) + (count >= MapReport::kMaxSuspicious ? " or more" : "") + " of those in force " +
+         (count == 1 ? "has" : "have");
+}
+
 std::string loops(const MapReport& report) {
   const client::DaemonStatus& status = report.status;
   std::string html = heading_html("Loop closures");
@@ -227,12 +243,24 @@ std::string loops(const MapReport& report) {
                          count_text(status.closures_removed) + " removed.");
   html += matrix(report);
   if (!report.suspicious_missing.ok()) return html + left_out(report.suspicious_missing);
-  if (report.suspicious.empty()) return html;
+  const std::size_t suspicious = report.suspicious_count(), to_show = to_be_shown(report);
+  html += paragraph_html(suspicious == 0
+                             ? "None of those in force has a suspicion of " + fixed(kSuspicious, 1) + " or more."
+                             : suspicious_text(report) + " a suspicion of " + fixed(kSuspicious, 1) + " or more; " +
+                                   code_html("relmap edges --suspicion") + " lists the most suspicious first.");
+  if (to_show == 0) return html;
   html += paragraph_html(
       "<b>The most suspicious of those in force.</b> A wrong one shows in its pictures: lines that cross, "
       "or join things that are not the same. " +
       code_html("relmap edge remove ID --dry-run") + " tells what its removal would change.");
-  for (const MapReport::Suspicious& closure : report.suspicious) html += "<figure>" + closure.svg + "</figure>\n";
+  for (const MapReport::Suspicious& closure : report.suspicious) {
+    if (!closure.svg.empty()) html += "<figure>" + closure.svg + "</figure>\n";
+    if (!closure.not_shown.ok())
+      html += paragraph_html(
+          "The pictures of " + code_html(closure.edge.id.to_string()) +
+          (closure.edge.suspicion ? ", whose suspicion is " + fixed(closure.edge.suspicion->value, 2) + "," : "") +
+          " cannot be shown: " + shown_html(closure.not_shown.to_string()));
+  }
   return html;
 }
 
@@ -340,15 +368,20 @@ std::vector<std::string> findings_of(const MapReport& report) {
   for (const client::DoubtfulCamera& camera : status.doubtful_cameras)
     list.push_back("The calibration of session " + std::to_string(camera.session) + " (" + camera.name +
                    ") contradicts that of others: " + camera.message);
-  std::size_t suspicious = 0;
-  for (const MapReport::Suspicious& closure : report.suspicious)
-    if (closure.edge.suspicion && closure.edge.suspicion->value >= kSuspicious && ++suspicious <= 5)
-      list.push_back("Loop closure " + closure.edge.id.to_string() + " is suspicious (" +
-                     fixed(closure.edge.suspicion->value, 2) + " of 1)" +
-                     (closure.edge.suspicion->doubts.empty()
-                          ? ""
-                          : ": " + std::string(name_of(closure.edge.suspicion->doubts.front().kind))) +
-                     ". Look at its pictures below.");
+  const std::size_t suspicious = report.suspicious_count();
+  for (std::size_t i = 0; i < std::min(suspicious, kNamedClosures); ++i) {
+    const MapReport::Suspicious& closure = report.suspicious[i];
+    const std::string id = closure.edge.id.to_string();
+    list.push_back(
+        "Loop closure " + id + " is suspicious (" + fixed(closure.edge.suspicion->value, 2) + " of 1)" +
+        (closure.edge.suspicion->doubts.empty()
+             ? ""
+             : ": " + std::string(name_of(closure.edge.suspicion->doubts.front().kind))) +
+        (closure.svg.empty() ? ". \"relmap edges --explain " + id + "\" says why." : ". Look at its pictures below."));
+  }
+  if (suspicious > kNamedClosures)
+    list.push_back("Of the loop closures, " + suspicious_text(report) + " a suspicion of " + fixed(kSuspicious, 1) +
+                   " or more.");
   if (!report.tears.empty())
     list.push_back("Measurements contradict each other: " + report.tears.front().words() + "." +
                    (report.tears.size() > 1 ? " " + counted_text(report.tears.size(), "tear") + " in all." : ""));

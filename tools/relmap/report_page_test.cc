@@ -98,6 +98,39 @@ TEST(ReportPage, SaysWhyAPartIsMissing) {
     EXPECT_THAT(page, HasSubstr(why));
 }
 
+TEST(ReportPage, PicturesThatCannotBeShownHideNoOthers) {
+  MapReport report = report_of("cart");
+  MapReport::Suspicious lost = report.suspicious[0];
+  lost.edge.id = {{2, 9}, 1};
+  lost.svg.clear();
+  lost.not_shown = {Reason::NO_SUCH_EDGE, "its session was deleted meanwhile"};
+  report.suspicious.insert(report.suspicious.begin(), lost);
+  const std::string page = report_page(report);
+  EXPECT_THAT(page, HasSubstr("the-pair"));
+  EXPECT_THAT(page, HasSubstr("The pictures of <code>2:9/1</code>, whose suspicion is 0.75, cannot be shown: "));
+  EXPECT_THAT(page, HasSubstr("NO_SUCH_EDGE: its session was deleted meanwhile"));
+  EXPECT_EQ(report.shown(), 1u);
+}
+
+TEST(ReportPage, SuspiciousClosuresAreCountedWithoutPicturesToo) {
+  MapReport report = report_of("cart");
+  report.suspicious[0].svg.clear();
+  for (std::uint32_t i = 0; i < 7; ++i) {
+    report.suspicious.push_back(report.suspicious[0]);
+    report.suspicious.back().edge.id.frame.index = 100 + i;
+  }
+  client::Edge harmless;
+  harmless.suspicion = client::Suspicion{0.2, {}, {}};
+  report.suspicious.push_back({harmless});
+  EXPECT_EQ(report.suspicious_count(), 8u);
+  const std::string page = report_page(report);
+  EXPECT_THAT(page, HasSubstr("8 of those in force have a suspicion of 0.5 or more"));
+  EXPECT_THAT(page, Not(HasSubstr("A wrong one shows in its pictures"))) << "there are none";
+  const auto findings = findings_of(report);
+  EXPECT_THAT(findings, ::testing::Contains(HasSubstr("\"relmap edges --explain 2:7/1\" says why")));
+  EXPECT_THAT(findings, ::testing::Contains(HasSubstr("8 of those in force have a suspicion of 0.5 or more.")));
+}
+
 TEST(ReportPage, OfAnEmptyMapThereIsNothingToLookAt) {
   const MapReport empty;
   EXPECT_THAT(findings_of(empty), IsEmpty());

@@ -1,0 +1,221 @@
+#include "tools/relmap/map_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <unordered_map>
+
+#include "client/path_uncertainty.h"
+#include "tools/terminal/progress_bar.h"
+
+namespace relmap::cli {
+
+namespace {
+
+using client::Skeleton;
+
+constexpr std::size_t kMaxStrained = 10;
+
+// The covariance with these traces that is the same in all directions. A step without any would be infinitely stiff.
+Matrix6 isotropic(double translation_trace, double rotation_trace) {
+  constexpr double kLeast = 1e-10;
+  Vector6 diagonal;
+  diagonal << Vector3::Constant(std::max(translation_trace / 3, kLeast)),
+      Vector3::Constant(std::max(rotation_trace / 3, kLeast));
+  return diagonal.asDiagonal();
+}
+
+std::vector<Spring> skeleton_springs(const Skeleton& skeleton) {
+  std::vector<Spring> springs;
+  for (const Skeleton::Chain& chain : skeleton.chains)
+    for (std::size_t i = 1; i < chain.points.size(); ++i) {
+      const Skeleton::Point& point = chain.points[i];
+      Spring& spring = springs.emplace_back();
+      if (point.frames == 1) spring.edge = {point.frame, 0};
+      spring.kind = point.unmeasured ? client::EdgeKind::kPrior : client::EdgeKind::kOdometry;
+      spring.doubtful = point.unmeasured || point.carried;
+      spring.relaxed = {
+          chain.points[i - 1].frame, point.frame, point.T_before_this,
+          point.carried ? carried_covariance() : isotropic(point.translation_variance, point.rotation_variance),
+          client::RelaxationEdgeKind::kOdometry};
+    }
+  for (const Skeleton::Closure& closure : skeleton.closures) {
+    if (closure.state != client::EdgeState::kAccepted || !closure.carries) continue;
+    Spring& spring = springs.emplace_back();
+    spring.edge = closure.id;
+    spring.kind = client::EdgeKind::kLoop;
+    spring.relaxed = {closure.a, closure.id.frame, closure.T_ab,
+                      isotropic(closure.translation_variance, closure.rotation_variance),
+                      client::RelaxationEdgeKind::kLoop};
+  }
+  choose_pulling(springs);
+  return springs;
+}
+
+// Divides the step to `point` from the point before it: returns the point that is made of frame `index`, and makes
+// `point` the end of what follows it.
+Skeleton::Point divide(const Skeleton::Point& before, Skeleton::Point& point, std::uint32_t index) {
+  const double share =
+      static_cast<double>(index - before.frame.index) / static_cast<double>(point.frame.index - before.frame.index);
+  Skeleton::Point made = point;
+  made.frame.index = index;
+  made.time_us = before.time_us + std::llround(share * static_cast<double>(point.time_us - before.time_us));
+  made.T_before_this = SE3::exp(share * point.T_before_this.log());
+  made.translation_variance = share * point.translation_variance;
+  made.rotation_variance = share * point.rotation_variance;
+  made.frames = std::clamp(static_cast<std::uint32_t>(std::lround(share * point.frames)), 1u, point.frames - 1);
+  point.T_before_this = (made.T_before_this.inverse() * point.T_before_this).normalized();
+  point.translation_variance -= made.translation_variance;
+  point.rotation_variance -= made.rotation_variance;
+  point.frames -= made.frames;
+  return made;
+}
+
+// The strains of edges that the layout was made of and could have stretched.
+std::vector<Tear> strains_of(const MapShape& shape, const std::function<bool(const Spring&, const Tear&)>& wanted) {
+  std::vector<Tear> strains;
+  for (const Spring& spring : shape.springs) {
+    const SE3* const a = shape.find(spring.relaxed.a);
+    const SE3* const b = shape.find(spring.relaxed.b);
+    if (spring.doubtful || !a || !b) continue;
+    if (const Tear strain = strain_of(spring, spring.relaxed, *a, *b); wanted(spring, strain))
+      strains.push_back(strain);
+  }
+  sort_worst_first(strains);
+  return strains;
+}
+
+}  // namespace
+
+std::uint64_t MapShape::closures_in_force() const {
+  std::uint64_t count = 0;
+  for (const Skeleton::Closure& closure : skeleton.closures)
+    if (closure.state == client::EdgeState::kAccepted) count += closure.alike;
+  return count;
+}
+
+const SE3* MapShape::find(FrameId frame) const {
+  const auto found = at.find(frame);
+  return found == at.end() ? nullptr : &layout.parts[found->second.part].places[found->second.place].T_root_frame;
+}
+
+std::uint32_t level_for(std::uint64_t keyframes) {
+  if (keyframes <= 50'000) return 3;
+  if (keyframes <= 500'000) return 2;
+  return keyframes <= 3'000'000 ? 1 : 0;
+}
+
+Result<MapShape> read_map_shape(const ShapeChoice& choice, client::Client& client, terminal::Console& console) {
+  const terminal::Console::Aside aside(console);
+  MapShape shape;
+  auto chosen = read_chosen_sessions(choice.sessions, client, console);
+  if (!chosen.ok()) return chosen.status();
+  shape.chosen = std::move(chosen).value();
+  std::uint64_t keyframes = 0;
+  for (const auto& [number, session] : shape.chosen.sessions) keyframes += session.frames;
+  if (keyframes == 0) return nothing_to_place(shape.chosen.mono_sessions, "draw", "drawn");
+  client::SkeletonOptions options;
+  options.level = level_for(keyframes);
+  options.candidates = true;
+  if (!shape.chosen.all) options.sessions = shape.chosen.numbers();
+  terminal::ProgressBar bar(console.err(), terminal::is_terminal());
+  auto skeleton = client.skeleton(options, [&](const Skeleton& so_far) {
+    if (so_far.frames_done < so_far.frames)
+      bar.show("reading the map's shape", so_far.frames_done, so_far.frames, "keyframes");
+    return Status();
+  });
+  if (!skeleton.ok()) return skeleton.status();
+  shape.skeleton = std::move(skeleton).value();
+  if (!choice.removed)
+    std::erase_if(shape.skeleton.closures,
+                  [](const Skeleton::Closure& closure) { return closure.state == client::EdgeState::kRemoved; });
+  add_points(shape.skeleton, choice.points);
+  return shape;
+}
+
+Status lay_out(MapShape& shape) {
+  client::SkeletonLayout options;
+  if (shape.skeleton.points() == shape.keyframes()) options.relaxation = {};  // a small map is worth the time
+  auto layout = client::relax_skeleton(shape.skeleton, options);
+  if (!layout.ok()) return layout.status();
+  shape.layout = std::move(layout).value();
+  for (std::size_t part = 0; part < shape.layout.parts.size(); ++part)
+    for (std::size_t place = 0; place < shape.layout.parts[part].places.size(); ++place)
+      shape.at[shape.layout.parts[part].places[place].frame] = {part, place};
+  shape.springs = skeleton_springs(shape.skeleton);
+  return {};
+}
+
+void add_points(Skeleton& skeleton, std::vector<FrameId> frames) {
+  std::sort(frames.begin(), frames.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  for (Skeleton::Chain& chain : skeleton.chains) {
+    const auto begin = std::lower_bound(frames.begin(), frames.end(), chain.points.front().frame);
+    const auto end = std::lower_bound(begin, frames.end(), chain.points.back().frame);
+    if (begin == end) continue;
+    std::vector<Skeleton::Point> points;
+    points.reserve(chain.points.size() + static_cast<std::size_t>(end - begin));
+    auto wanted = begin;
+    for (Skeleton::Point& point : chain.points) {
+      for (; wanted != end && *wanted <= point.frame; ++wanted)
+        if (*wanted != point.frame && point.frames > 1) points.push_back(divide(points.back(), point, wanted->index));
+      points.push_back(point);
+    }
+    chain.points = std::move(points);
+  }
+}
+
+std::string shape_text(const MapShape& shape) {
+  const std::size_t points = shape.skeleton.points();
+  if (points == shape.keyframes()) return {};
+  return counted_text(points, "point") + " stand for " + counted_text(shape.keyframes(), "keyframe");
+}
+
+std::vector<Tear> tears_of(const MapShape& shape) {
+  return strains_of(shape, [](const Spring&, const Tear& strain) { return strain.sigmas > kTearSigmas; });
+}
+
+std::vector<Tear> strained_of(const MapShape& shape) {
+  std::vector<Tear> strained = strains_of(shape, [](const Spring& spring, const Tear& strain) {
+    return spring.kind == client::EdgeKind::kLoop && strain.sigmas > 1;
+  });
+  if (strained.size() > kMaxStrained) strained.resize(kMaxStrained);
+  return strained;
+}
+
+std::vector<std::vector<double>> uncertainty_of(const MapShape& shape) {
+  std::vector<std::vector<client::RelaxationEdge>> edges(shape.layout.parts.size());
+  for (const Spring& spring : shape.springs)
+    if (const auto at = shape.at.find(spring.relaxed.a); spring.pulls && at != shape.at.end())
+      edges[at->second.part].push_back(spring.relaxed);
+  std::vector<std::vector<double>> sigmas;
+  for (std::size_t p = 0; p < shape.layout.parts.size(); ++p) {
+    const client::RelaxedSkeleton::Part& part = shape.layout.parts[p];
+    std::vector<FrameId> frames;
+    for (const client::RelaxedSkeleton::Place& place : part.places) frames.push_back(place.frame);
+    sigmas.push_back(client::position_sigmas(frames, edges[p], part.root));
+  }
+  return sigmas;
+}
+
+std::map<std::string, std::uint64_t> keyframes_by_day(const Skeleton& skeleton) {
+  constexpr std::int64_t kDay = 86'400'000'000;
+  std::map<std::int64_t, std::uint64_t> days;
+  for (const Skeleton::Chain& chain : skeleton.chains)
+    for (std::size_t i = 0; i < chain.points.size(); ++i) {
+      const Skeleton::Point& point = chain.points[i];
+      const std::int64_t day = point.time_us / kDay;
+      const Skeleton::Point& before = chain.points[i > 0 ? i - 1 : 0];
+      if (i == 0 || before.time_us / kDay == day) {
+        days[day] += i == 0 ? 1 : point.frames;
+        continue;
+      }
+      for (std::uint32_t k = 1; k <= point.frames; ++k)
+        ++days[(before.time_us + (point.time_us - before.time_us) / point.frames * k) / kDay];
+    }
+  std::map<std::string, std::uint64_t> by_day;
+  for (const auto& [day, count] : days) by_day[time_text(day * kDay).substr(0, 10)] += count;
+  return by_day;
+}
+
+}  // namespace relmap::cli
