@@ -146,6 +146,8 @@ class FakeMap final : public v1::Map::Service {
     if (request->edge().ordinal() == 0) return refusal(Reason::ODOMETRY_EDGE, "the robot's own motion");
     *reply->mutable_edge()->mutable_id() = request->edge();
     *reply->mutable_edge()->mutable_a_from_b() = to_wire(SE3());
+    reply->mutable_edge()->set_kind(v1::EDGE_KIND_LOOP);
+    reply->mutable_edge()->set_state(v1::EDGE_STATE_ACCEPTED);
     if (request->pictures()) {
       reply->mutable_picture_a()->set_data("jpeg");
       reply->mutable_picture_a()->set_width(320);
@@ -162,6 +164,7 @@ class FakeMap final : public v1::Map::Service {
     reply->mutable_motion()->set_verdict(v1::REASON_CONTRADICTS_MOTION);
     reply->mutable_motion()->set_sigmas_apart(7);
     reply->add_agreements()->set_agrees(true);
+    reply->mutable_agreements(0)->set_state(v1::EDGE_STATE_ACCEPTED);
     return grpc::Status::OK;
   }
   // Two pages of one cell each.
