@@ -2,6 +2,9 @@
 
 #include <string>
 
+#include "relmap/v1/common.pb.h"
+#include "relmap/v1/graph.pb.h"
+
 namespace relmap::client {
 
 namespace {

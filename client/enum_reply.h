@@ -1,9 +1,16 @@
-// Enums of a daemon's reply. Internal to client/, since it exposes generated code.
+// Enums of a daemon's reply. Internal to client/.
 #pragma once
 
 #include "client/map_types.h"
-#include "relmap/v1/common.pb.h"
-#include "relmap/v1/graph.pb.h"
+
+namespace relmap::v1 {
+enum DoubtKind : int;
+enum EdgeKind : int;
+enum EdgeState : int;
+enum MotionSource : int;
+enum SessionState : int;
+enum Verification : int;
+}  // namespace relmap::v1
 
 namespace relmap::client {
 
