@@ -101,6 +101,7 @@ class FakeMap final : public v1::Map::Service {
       *step.mutable_frame() = to_wire(FrameId{1, i});
       if (i < 2) {
         *step.mutable_edge() = to_wire(EdgeId{{1, i + 1}, 0});
+        step.set_kind(v1::EDGE_KIND_ODOMETRY);
         *step.mutable_to_next() = to_wire(SE3());
       }
       if (i == 1) {  // in two messages, and sometimes the second is lost
@@ -122,6 +123,8 @@ class FakeMap final : public v1::Map::Service {
       v1::Edge& edge = *reply->add_edges();
       *edge.mutable_id() = to_wire(EdgeId{{1, static_cast<std::uint32_t>(2 * page + i)}, 1});
       *edge.mutable_a_from_b() = to_wire(SE3());
+      edge.set_kind(v1::EDGE_KIND_LOOP);
+      edge.set_state(v1::EDGE_STATE_ACCEPTED);
       edge.set_time_us(5);
       edge.mutable_suspicion()->set_value(0.5);
       edge.mutable_suspicion()->set_remark("accepted by an operator");
@@ -129,6 +132,7 @@ class FakeMap final : public v1::Map::Service {
       doubt.set_kind(v1::DOUBT_KIND_TENSION);
       doubt.set_weight(0.25);
       v1::EdgeEvent& event = *edge.add_history();
+      event.set_state(v1::EDGE_STATE_ACCEPTED);
       event.set_time_us(77);
       event.set_author("anna");
     }
@@ -142,6 +146,8 @@ class FakeMap final : public v1::Map::Service {
     if (request->edge().ordinal() == 0) return refusal(Reason::ODOMETRY_EDGE, "the robot's own motion");
     *reply->mutable_edge()->mutable_id() = request->edge();
     *reply->mutable_edge()->mutable_a_from_b() = to_wire(SE3());
+    reply->mutable_edge()->set_kind(v1::EDGE_KIND_LOOP);
+    reply->mutable_edge()->set_state(v1::EDGE_STATE_ACCEPTED);
     if (request->pictures()) {
       reply->mutable_picture_a()->set_data("jpeg");
       reply->mutable_picture_a()->set_width(320);
@@ -158,6 +164,7 @@ class FakeMap final : public v1::Map::Service {
     reply->mutable_motion()->set_verdict(v1::REASON_CONTRADICTS_MOTION);
     reply->mutable_motion()->set_sigmas_apart(7);
     reply->add_agreements()->set_agrees(true);
+    reply->mutable_agreements(0)->set_state(v1::EDGE_STATE_ACCEPTED);
     return grpc::Status::OK;
   }
   // Two pages of one cell each.
@@ -195,6 +202,8 @@ class FakeMap final : public v1::Map::Service {
         v1::Edge& step = *reply.add_unmeasured();
         *step.mutable_id() = to_wire(EdgeId{{1, 2}, 0});
         *step.mutable_a_from_b() = to_wire(SE3());
+        step.set_kind(v1::EDGE_KIND_PRIOR);
+        step.set_state(v1::EDGE_STATE_ACCEPTED);
         step.set_source(v1::MOTION_SOURCE_CONSTANT_VELOCITY);
         step.set_unmeasured(true);
       }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "client/enum_reply.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
@@ -125,11 +126,13 @@ Unmeasured read_unmeasured(const Way& message) {
   return unmeasured;
 }
 
-Suspicion read_suspicion(const v1::Suspicion& message) {
-  Suspicion suspicion{message.value(), {}, message.remark()};
-  for (const v1::Doubt& doubt : message.doubts())
-    suspicion.doubts.push_back({static_cast<DoubtKind>(doubt.kind()), doubt.weight(), doubt.message()});
-  return suspicion;
+Status read_suspicion(const v1::Suspicion& message, Suspicion& suspicion) {
+  suspicion = {message.value(), {}, message.remark()};
+  for (const v1::Doubt& doubt : message.doubts()) {
+    suspicion.doubts.push_back({{}, doubt.weight(), doubt.message()});
+    if (Status read = read_enum(doubt.kind(), suspicion.doubts.back().kind); !read.ok()) return read;
+  }
+  return {};
 }
 
 FramePicture read_picture(const v1::FramePicture& message) {
@@ -164,31 +167,38 @@ Result<Edge> read_edge(const v1::Edge& message) {
   edge.id = read_id(message.id());
   edge.a = read_id(message.a());
   edge.b = read_id(message.b());
-  edge.kind = static_cast<EdgeKind>(message.kind());
-  edge.state = static_cast<EdgeState>(message.state());
+  for (const Status& read :
+       {read_enum(message.kind(), edge.kind), read_enum(message.state(), edge.state),
+        read_enum(message.source(), edge.source), read_enum(message.verification(), edge.verification)})
+    if (!read.ok()) return read;
   edge.reason = reason_from_wire(message.reason());
   edge.carries = message.carries();
   edge.T_ab = *T;
   edge.covariance = read_covariance(message.covariance());
   edge.support = message.support();
   edge.prior_active = message.prior_active();
-  edge.source = static_cast<MotionSource>(message.source());
   edge.unmeasured = message.unmeasured();
   edge.driven_s = message.driven_s();
   edge.standing_s = message.standing_s();
-  edge.verification = static_cast<Verification>(message.verification());
   edge.inliers = message.inliers();
   edge.bound = message.bound();
   edge.probability = message.probability();
   edge.spread = message.spread();
   for (const v1::EdgeId& id : message.consistent_with()) edge.consistent_with.push_back(read_id(id));
-  for (const v1::EdgeEvent& event : message.history())
-    edge.history.push_back({event.journal_sequence(), static_cast<EdgeState>(event.state()),
-                            reason_from_wire(event.reason()), read_id(event.cause()), event.note(), event.time_us(),
+  for (const v1::EdgeEvent& event : message.history()) {
+    edge.history.push_back({event.journal_sequence(),
+                            {},
+                            reason_from_wire(event.reason()),
+                            read_id(event.cause()),
+                            event.note(),
+                            event.time_us(),
                             event.author()});
+    if (Status read = read_enum(event.state(), edge.history.back().state); !read.ok()) return read;
+  }
   for (const v1::EdgeId& id : message.carried_by()) edge.carried_by.push_back(read_id(id));
   if (message.has_carried()) edge.carried = read_carried(message.carried());
-  if (message.has_suspicion()) edge.suspicion = read_suspicion(message.suspicion());
+  if (message.has_suspicion())
+    if (Status read = read_suspicion(message.suspicion(), edge.suspicion.emplace()); !read.ok()) return read;
   edge.time_us = message.time_us();
   if (!message.has_uniqueness()) return edge;
   const v1::Uniqueness& found = message.uniqueness();
@@ -241,9 +251,11 @@ Result<EdgeExplanation> read_explanation(const v1::ExplainEdgeReply& message) {
     if (!verdict.ok()) return verdict.status();
     explained.motion = std::move(verdict).value();
   }
-  for (const v1::Agreement& agreement : message.agreements())
-    explained.agreements.push_back({read_id(agreement.edge()), read_id(agreement.a()), read_id(agreement.b()),
-                                    static_cast<EdgeState>(agreement.state()), agreement.agrees()});
+  for (const v1::Agreement& agreement : message.agreements()) {
+    explained.agreements.push_back(
+        {read_id(agreement.edge()), read_id(agreement.a()), read_id(agreement.b()), {}, agreement.agrees()});
+    if (Status read = read_enum(agreement.state(), explained.agreements.back().state); !read.ok()) return read;
+  }
   return explained;
 }
 
@@ -270,7 +282,8 @@ AuditEntry read_audit(const v1::AuditEntry& message) {
 
 EditEffect read_effect(const v1::EditEffect& message) {
   const auto state = [](v1::EdgeState wire) {
-    return wire == v1::EDGE_STATE_UNSPECIFIED ? std::nullopt : std::optional(static_cast<EdgeState>(wire));
+    EdgeState known = {};
+    return read_enum(wire, known).ok() ? std::optional(known) : std::nullopt;
   };
   EditEffect effect;
   for (const v1::ClosureChange& change : message.closures())
@@ -340,7 +353,7 @@ Result<Session> read_session(const v1::Session& message) {
   session.refused = message.refused();
   session.given_up = message.given_up();
   session.next_sequence = message.next_sequence();
-  session.state = static_cast<SessionState>(message.state());
+  if (Status read = read_enum(message.state(), session.state); !read.ok()) return read;
   return session;
 }
 
@@ -352,7 +365,7 @@ Result<Localisation> read_localisation(const v1::LocaliseReply& message) {
   found.T_frame_view = *T;
   found.covariance = read_covariance(message.covariance());
   found.inliers = message.inliers();
-  found.verification = static_cast<Verification>(message.verification());
+  if (Status read = read_enum(message.verification(), found.verification); !read.ok()) return read;
   found.probability = message.probability();
   found.spread = message.spread();
   found.new_place = message.new_place();
@@ -370,7 +383,7 @@ Result<PlaceMatches> read_matches(const v1::MatchImageReply& message) {
     PlaceMatch& match = matches.places.emplace_back();
     match.frame = read_id(place.frame());
     match.probability = place.probability();
-    match.verification = static_cast<Verification>(place.verification());
+    if (Status read = read_enum(place.verification(), match.verification); !read.ok()) return read;
     match.inliers = place.inliers();
     match.spread = place.spread();
     match.unverified = {reason_from_wire(place.reason()), place.message()};
@@ -430,7 +443,7 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message) {
   const auto T = from_wire(message.to_next());
   if (!T.ok()) return ill_formed("route", T.status());
   step.edge = read_id(message.edge());
-  step.kind = static_cast<EdgeKind>(message.kind());
+  if (Status read = read_enum(message.kind(), step.kind); !read.ok()) return read;
   step.T_to_next = *T;
   step.long_loop = message.long_loop();
   step.carried = message.carried();

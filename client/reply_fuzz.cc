@@ -171,9 +171,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 15:
       ask(ByteReader(bytes));
       break;
-    case 16:
-      read_as(bytes, read_event);
+    case 16: {
+      v1::MapEvent message;
+      if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) break;
+      const auto read = read_event(message);
+      check(read);
+      if (!read.ok() || !*read) break;
+      if (std::holds_alternative<SessionChanged>((*read)->what))
+        must(v1::SessionState_IsValid(message.session_changed().state()));
+      if (std::holds_alternative<FramesAdded>((*read)->what))
+        for (const v1::AddedFrame& frame : message.frames_added().frames())
+          must(v1::MotionSource_IsValid(frame.source()));
       break;
+    }
     default: {
       v1::GetSkeletonReply message;
       Skeleton skeleton;

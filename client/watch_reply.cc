@@ -1,3 +1,4 @@
+#include "client/enum_reply.h"
 #include "client/replies.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/watch.pb.h"
@@ -19,7 +20,7 @@ Result<FramesAdded> read_frames_added(const v1::FramesAdded& message) {
     if (!id.ok()) return ill_formed_event(id.status());
     read.frame = *id;
     read.time_us = frame.time_us();
-    read.source = static_cast<MotionSource>(frame.source());
+    if (const Status known = read_enum(frame.source(), read.source); !known.ok()) return known;
     if (!frame.has_previous_from_this()) continue;
     const auto T = from_wire(frame.previous_from_this());
     if (!T.ok()) return ill_formed_event(T.status());
@@ -35,17 +36,21 @@ FramesMoved read_frames_moved(const v1::FramesMoved& message) {
   return moved;
 }
 
-SessionChanged read_session_changed(const v1::Session& message) {
-  return {message.number(), message.uuid(), message.robot(), message.name(),
-          static_cast<SessionState>(message.state())};
+Result<SessionChanged> read_session_changed(const v1::Session& message) {
+  SessionChanged changed{message.number(), message.uuid(), message.robot(), message.name(), {}};
+  if (Status known = read_enum(message.state(), changed.state); !known.ok()) return known;
+  return changed;
 }
 
 Status read_what(const v1::MapEvent& message, WatchEvent& event) {
   using Kind = v1::MapEvent::EventCase;
   switch (message.event_case()) {
-    case Kind::kSessionChanged:
-      event.what = read_session_changed(message.session_changed());
+    case Kind::kSessionChanged: {
+      auto changed = read_session_changed(message.session_changed());
+      if (!changed.ok()) return changed.status();
+      event.what = std::move(*changed);
       break;
+    }
     case Kind::kFramesAdded: {
       auto added = read_frames_added(message.frames_added());
       if (!added.ok()) return added.status();

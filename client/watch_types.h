@@ -114,9 +114,12 @@ struct WatchEvent {
                WatchDisconnected>
       what;
   std::string resume_token;  // of the watch itself: that of the last event
-  // When the record that brought it about was submitted, UTC; 0: not of the log.
+  // When the record that brought it about was submitted, UTC; of frames added and moved and sequences skipped, when it
+  // was committed; 0: not of the log.
   std::int64_t time_us = 0;
-  std::string author;  // the name in the caller's credentials; empty: a robot's own stream, or the daemon
+  // The name in the caller's credentials, or "relmapd" for what no caller did: the daemon itself, or a robot's own
+  // stream. Of what goes with a deleted session, who deleted it. Empty: not of the log.
+  std::string author;
   std::uint64_t journal_sequence = 0;  // of that record
   std::string note;                    // an operator's
 };

@@ -224,6 +224,10 @@ int run(const CommandLine& line, Config config) {
   relmap::monitor::ServiceManager manager;
   limit_connections(config);
   auto daemon = relmap::ops::Daemon::start(config);
+  if (daemon.reason() == Reason::SHUTTING_DOWN) {
+    spdlog::info("stopped: {}", daemon.status().message());
+    return 0;
+  }
   if (!daemon.ok()) return fail(daemon.status());
   const auto state = [&] {
     return relmap::monitor::ServiceManager::State{(*daemon)->health().live, (*daemon)->status_line()};

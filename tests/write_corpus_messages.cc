@@ -427,6 +427,13 @@ void write_replies(const std::string& root) {
     fill(*event.GetReflection()->MutableMessage(&event, events.field(i)));
     replies.add("event_" + events.field(i)->name(), {16}, as_bytes(event.SerializeAsString()));
   }
+  v1::MapEvent unknown;
+  unknown.mutable_session_changed()->set_state(static_cast<v1::SessionState>(257));
+  replies.add("event_with_unknown_state_of_session", {16}, as_bytes(unknown.SerializeAsString()));
+  v1::AddedFrame& added = *unknown.mutable_frames_added()->add_frames();
+  added.mutable_frame()->set_session(1);
+  added.set_source(static_cast<v1::MotionSource>(257));
+  replies.add("event_with_unknown_source_of_motion", {16}, as_bytes(unknown.SerializeAsString()));
   add_message<v1::ClosureMatrixCell>(replies, 12);
   add_message<v1::AuditEntry>(replies, 13);
   replies.add("list_edges", {14, 3, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x40, 5, 0, 0, 0, 0, 0, 0, 0, 9});

@@ -113,6 +113,8 @@ void write_journal_records(const std::string& root) {
   tags::add_map_identity(all, {Uuid{{1, 2}}, 9});
   tags::add_before_frozen(all, SessionState::kEnded);
   tags::add_shown(all, 17);
+  tags::add_digests_commit(all, 12);
+  tags::add_digests_made(all, {12, {1, 3}, 200});
   tags::add_edit_key(all, {"an edit", 1});
   tags::add_submission(all, 1'700'000'000'000'000, "ann");
   std::sort(all.begin(), all.end(), [](const Extension& a, const Extension& b) { return a.tag < b.tag; });

@@ -674,7 +674,7 @@ ClosureChange apply_proposal(storage::EditableGraph& map, std::uint64_t sequence
 }
 
 ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, const storage::UnseenRecord& record,
-                           std::uint32_t loop_edge_spacing, const storage::Submission& submitted) {
+                           std::uint32_t loop_edge_spacing) {
   const auto closure = storage::find_edge(map, record.closure);
   if (!closure || closure->kind != storage::EdgeKind::kLoop || closure->state != storage::EdgeState::kAccepted ||
       record.frame.session != closure->b.session || record.frame.index <= closure->b.index || !map.hot(record.frame) ||
@@ -693,7 +693,7 @@ ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, 
   }
   if (unseen.size() < kMinUnseen || unseen.size() <= set.size() || decided_among(map, set)) return {};
   return change_states(map, quarantined(map, {}, {}, set, Reason::NOT_SEEN_BEYOND),
-                       {sequence, closure->id, {}, submitted}, loop_edge_spacing);
+                       {sequence, closure->id, {}, record.submitted}, loop_edge_spacing);
 }
 
 ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record) {

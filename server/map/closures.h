@@ -46,10 +46,8 @@ ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingR
 // Notes that the frame saw nothing of where the closure leads (unseen.h). When more frames have seen nothing than
 // closures agree, the closure and those that agree with it go out of force (NOT_SEEN_BEYOND), and are no witnesses any
 // more. Changes nothing if the closure is not accepted, or if an operator put one of them into force.
-// `submitted`: of the record.
 ClosureChange apply_unseen(storage::EditableGraph& map, std::uint64_t sequence, const storage::UnseenRecord& record,
-                           std::uint32_t loop_edge_spacing = kLoopEdgeSpacing,
-                           const storage::Submission& submitted = {});
+                           std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
 // Adds to `frames` every frame with an observation whose landmark or validity changes through bindings of `closure`, if
 // exactly the closures for which `holds` returns true are in force. `known` holds the landmarks that have been

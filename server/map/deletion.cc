@@ -36,8 +36,13 @@ struct Fact {
 // Removes one chunk from the map.
 class Deletion {
  public:
-  Deletion(storage::Map& map, std::uint64_t sequence, SessionNumber session, std::uint32_t spacing)
-      : map_(map), sequence_(sequence), session_(*map.session(session)), spacing_(spacing), local_(map) {
+  Deletion(storage::Map& map, std::uint64_t sequence, const storage::RemoveChunkRecord& record, std::uint32_t spacing)
+      : map_(map),
+        sequence_(sequence),
+        submitted_(record.submitted),
+        session_(*map.session(record.session)),
+        spacing_(spacing),
+        local_(map) {
     find_frames();
     find_closures();
     find_affected();
@@ -111,6 +116,7 @@ class Deletion {
 
   storage::Map& map_;
   const std::uint64_t sequence_;
+  const storage::Submission submitted_;  // of the record
   const storage::Session session_;
   const std::uint32_t spacing_;
   storage::LocalGraph local_;  // valid until edges change
@@ -562,7 +568,13 @@ storage::Edge Deletion::add_compounded(storage::Edge edge) {
   edge.verification = storage::Verification::kCompounded;
   storage::FrameHot& hot = map_.edit_hot(edge.b);
   edge.id = {edge.b, hot.next_loop_ordinal++};
-  edge.history.push_back({sequence_, storage::EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}, 0, {}});
+  edge.history.push_back({sequence_,
+                          storage::EdgeState::kAccepted,
+                          Reason::SESSION_DELETED,
+                          edge.id,
+                          {},
+                          submitted_.time_us,
+                          submitted_.author});
   hot.edges.push_back(edge);
   insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
   ++map_.state().closures_accepted;
@@ -575,7 +587,8 @@ storage::Edge Deletion::add_compounded(storage::Edge edge) {
 std::optional<storage::RemoveChunkRecord> next_deletion(const storage::Session& session) {
   if (!storage::is_going(session) || (session.frames == 0 && session.refused == 0 && session.given_up == 0))
     return std::nullopt;
-  return storage::RemoveChunkRecord{session.number, storage::chunk_of({session.number, session.last})};
+  return storage::RemoveChunkRecord{
+      session.number, storage::chunk_of({session.number, session.last}), {}, {0, session.deleted_by}};
 }
 
 ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const storage::RemoveChunkRecord& record,
@@ -587,7 +600,7 @@ ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const st
     map.forget_skipped(record.session, kSkippedAtOnce);
     return {};
   }
-  return Deletion(map, sequence, record.session, loop_edge_spacing).run();
+  return Deletion(map, sequence, record, loop_edge_spacing).run();
 }
 
 }  // namespace relmap::map

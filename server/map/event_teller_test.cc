@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/map/deletion.h"
 #include "server/map/edge_edit.h"
 #include "server/map/testing/two_laps.h"
 #include "storage/events/event_block.h"
@@ -166,6 +167,40 @@ TEST_F(Telling, TheHistoryOfAClosureSaysWhenAndByWhomAndTheHashDoesNot) {
   EXPECT_EQ(closure(62).history[0].time_us, kTime) << "as it was read from disk";
   EXPECT_EQ(closure(62).history[1].author, "ann");
   EXPECT_EQ(closure(62).history[1].time_us, kTime + 5);
+}
+
+TEST_F(Telling, WhoDeletesASessionIsToldWithAllThatGoes) {
+  for (const std::uint32_t query : {62u, 64u}) propose(query);
+  (void)told();
+  const storage::MapHash hash = [&] {
+    drive_.apply(storage::SetSessionStateRecord{kDriveSession, storage::SessionState::kDeleting, {}, {}, by("ann")});
+    return storage::hash_map(drive_.map());
+  }();
+  EXPECT_EQ(drive_.map().session(kDriveSession)->deleted_by, "ann");
+  drive_.map().edit_session(kDriveSession).deleted_by = "somebody else";
+  drive_.map().publish();
+  EXPECT_EQ(storage::hash_map(drive_.map()), hash) << "it is not part of what the map is";
+  drive_.map().edit_session(kDriveSession).deleted_by = "ann";
+  drive_.map().publish();
+  (void)told();
+  while (auto next = next_deletion(*drive_.map().session(kDriveSession))) {
+    EXPECT_EQ(next->submitted, (storage::Submission{0, "ann"}));
+    next->submitted.time_us = kTime;
+    drive_.apply(*next);
+    if (const auto session = drive_.map().session(kDriveSession); !storage::is_deleted(*session)) {
+      EXPECT_EQ(session->deleted_by, "ann");
+    }
+  }
+  EXPECT_EQ(drive_.map().session(kDriveSession)->deleted_by, "") << "nothing is left to be told";
+  const auto events = told();
+  expect_told_all();
+  EXPECT_EQ(all_of<storage::SessionDeletedEvent>(events).size(), 1u);
+  EXPECT_GE(all_of<storage::FramesRemovedEvent>(events).size(), 2u);
+  EXPECT_GE(all_of<storage::ClosureRemovedEvent>(events).size(), 2u);
+  for (const Event& event : events)
+    if (event.at.ordinal != storage::kMovedOrdinal) {
+      EXPECT_EQ(event.submitted, by("ann"));
+    }
 }
 
 // A map over a disk that loses power. The journal, which a test keeps itself, is applied again from the last commit.

@@ -214,7 +214,8 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::ClosureP
   return recorded([&](storage::EditableGraph& map) {
     ClosureChange change = apply_proposal(map, sequence, record, loop_edge_spacing_, rules_);
     if (record.unseen.valid())
-      change.append(apply_unseen(map, sequence, {record.query, record.unseen}, loop_edge_spacing_, record.submitted));
+      change.append(
+          apply_unseen(map, sequence, {record.query, record.unseen, {}, record.submitted}, loop_edge_spacing_));
     return change;
   });
 }
@@ -253,6 +254,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const storage::SetSessionStateRe
   const bool thaws = storage::is_frozen(*session) && record.state == storage::SessionState::kOpen;
   edited.state = thaws ? session->before_frozen : record.state;
   edited.before_frozen = record.state == storage::SessionState::kFrozen ? session->state : storage::SessionState::kOpen;
+  if (storage::is_going(edited)) edited.deleted_by = record.submitted.author;
   if (storage::is_deleted(edited)) storage::shrink_deleted(edited);
   freeze(edited);
   return {};

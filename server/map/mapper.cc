@@ -63,7 +63,7 @@ struct Mapper::Impl {
   DeterministicDriver::Hooks driver_hooks();
 
   Status load();
-  void make_digests();
+  Status make_digests();
   void give_identity();
   void recover();
   void start();
@@ -239,7 +239,8 @@ Status Mapper::Impl::load() {
   auto opened = storage::Map::open(engine, epoch, budget, options.events);
   if (!opened.ok()) return opened.status();
   map = *std::move(opened);
-  if (read_only.ok() && !map->digests_hold()) make_digests();
+  if (read_only.ok() && !map->digests_hold())
+    if (Status made = make_digests(); !made.ok()) return made;
   commits.open(*map);
   map->watch_edits(
       [this](std::uint64_t version, std::span<const storage::ChunkId> chunks) { edits.edited(version, chunks); });
@@ -260,25 +261,31 @@ Status Mapper::Impl::load() {
   return {};
 }
 
-// Makes the digests of a map that a version without them wrote to last. Without them pictures of the map take longer.
-void Mapper::Impl::make_digests() {
+// Makes the digests of a map that a version without them wrote to last, or those that an earlier start did not get to.
+// Without them pictures of the map take longer. SHUTTING_DOWN if the daemon is to stop meanwhile.
+Status Mapper::Impl::make_digests() {
   using std::chrono::duration;
   const Clock::time_point begun = Clock::now();
   Clock::time_point told = begun;
   const std::uint64_t frames = map->state().keyframes;
   spdlog::info("the map has no digests of its {} frames, or they are of an earlier commit: they are made now", frames);
-  const Status made = map->rebuild_digests([&](std::uint64_t done, std::uint64_t total) {
+  bool left = false;
+  const Status made = map->complete_digests([&](std::uint64_t done, std::uint64_t total) {
     if (const Clock::time_point now = Clock::now(); now - told > std::chrono::seconds(5)) {
       told = now;
       spdlog::info("digests: {} of {} frames", done, total);
     }
-    return true;
+    left = options.leaving && options.leaving();
+    if (left) spdlog::info("digests of {} of {} frames are made; the next start makes the others", done, total);
+    return !left;
   });
+  if (left) return {Reason::SHUTTING_DOWN, "the daemon was told to stop while it was starting"};
   if (made.ok())
     spdlog::info("digests of {} frames were made in {:.1f} s", frames, duration<double>(Clock::now() - begun).count());
   else
     spdlog::warn("no digests were made, so pictures of the map take longer, until the next start: {}",
                  made.to_string());
+  return {};
 }
 
 // Gives a new map its identity. It is told only once it is durable, so that a crash cannot take it back.
@@ -485,7 +492,9 @@ std::optional<std::uint64_t> Mapper::Impl::append_patiently(const storage::Journ
 std::optional<storage::RemoveChunkRecord> Mapper::Impl::next_removal_patiently() {
   while (background.removal_is_held_back())
     if (failed || !wait_for_disk()) return std::nullopt;
-  return background.next_removal();
+  auto removal = background.next_removal();
+  if (removal) removal->submitted.time_us = now_us();
+  return removal;
 }
 
 // Makes the map read-only, for example because a part of it could not be read while a record was applied. Acknowledged

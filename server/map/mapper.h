@@ -43,6 +43,9 @@ struct MapperOptions {
   // memory only, within its share.
   std::string folder;
   storage::EventLimits events = {};  // of the log of events
+  // Asked again and again while open() does work that can wait until the next start; true: open() leaves it and returns
+  // SHUTTING_DOWN. Empty: never.
+  std::function<bool()> leaving = {};
 };
 
 struct MapperStats {
@@ -81,7 +84,8 @@ struct MapperProgress {
 class Mapper {
  public:
   // Acquires the engine, loads the map, re-applies the journal and starts the threads. A map that can only be read, or
-  // whose journal cannot be re-applied in full, is served READ_ONLY.
+  // whose journal cannot be re-applied in full, is served READ_ONLY. SHUTTING_DOWN if `options.leaving` says so: what
+  // was written by then is right.
   static Result<std::unique_ptr<Mapper>> open(std::shared_ptr<storage::Engine> engine,
                                               std::shared_ptr<storage::Budget> budget,
                                               std::shared_ptr<const place::Vocabulary> vocabulary,

@@ -17,6 +17,10 @@
 #include "server/map/derived.h"
 #include "server/map/lookup_queue.h"
 #include "server/map/testing/points_drive.h"
+#include "storage/engine/memory_engine.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
+#include "storage/testing/digest_oracle.h"
 #include "storage/testing/event_follower.h"
 #include "storage/testing/fault_engine.h"
 #include "storage/testing/faulty_files.h"
@@ -108,6 +112,41 @@ TEST(Mapper, TheIdentityOfAMapNeverChanges) {
   }
   EXPECT_EQ(open_mapper(engine)->identity(), first);
   EXPECT_NE(open_mapper(storage::make_memory_engine())->identity().uuid, first.uuid);
+}
+
+TEST(Mapper, AStopWhileDigestsAreMadeLeavesTheRestToTheNextStart) {
+  const sim::PointsWorld world(small_world(200));
+  const auto engine = storage::make_memory_engine();
+  storage::MapHash hash;
+  {
+    const auto mapper = open_mapper(engine);
+    ASSERT_TRUE(feed(*mapper, world, 0, 200).ok());
+    hash = storage::hash_map(*mapper->view());
+    ASSERT_TRUE(mapper->stop().ok());
+  }
+  auto state = storage::decode_state(engine->snapshot()->get(storage::keys::map_state()).value().value()).or_throw();
+  EXPECT_NE(state.digests_commit, 0u);
+  state.digests_commit = 0;
+  const storage::Put put{storage::keys::map_state(), storage::encode_state(state)};
+  ASSERT_TRUE(
+      engine->commit(engine->acquire().or_throw(), state.applied_sequence, std::vector<storage::Put>{put}, {}).ok());
+
+  MapperOptions options;
+  options.closures = false;
+  std::size_t asked = 0;
+  options.leaving = [&] { return ++asked == 3; };
+  const auto open = [&] {
+    return Mapper::open(engine, std::make_shared<storage::Budget>(64u << 20), nullptr, options);
+  };
+  EXPECT_EQ(open().reason(), Reason::SHUTTING_DOWN);
+  EXPECT_EQ(asked, 3u) << "it is asked after each chunk";
+  asked = 3;
+  const auto mapper = open().or_throw();
+  EXPECT_EQ(asked, 4u) << "the next start made the one that was left";
+  EXPECT_EQ(storage::hash_map(*mapper->view()), hash);
+  EXPECT_EQ(storage::digests_visited(*mapper->view()), storage::digests_of_frames(*mapper->view()));
+  state = storage::decode_state(engine->snapshot()->get(storage::keys::map_state()).value().value()).or_throw();
+  EXPECT_EQ(state.digests_commit, engine->snapshot()->commit_number());
 }
 
 // So that a user who keeps data derived from the map between runs misses no edit.
@@ -286,6 +325,39 @@ TEST(Mapper, WhenAndByWhomOutlastsARestart) {
   });
   ASSERT_NE(label, follower.events().end());
   EXPECT_EQ(label->submitted, (storage::Submission{123, "bob"}));
+}
+
+// The deletion is stopped by the end of the daemon, whether it has begun by then or not, and goes on at the next start.
+TEST(Mapper, WhoDeletedASessionOutlastsARestart) {
+  const sim::PointsWorld world(small_world(300));
+  const auto engine = storage::make_memory_engine();
+  std::int64_t begun = 0;
+  {
+    const auto mapper = open_mapper(engine);
+    ASSERT_TRUE(feed(*mapper, world, 0, 300).ok());
+    storage::SetSessionStateRecord deleting{mapper->view()->sessions().at(0).number, storage::SessionState::kDeleting};
+    deleting.submitted.author = "ann";
+    begun = now_us();
+    (void)mapper->submit_and_wait(deleting).or_throw();
+    ASSERT_TRUE(mapper->stop().ok());
+  }
+  const auto mapper = open_mapper(engine);
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  (void)mapper->commit(soon()).or_throw();
+  storage::EventFollower follower;
+  follower.follow(*mapper->view()->committed());
+  EXPECT_EQ(follower.map(), storage::ToldMap::of(*mapper->view()));
+  std::size_t told = 0;
+  for (const storage::Event& event : follower.events()) {
+    if (!std::holds_alternative<storage::FramesRemovedEvent>(event.content) &&
+        !std::holds_alternative<storage::SessionDeletedEvent>(event.content))
+      continue;
+    ++told;
+    EXPECT_EQ(event.submitted.author, "ann");
+    EXPECT_GE(event.submitted.time_us, begun);
+    EXPECT_LE(event.submitted.time_us, event.committed_us);
+  }
+  EXPECT_EQ(told, 6u) << "five chunks, and the session";
 }
 
 TEST(Mapper, ASessionKeepsItsCalibration) {

@@ -110,9 +110,11 @@ TEST_F(GoesOn, AClosureOutOfForceLeadsNowhere) {
 
 class Unseen : public TwoLaps {
  protected:
+  static constexpr std::int64_t kTime = 1'700'000'000'000'000;
+
   void not_seen(std::uint32_t first, std::uint32_t count, std::uint32_t query) {
     for (std::uint32_t i = first; i < first + count; ++i)
-      drive_.apply(storage::UnseenRecord{{kDriveSession, i}, closure(query).id});
+      drive_.apply(storage::UnseenRecord{{kDriveSession, i}, closure(query).id, {}, {kTime + i, {}}});
   }
 };
 
@@ -127,6 +129,7 @@ TEST_F(Unseen, ClosuresGoOutOfForceWhenMoreFramesSeeNothingThanClosuresAgree) {
   for (const std::uint32_t query : {62, 63, 64}) {
     EXPECT_EQ(state(query), storage::EdgeState::kQuarantined) << query;
     EXPECT_EQ(closure(query).reason, Reason::NOT_SEEN_BEYOND) << query;
+    EXPECT_EQ(closure(query).history.back().time_us, kTime + 77) << "when the record was submitted that decided";
   }
   EXPECT_EQ(closure(64).unseen.size(), 8u);
   expect_derived_facts_hold();

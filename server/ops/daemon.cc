@@ -24,6 +24,7 @@
 #include "server/ops/private_folder.h"
 #include "server/ops/process.h"
 #include "server/ops/settings.h"
+#include "server/ops/signals.h"
 #include "server/ops/socket_path.h"
 #include "server/route/overlay/route_index.h"
 #include "server/rpc/handshake_log.h"
@@ -185,6 +186,7 @@ Status Daemon::Impl::open_map() {
   map::MapperOptions map_options = config.map;
   map_options.folder = config.data;
   map_options.events.max_bytes = config.events_max_mb << 20;
+  map_options.leaving = is_told_to_stop;
   auto opened = map::Mapper::open(*engine, budget, *vocabulary, map_options);
   if (!opened.ok()) return opened.status();
   mapper = std::move(opened).value();

@@ -15,7 +15,7 @@ class Daemon {
   // configuration has a URL, and writes DIR/endpoint. If LCM cannot start, the log and the status name the reason and
   // the daemon serves without it. BAD_CONFIG, FOLDER_LOCKED, PORT_IN_USE, NO_SUCH_FILE (the vocabulary),
   // WRONG_VOCABULARY, and for the folder NOT_A_MAP (nothing is written to it then), IO_ERROR, DATA_LOSS,
-  // UNKNOWN_FORMAT_VERSION.
+  // UNKNOWN_FORMAT_VERSION. SHUTTING_DOWN if the process is told to stop (signals.h) during work that can wait.
   static Result<std::unique_ptr<Daemon>> start(const Config& config);
   // Checks the configuration, the files that it names, and whether the data folder is a map or may become one, with the
   // errors of start(). Writes nothing and takes no lock and no port.

@@ -4,10 +4,18 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <span>
 #include <sstream>
+
+#include "server/ops/signals.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
+#include "storage/map/map.h"
+#include "storage/rocksdb/rocksdb_engine.h"
 
 namespace relmap::ops {
 namespace {
@@ -59,6 +67,51 @@ TEST_F(DaemonTest, ReleasesTheFolderWhenItStops) {
     auto daemon = Daemon::start(config_);
     ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
   }
+}
+
+// A map that a program without digests wrote to last, and a signal that comes while the daemon starts.
+TEST_F(DaemonTest, StopsWhileItMakesDigestsAndMakesThemAtTheNextStart) {
+  {
+    auto daemon = Daemon::start(config_);
+    ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
+  }
+  const auto digests_hold = [&](bool forget) {
+    const auto engine = storage::open_rocksdb(config_.data, {}).or_throw();
+    const std::uint64_t epoch = engine->acquire().or_throw();
+    const auto map = storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(64u << 20)).or_throw();
+    if (forget) {
+      storage::Session session;
+      session.number = session.frames = 1;
+      map->add_session(session);
+      map->add_frame({1, 0}, {}, {}, {});
+      map->state().keyframes = 1;
+      EXPECT_TRUE(map->commit().ok());
+      storage::MapState state = map->state();
+      state.digests_commit = 0;
+      const storage::Put put{storage::keys::map_state(), storage::encode_state(state)};
+      EXPECT_TRUE(engine->commit(epoch, engine->applied_sequence(), std::span(&put, 1), {}).ok());
+    }
+    return map->digests_hold();
+  };
+  digests_hold(/*forget=*/true);
+  EXPECT_FALSE(digests_hold(/*forget=*/false));
+  block_stop_signals();
+  EXPECT_FALSE(is_told_to_stop());
+  raise(SIGHUP);
+  EXPECT_FALSE(is_told_to_stop()) << "which is no reason to stop";
+  raise(SIGTERM);
+  EXPECT_TRUE(is_told_to_stop());
+  EXPECT_EQ(Daemon::start(config_).reason(), Reason::SHUTTING_DOWN);
+  EXPECT_EQ(wait_for_signal(std::chrono::milliseconds(0)), SIGHUP);
+  EXPECT_EQ(wait_for_signal(std::chrono::milliseconds(0)), SIGTERM);
+  EXPECT_FALSE(is_told_to_stop());
+  EXPECT_FALSE(digests_hold(/*forget=*/false));
+  EXPECT_FALSE(std::filesystem::exists(config_.data + "/endpoint"));
+  auto daemon = Daemon::start(config_);
+  ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
+  EXPECT_TRUE((*daemon)->stop().ok());
+  daemon->reset();
+  EXPECT_TRUE(digests_hold(/*forget=*/false));
 }
 
 TEST_F(DaemonTest, ASecondDaemonOnTheFolderFailsAndDoesNotDisturbTheFirst) {

@@ -29,6 +29,13 @@ void block_stop_signals() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
+bool is_told_to_stop() {
+  sigset_t pending;
+  sigemptyset(&pending);
+  sigpending(&pending);
+  return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
+}
+
 std::optional<int> wait_for_signal(std::chrono::milliseconds timeout) {
   const sigset_t set = all_signals(), stop = stop_signals();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);

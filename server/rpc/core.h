@@ -101,6 +101,8 @@ struct Intake {
   std::function<IngestFacts()> facts;      // empty if nothing is counted
 };
 
+struct SeenEnds;  // route_request.h
+
 // A route that is being streamed, with its alternatives; it is kept as long as its stream may be resumed.
 struct FoundRoute {
   FoundRoute(storage::Budget& budget, std::uint64_t n) : number(n), charge(budget, storage::Share::kReplies) {}
@@ -109,7 +111,8 @@ struct FoundRoute {
   std::shared_ptr<const storage::MapView> view;
   route::RouteAnswer answer;
   std::vector<route::Alternative> alternatives;
-  std::uint32_t fingerprint = 0;  // of the request without its ends
+  std::shared_ptr<const SeenEnds> from, to;  // the ends that are views
+  std::uint32_t fingerprint = 0;             // of the request without its ends
   std::uint32_t ends_fingerprint = 0;
   Charge charge;
 

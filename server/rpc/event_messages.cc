@@ -71,7 +71,7 @@ v1::MapEvent event_message(const storage::Event& event) {
   std::visit([&](const auto& content) { put(content, message); }, event.content);
   // Records of a robot's own stream do not say when they were submitted.
   message.set_time_us(event.submitted.time_us != 0 ? event.submitted.time_us : event.committed_us);
-  message.set_author(event.submitted.author);
+  message.set_author(author_name(event.submitted.author));
   message.set_journal_sequence(event.at.sequence);
   message.set_note(event.note);
   return message;

@@ -419,6 +419,29 @@ TEST_F(Handlers, RoutesKeepToTheirFilter) {
   EXPECT_EQ(reason(request), Reason::NOT_CONNECTED);
 }
 
+TEST_F(Handlers, OnlySoManySessionsAreNamedInOneRequest) {
+  const auto refusal = [&](auto handler, auto request, auto* sessions) {
+    for (int i = 0; i < kMaxNamedSessions; ++i) sessions(request)->Add(1);
+    EXPECT_TRUE(call(*map_.core, handler, request, deadline_).ok()) << "as many as may be, one of them again and again";
+    sessions(request)->Add(1);
+    return call(*map_.core, handler, request, deadline_).status();
+  };
+  v1::FindRouteRequest way;
+  *way.mutable_from()->mutable_frame() = wire({1, 3});
+  *way.mutable_to()->mutable_frame() = wire({1, 9});
+  for (const Status& refused :
+       {refusal(
+            find_route, way, +[](v1::FindRouteRequest& r) { return r.mutable_filter()->mutable_sessions(); }),
+        refusal(
+            get_closure_matrix, v1::GetClosureMatrixRequest(),
+            +[](v1::GetClosureMatrixRequest& r) { return r.mutable_sessions(); }),
+        refusal(
+            get_skeleton, v1::GetSkeletonRequest(), +[](v1::GetSkeletonRequest& r) { return r.mutable_sessions(); })}) {
+    EXPECT_EQ(refused.reason(), Reason::INVALID_ARGUMENT);
+    EXPECT_EQ(refused.message(), "more than 10000 sessions");
+  }
+}
+
 TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
   RpcLimits limits;
   limits.route_steps_per_message = 5;
@@ -469,6 +492,47 @@ TEST_F(Handlers, ABrokenRouteStreamResumesWhereItBroke) {
   }
   EXPECT_EQ(at, whole.size());
   EXPECT_TRUE(call(core, find_route, rest_of_it, deadline_).ok()) << "its end may not have arrived";
+}
+
+TEST_F(Handlers, AResumedRouteStreamSaysWhatTheUnbrokenOneSaidOfViewsToo) {
+  RpcLimits limits;
+  limits.route_steps_per_message = 7;
+  Core core(*map_.mapper, map_.core->facts, limits);
+  const sim::PointsWorld robot = again();
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_view() = view_of(robot, 10);
+  *request.mutable_to()->mutable_view() = view_of(robot, 10 + ServedMap::kLap * 9 / 20);
+  *request.add_or_to()->mutable_view() = view_of(robot, 12 + ServedMap::kLap * 9 / 20);
+  request.set_alternatives(3);
+  const auto messages_of = [&](const v1::FindRouteRequest& asked) {
+    std::vector<v1::FindRouteReply> messages;
+    auto stream = call(core, find_route, asked, deadline_).or_throw();
+    while (auto message = stream().or_throw()) messages.push_back(*std::move(message));
+    return messages;
+  };
+  const std::vector<v1::FindRouteReply> messages = messages_of(request);
+  ASSERT_FALSE(messages.empty());
+  EXPECT_GE(messages.back().route(), 1u) << "there is the other way around";
+  for (const v1::FindRouteReply& message : messages) {
+    if (!message.has_summary()) continue;
+    EXPECT_EQ(message.summary().from_view().frame().SerializeAsString(), message.summary().from().SerializeAsString());
+    EXPECT_EQ(message.summary().to_view().frame().SerializeAsString(), message.summary().to().SerializeAsString());
+    EXPECT_GE(message.summary().to_view().inliers(), 20u);
+  }
+  for (const bool with_ends : {true, false})
+    for (std::size_t i = 0; i + 1 < messages.size(); ++i) {
+      v1::FindRouteRequest rest = request;
+      rest.set_resume_token(messages[i].resume_token());
+      if (!with_ends) {
+        rest.clear_from();
+        rest.clear_to();
+        rest.clear_or_to();
+      }
+      const std::vector<v1::FindRouteReply> told = messages_of(rest);
+      ASSERT_EQ(told.size(), messages.size() - i - 1);
+      for (std::size_t j = 0; j < told.size(); ++j)
+        EXPECT_EQ(told[j].SerializeAsString(), messages[i + 1 + j].SerializeAsString());
+    }
 }
 
 TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {

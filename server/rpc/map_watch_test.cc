@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/rpc/event_messages.h"
 #include "server/rpc/testing/scripted_feed.h"
 #include "server/rpc/watch_token.h"
 
@@ -92,6 +93,15 @@ class MapWatchTest : public ::testing::Test {
   ScriptedLog log_;
   MapWatch::Clock::time_point now_ = MapWatch::Clock::now();
 };
+
+TEST_F(MapWatchTest, WhatNoCallerDidIsOfRelmapdAndWhatSaysNotWhenOfItsCommit) {
+  storage::Event event{{7, 0}, {5, "anna"}, "a mirror", storage::ClosureRemovedEvent{{{1, 9}, 1}}, 77};
+  EXPECT_EQ(event_message(event).time_us(), 5);
+  EXPECT_EQ(event_message(event).author(), "anna");
+  event.submitted = {};
+  EXPECT_EQ(event_message(event).time_us(), 77);
+  EXPECT_EQ(event_message(event).author(), "relmapd");
+}
 
 TEST_F(MapWatchTest, TellsEveryKindOfEventWithWhoDidIt) {
   const storage::EventContent contents[] = {

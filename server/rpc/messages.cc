@@ -117,12 +117,14 @@ v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us) {
     added.set_note(event.note);
     if (event.time_us == 0) continue;
     added.set_time_us(event.time_us);
-    added.set_author(event.author.empty() ? "relmapd" : event.author);  // what no operator did, the daemon did
+    added.set_author(author_name(event.author));
   }
   tell_suspicion(edge, message);
   message.set_time_us(time_us);
   return message;
 }
+
+std::string author_name(const std::string& author) { return author.empty() ? "relmapd" : author; }
 
 v1::Session session_message(const storage::Session& session) {
   v1::Session message;

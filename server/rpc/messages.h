@@ -16,6 +16,8 @@ namespace relmap::rpc {
 // `time_us` is that of the edge's newer end; the second reads it.
 v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us);
 v1::Edge edge_message(const storage::Graph& graph, const storage::Edge& edge);
+// Who did something, as events and histories tell it: the author of its record, or "relmapd" if no caller did it.
+std::string author_name(const std::string& author);
 v1::Session session_message(const storage::Session& session);
 v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);

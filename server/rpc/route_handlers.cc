@@ -65,7 +65,7 @@ struct RoutePosition {
 // Charges the memory of a route; drops the least recently used ones to make room.
 Status charge_for(TokenKeeper<FoundRoute>& others, FoundRoute& found) {
   for (;;) {
-    Status charged = found.charge.grow_to(found.memory_bytes());
+    Status charged = found.charge.grow_to(found.memory_bytes() + found.from->memory_bytes() + found.to->memory_bytes());
     if (charged.ok() || !others.drop_oldest()) return charged;
   }
 }
@@ -122,9 +122,6 @@ class RouteStream {
     return std::optional(std::move(reply));
   }
 
-  // How the ends were localised that are views.
-  RouteEnds from, to;
-
  private:
   const route::Route& route() const { return found_->route(number_); }
   void begin(std::size_t number) {
@@ -152,8 +149,8 @@ class RouteStream {
     message.set_bound_closures(found_->answer.near || !found_->answer.frame_by_frame.empty());
     message.set_no_way_by_edges(found_->answer.no_way_by_edges);
     if (number_ > 0) message.set_shared(found_->alternatives[number_ - 1].shared);
-    if (const auto view = from.view_at(route.path.from)) *message.mutable_from_view() = *view;
-    if (const auto view = to.view_at(route.path.to)) *message.mutable_to_view() = *view;
+    if (const auto* view = found_->from->at(route.path.from)) *message.mutable_from_view() = *view;
+    if (const auto* view = found_->to->at(route.path.to)) *message.mutable_to_view() = *view;
     return message;
   }
 
@@ -221,15 +218,17 @@ Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& requ
                    : route::RouteIndex::Snapshot{mapper.view(), nullptr, "there are none", {}, {}};
   const auto options = route_options(*map.view, request, deadline);
   if (!options.ok()) return options.status();
-  const auto from = route_ends(mapper, *map.view, request.from(), request.or_from(), "from", deadline);
+  auto from = route_ends(mapper, *map.view, request.from(), request.or_from(), "from", deadline);
   if (!from.ok()) return from.status();
-  const auto to = route_ends(mapper, *map.view, request.to(), request.or_to(), "to", deadline);
+  auto to = route_ends(mapper, *map.view, request.to(), request.or_to(), "to", deadline);
   if (!to.ok()) return to.status();
 
   auto found = std::make_shared<FoundRoute>(mapper.budget(), ++routes.searched);
   found->fingerprint = route_fingerprint(request);
   found->ends_fingerprint = route_ends_fingerprint(request);
   found->view = map.view;
+  found->from = std::make_shared<const SeenEnds>(std::move(from->seen));
+  found->to = std::make_shared<const SeenEnds>(std::move(to->seen));
   auto answer = [&] {
     SearchWork work(mapper.budget(), limits.max_search_frames,
                     deadline);  // releases its memory before that of the route is charged
@@ -247,8 +246,6 @@ Result<Producer<v1::FindRouteReply>> find_route(const v1::FindRouteRequest& requ
     found->alternatives.pop_back();
   }
   const auto stream = std::make_shared<RouteStream>(routes, limits, found, request.covariance(), deadline);
-  stream->from.seen = from->seen;
-  stream->to.seen = to->seen;
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
 }
 

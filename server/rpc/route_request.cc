@@ -10,6 +10,7 @@
 #include "server/route/newest_frame.h"
 #include "server/route/refusal.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/limits.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/place_messages.h"
 
@@ -20,7 +21,7 @@ namespace {
 constexpr int kMaxEnds = 100;  // alternatives; few of them may be pictures, since each takes time
 constexpr std::size_t kMaxPictures = 4;
 constexpr std::size_t kMaxRouteFrames = 10'000;  // at an end, or to be avoided
-constexpr int kMaxAvoidedLabels = 100, kMaxRouteSessions = 10'000;
+constexpr int kMaxAvoidedLabels = 100;
 
 Status too_many(const char* what, std::size_t max_count) {
   return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(max_count) + ' ' + what};
@@ -42,13 +43,13 @@ Status add_end(map::Mapper& mapper, const storage::MapView& view, const v1::Rout
       return {};
     }
     case v1::RouteEnd::kView: {
-      if (ends.seen.size() == kMaxPictures) return too_many("pictures at one end", kMaxPictures);
+      if (ends.seen.by_frame.size() == kMaxPictures) return too_many("pictures at one end", kMaxPictures);
       auto seen = localise_view(mapper, view, end.view(), std::nullopt, deadline);
       if (!seen.ok()) return seen.status();
       const auto frame = from_wire(seen->frame());
       if (!frame.ok()) return frame.status();
       ends.frames.push_back(*frame);
-      ends.seen.insert_or_assign(*frame, std::move(seen).value());
+      ends.seen.by_frame.insert_or_assign(*frame, std::move(seen).value());
       return {};
     }
     case v1::RouteEnd::kRobot: {
@@ -88,7 +89,7 @@ Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
 
 Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteFilter& given,
                                      const Deadline& deadline) {
-  if (given.sessions_size() > kMaxRouteSessions) return too_many("sessions", kMaxRouteSessions);
+  if (given.sessions_size() > kMaxNamedSessions) return too_many("sessions", kMaxNamedSessions);
   if (given.avoid_labels_size() > kMaxAvoidedLabels) return too_many("labels to be avoided", kMaxAvoidedLabels);
   route::RouteFilter filter;
   for (const SessionNumber number : given.sessions()) {
@@ -117,6 +118,12 @@ Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteF
 }
 
 }  // namespace
+
+std::size_t SeenEnds::memory_bytes() const {
+  std::size_t bytes = 0;
+  for (const auto& [frame, seen] : by_frame) bytes += sizeof frame + seen.SpaceUsedLong();
+  return bytes;
+}
 
 Result<RouteEnds> route_ends(map::Mapper& mapper, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,

@@ -12,14 +12,21 @@
 
 namespace relmap::rpc {
 
+// How those of the ends were localised that are views.
+struct SeenEnds {
+  std::map<FrameId, v1::LocaliseReply> by_frame;
+
+  // Null: the frame is not the place of a view.
+  const v1::LocaliseReply* at(FrameId frame) const {
+    const auto found = by_frame.find(frame);
+    return found == by_frame.end() ? nullptr : &found->second;
+  }
+  std::size_t memory_bytes() const;
+};
+
 struct RouteEnds {
   std::vector<FrameId> frames;
-  std::map<FrameId, v1::LocaliseReply> seen;  // the frames that come from a picture, with their localisation
-
-  std::optional<v1::LocaliseReply> view_at(FrameId frame) const {
-    const auto found = seen.find(frame);
-    return found == seen.end() ? std::nullopt : std::optional(found->second);
-  }
+  SeenEnds seen;
 };
 
 // Returns the frames of one end with its alternatives. `what` is "from" or "to", for messages. The reasons, of the

@@ -11,9 +11,12 @@
 #include <thread>
 #include <vector>
 
+#include "proto/base/clock.h"
 #include "proto/wire/convert.h"
+#include "relmap/v1/admin.grpc.pb.h"
 #include "relmap/v1/map.grpc.pb.h"
 #include "server/rpc/gateway.h"
+#include "server/rpc/limits.h"
 #include "server/rpc/server.h"
 #include "server/rpc/testing/fleet_credentials.h"
 #include "server/rpc/testing/served_map.h"
@@ -103,7 +106,9 @@ class Watches : public testing::Test {
     EXPECT_EQ(running(), count);
   }
 
+  const std::int64_t begun_ = now_us();
   ServedMap map_;
+  const std::int64_t taken_in_ = now_us();
   const Gatekeeper everyone_{"", true};
   std::unique_ptr<Core> core_;
   std::unique_ptr<RpcServer> server_;
@@ -204,6 +209,113 @@ TEST_F(Watches, EndWithTheirCredentials) {
   EXPECT_EQ(why_of(reader.finish()), Reason::UNAUTHENTICATED);
   EXPECT_TRUE(other.catches_up()) << "robots may ask what readers may";
   other.cancel();
+}
+
+TEST_F(Watches, NameSessionsThatExistAndNotTooMany) {
+  start();
+  v1::WatchMapRequest request;
+  for (int i = 0; i < kMaxNamedSessions; ++i) request.add_sessions(1);
+  EXPECT_TRUE(caller(request)->catches_up());
+  request.add_sessions(1);
+  const grpc::Status too_many = caller(request)->finish();
+  EXPECT_EQ(why_of(too_many), Reason::INVALID_ARGUMENT);
+  EXPECT_THAT(too_many.error_message(), HasSubstr("more than 10000 sessions"));
+  request.clear_sessions();
+  request.add_sessions(2);
+  request.add_sessions(77);
+  const grpc::Status unknown = caller(request)->finish();
+  EXPECT_EQ(why_of(unknown), Reason::NO_SUCH_SESSION);
+  EXPECT_THAT(unknown.error_message(), HasSubstr("77"));
+  request.mutable_sessions()->RemoveLast();
+  request.set_from(v1::WATCH_FROM_OLDEST);
+  std::string token;
+  EXPECT_TRUE(caller(request)->read_until([&](const v1::MapEvent& event) {
+    token = event.resume_token();
+    return event.has_caught_up();
+  }));
+  request.add_sessions(77);
+  request.set_resume_token(token);
+  EXPECT_TRUE(caller(request)->catches_up()) << "it may have been deleted since the token was told";
+}
+
+TEST_F(Watches, TellTimesBetweenSubmissionAndCommit) {
+  start();
+  const std::int64_t labelling = now_us();
+  label("first");
+  const std::int64_t labelled = now_us();  // and committed
+  v1::WatchMapRequest request;
+  request.set_from(v1::WATCH_FROM_OLDEST);
+  std::int64_t committed = 0;  // when the newest frames were that were told
+  int labels = 0, sessions = 0, frames = 0;
+  EXPECT_TRUE(caller(request)->read_until([&](const v1::MapEvent& event) {
+    if (event.has_storage_changed()) {
+      EXPECT_EQ(event.time_us(), 0) << "it is not of the log";
+      EXPECT_EQ(event.author(), "");
+      return false;
+    }
+    if (event.has_caught_up()) {
+      EXPECT_GE(event.caught_up().time_us(), committed);
+      EXPECT_LE(event.caught_up().time_us(), labelled);
+      return true;
+    }
+    EXPECT_GE(event.time_us(), begun_) << event.ShortDebugString();
+    EXPECT_LE(event.time_us(), labelled) << event.ShortDebugString();
+    if (event.has_frames_added()) {  // when they were committed
+      ++frames;
+      EXPECT_GE(event.time_us(), committed);
+      committed = event.time_us();
+    }
+    if (event.has_session_changed()) {  // when it was submitted: before the commit of its frames
+      ++sessions;
+      EXPECT_LE(event.time_us(), taken_in_);
+    }
+    if (event.has_frame_labels()) {
+      ++labels;
+      EXPECT_GE(event.time_us(), labelling);
+    } else {
+      EXPECT_EQ(event.author(), "relmapd") << event.ShortDebugString();
+      EXPECT_LE(event.time_us(), labelling) << "all of it is committed";
+    }
+    return false;
+  }));
+  EXPECT_EQ(labels, 1);
+  EXPECT_EQ(sessions, 2);
+  EXPECT_GE(frames, 1);
+}
+
+TEST_F(Watches, TellWhoDeletedASession) {
+  start();
+  v1::DeleteSessionRequest request;
+  request.set_session(2);
+  request.set_uuid(map_.mapper->view()->session(2)->header.uuid.to_string());
+  const std::int64_t begun = now_us();
+  {
+    const auto stub = v1::Admin::NewStub(grpc::CreateChannel(address_, grpc::InsecureChannelCredentials()));
+    grpc::ClientContext context;
+    v1::Progress progress;
+    const auto deleting = stub->DeleteSession(&context, request);
+    while (deleting->Read(&progress)) {
+    }
+    const grpc::Status status = deleting->Finish();
+    EXPECT_TRUE(status.ok()) << status.error_message();
+  }
+  map_.settle();
+  commit();
+  const std::int64_t gone = now_us();
+  v1::WatchMapRequest from_oldest;
+  from_oldest.set_from(v1::WATCH_FROM_OLDEST);
+  std::vector<v1::MapEvent> told;
+  EXPECT_TRUE(caller(from_oldest)->read_until([&](const v1::MapEvent& event) {
+    if (event.has_frames_removed() || event.has_session_deleted()) told.push_back(event);
+    return event.has_caught_up();
+  }));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_TRUE(told[1].has_session_deleted());
+  for (const v1::MapEvent& event : told) {
+    EXPECT_EQ(event.author(), kAnonymous);
+    EXPECT_GE(event.time_us(), begun);
+    EXPECT_LE(event.time_us(), gone);
+  }
 }
 
 TEST_F(Watches, TellWhoEditedAndGoOnAfterAToken) {

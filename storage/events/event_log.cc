@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "storage/events/event_block.h"
+#include "storage/events/event_head.h"
 #include "storage/format/keys.h"
 
 namespace relmap::storage {
@@ -12,16 +13,6 @@ namespace {
 Status lost(const Status& why) {
   if (why.reason() == Reason::IO_ERROR) return why;
   return {Reason::DATA_LOSS, "head of the log of events: " + why.to_string()};
-}
-
-// Nullopt: the map has told nothing yet.
-Result<std::optional<EventLogHead>> load_head(const EngineSnapshot& snapshot) {
-  const auto bytes = snapshot.get(keys::all_events());
-  if (!bytes.ok()) return lost(bytes.status());
-  if (!*bytes) return std::optional<EventLogHead>();
-  const auto head = decode_event_head(**bytes);
-  if (!head.ok()) return lost(head.status());
-  return std::optional(*head);
 }
 
 class Reading {
@@ -76,8 +67,8 @@ class Reading {
 }  // namespace
 
 Result<EventsRead> read_events(const EngineSnapshot& snapshot, EventPosition after, std::size_t max_bytes) {
-  const auto head = load_head(snapshot);
-  if (!head.ok()) return head.status();
+  const auto head = load_event_head(snapshot);
+  if (!head.ok()) return lost(head.status());
   Reading reading(after, max_bytes);
   if (!*head || after >= (*head)->newest) return std::move(reading).finish(after);
   const EventPosition oldest = (*head)->oldest;
@@ -92,8 +83,8 @@ Result<EventsRead> read_events(const EngineSnapshot& snapshot, EventPosition aft
 }
 
 Result<EventPosition> newest_event(const EngineSnapshot& snapshot) {
-  const auto head = load_head(snapshot);
-  if (!head.ok()) return head.status();
+  const auto head = load_event_head(snapshot);
+  if (!head.ok()) return lost(head.status());
   return *head ? (*head)->newest : EventPosition();
 }
 

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "storage/events/event_head.h"
 #include "storage/format/keys.h"
 
 namespace relmap::storage {
@@ -19,11 +20,10 @@ std::string behind(EventPosition last) { return key_of(last) + '\0'; }
 
 Status EventWriter::open(const EngineSnapshot& snapshot, std::uint64_t applied_sequence) {
   Status read = [&]() -> Status {
-    const auto bytes = snapshot.get(keys::all_events());
-    if (!bytes.ok()) return bytes.status();
-    const auto head = *bytes ? decode_event_head(**bytes) : Result<EventLogHead>(Status(Reason::DATA_LOSS, ""));
-    if (head.ok())
-      head_ = *head;
+    const auto head = load_event_head(snapshot);
+    if (head.reason() == Reason::IO_ERROR) return head.status();
+    if (head.ok() && *head)
+      head_ = **head;
     else if (Status found = find_head(snapshot); !found.ok())
       return found;
     has_head_ = head_.newest != EventPosition();

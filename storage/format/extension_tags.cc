@@ -193,6 +193,27 @@ bool take_digests_commit(Extensions& extensions, std::uint64_t& commit) {
   return r.at_end() && commit != 0;
 }
 
+void add_digests_made(Extensions& extensions, const DigestsMade& made) {
+  if (made.commit == 0) return;
+  ByteWriter w;
+  w.put(made.commit);
+  w.put(made.through.session);
+  w.put(made.through.chunk);
+  w.put(made.frames);
+  add_extension(extensions, kDigestsMade, w.take());
+}
+
+bool take_digests_made(Extensions& extensions, DigestsMade& made) {
+  const auto bytes = take_extension(extensions, kDigestsMade);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  made.commit = r.get<std::uint64_t>();
+  made.through.session = r.get<SessionNumber>();
+  made.through.chunk = r.get<std::uint32_t>();
+  made.frames = r.get<std::uint64_t>();
+  return r.at_end() && made.commit != 0;
+}
+
 void add_edit_key(Extensions& extensions, const EditKey& edit) {
   if (edit.key.empty()) return;
   ByteWriter w;
@@ -211,13 +232,25 @@ bool take_edit_key(Extensions& extensions, EditKey& edit) {
   return true;
 }
 
+void add_author(Extensions& extensions, const std::string& author) {
+  if (!author.empty()) add_extension(extensions, kAuthor, {author.begin(), author.end()});
+}
+
+bool take_author(Extensions& extensions, std::string& author) {
+  const auto bytes = take_extension(extensions, kAuthor);
+  if (!bytes) return true;
+  if (bytes->empty() || bytes->size() > kMaxAuthorBytes) return false;
+  author.assign(bytes->begin(), bytes->end());
+  return true;
+}
+
 void add_submission(Extensions& extensions, std::int64_t time_us, const std::string& author) {
   if (time_us != 0) {
     ByteWriter w;
     w.put(time_us);
     add_extension(extensions, kWallTime, w.take());
   }
-  if (!author.empty()) add_extension(extensions, kAuthor, {author.begin(), author.end()});
+  add_author(extensions, author);
 }
 
 bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string& author) {
@@ -226,11 +259,7 @@ bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string&
     time_us = r.get<std::int64_t>();
     if (!r.at_end() || time_us == 0) return false;
   }
-  if (const auto bytes = take_extension(extensions, kAuthor)) {
-    if (bytes->empty() || bytes->size() > kMaxAuthorBytes) return false;
-    author.assign(bytes->begin(), bytes->end());
-  }
-  return true;
+  return take_author(extensions, author);
 }
 
 // Events that one record brought about were submitted together, so one entry says it of all of them.

@@ -27,12 +27,15 @@ inline constexpr std::uint32_t kUnseen = 29;        // of a closure: frames that
 inline constexpr std::uint32_t kUnseenPlace = 30;   // of a proposal: the closure of whose place the query saw nothing
 inline constexpr std::uint32_t kEditKey = 31;       // of an edit in the journal: by what its caller names it
 
-inline constexpr std::uint32_t kDigests = 36;  // of the map's state: the commit as of which its digests are right
+inline constexpr std::uint32_t kDigests = 36;      // of the map's state: the commit as of which its digests are right
+inline constexpr std::uint32_t kDigestsMade = 37;  // of the map's state: how far they were made anew
 
 // These tags say how the map came about, so map hashes leave them out. kOwner is reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
 inline constexpr std::uint32_t kOwner = 18;
-inline constexpr std::uint32_t kWallTime = 19, kAuthor = 20;  // of edits, and of edges for the events of their history
+// Of records in the journal, and of edges for the events of their history; the author also of a session that is being
+// deleted.
+inline constexpr std::uint32_t kWallTime = 19, kAuthor = 20;
 inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kAuthor; }
 
 // They write nothing where the value is unknown or the default.
@@ -46,7 +49,9 @@ void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 void add_shown(Extensions& extensions, std::uint64_t shown);
 void add_digests_commit(Extensions& extensions, std::uint64_t commit);
+void add_digests_made(Extensions& extensions, const DigestsMade& made);
 void add_edit_key(Extensions& extensions, const EditKey& edit);
+void add_author(Extensions& extensions, const std::string& author);
 void add_submission(Extensions& extensions, std::int64_t time_us, const std::string& author);
 void add_submissions(Extensions& extensions, const std::vector<EdgeEvent>& history);
 // They return false if the extension is malformed.
@@ -60,7 +65,9 @@ bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
 bool take_shown(Extensions& extensions, std::uint64_t& shown);
 bool take_digests_commit(Extensions& extensions, std::uint64_t& commit);
+bool take_digests_made(Extensions& extensions, DigestsMade& made);
 bool take_edit_key(Extensions& extensions, EditKey& edit);
+bool take_author(Extensions& extensions, std::string& author);
 bool take_submission(Extensions& extensions, std::int64_t& time_us, std::string& author);
 // Of the history as it was read. What is said of an event that it no longer has is dropped.
 bool take_submissions(Extensions& extensions, std::vector<EdgeEvent>& history);

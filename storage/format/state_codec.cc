@@ -93,6 +93,7 @@ Bytes encode_session(const Session& s) {
   put_extensions(w, header_extensions(s.header));
   Extensions extensions = s.unknown;
   tags::add_before_frozen(extensions, s.before_frozen);
+  tags::add_author(extensions, s.deleted_by);
   put_extensions(w, extensions);
   return seal(kSessionKind, kStateVersion, w.bytes());
 }
@@ -108,7 +109,8 @@ Result<Session> decode_session(ByteSpan bytes) {
   if (sealed->version == kStateVersion) {
     if (!set_header_extensions(s.header, get_extensions(r))) return malformed("session");
     s.unknown = get_extensions(r);
-    if (!tags::take_before_frozen(s.unknown, s.before_frozen)) return malformed("session");
+    if (!tags::take_before_frozen(s.unknown, s.before_frozen) || !tags::take_author(s.unknown, s.deleted_by))
+      return malformed("session");
   }
   if (s.state > SessionState::kDeleting) return malformed("session");
   if (sealed->kind != kSessionKind || !r.at_end()) return malformed("session");
@@ -192,6 +194,7 @@ Bytes encode_state(const MapState& s) {
   Extensions extensions = s.unknown;
   tags::add_map_identity(extensions, s.identity);
   tags::add_digests_commit(extensions, s.digests_commit);
+  tags::add_digests_made(extensions, s.digests_made);
   put_extensions(w, extensions);
   return seal(kStateKind, kStateVersion, w.bytes());
 }
@@ -207,7 +210,8 @@ Result<MapState> decode_state(ByteSpan bytes) {
   if (sealed->version > kFormat2) s.idle_records = r.get<std::uint32_t>();
   if (sealed->version == kStateVersion) {
     s.unknown = get_extensions(r);
-    if (!tags::take_map_identity(s.unknown, s.identity) || !tags::take_digests_commit(s.unknown, s.digests_commit))
+    if (!tags::take_map_identity(s.unknown, s.identity) || !tags::take_digests_commit(s.unknown, s.digests_commit) ||
+        !tags::take_digests_made(s.unknown, s.digests_made))
       return malformed("state");
   }
   if (!r.at_end() || sealed->kind != kStateKind) return malformed("state");

@@ -34,6 +34,7 @@ TEST(StateCodec, GivesBackSessions) {
     EXPECT_EQ(decoded->given_up, session.given_up);
     EXPECT_EQ(decoded->state, session.state);
     EXPECT_EQ(decoded->before_frozen, session.before_frozen);
+    EXPECT_EQ(decoded->deleted_by, session.deleted_by);
     EXPECT_EQ(decoded->header.unknown, session.header.unknown);
     EXPECT_EQ(decoded->unknown, session.unknown);
   }
@@ -66,6 +67,8 @@ TEST(StateCodec, GivesBackTheMapState) {
   state.vocabulary_crc = 7;
   state.unknown = {{1000, {1, 2, 3}}};
   state.identity = {Uuid::random(), 1'764'000'000'000'000};
+  state.digests_commit = 9;
+  state.digests_made = {10, {3, 4}, 200};
   const auto decoded = decode_state(encode_state(state));
   ASSERT_TRUE(decoded.ok()) << decoded.status().to_string();
   EXPECT_EQ(decoded->applied_sequence, 12u);
@@ -74,6 +77,8 @@ TEST(StateCodec, GivesBackTheMapState) {
   EXPECT_EQ(decoded->idle_records, 0u);
   EXPECT_EQ(decoded->unknown, state.unknown);
   EXPECT_EQ(decoded->identity, state.identity);
+  EXPECT_EQ(decoded->digests_commit, 9u);
+  EXPECT_EQ(decoded->digests_made, state.digests_made);
   state.idle_records = 7;
   EXPECT_EQ(decode_state(encode_state(state))->idle_records, 7u);
   EXPECT_EQ(decoded->refused, state.refused);

@@ -52,11 +52,12 @@ std::size_t memory_bytes(const FrameCold& frame) {
 void shrink_deleted(Session& session) {
   session.header.unknown = {};
   session.unknown = {};
+  session.deleted_by = {};
 }
 
 std::size_t memory_bytes(const Session& session) {
   return shared(session) + heap(session.header.robot) + heap(session.header.name) + heap(session.display_name) +
-         heap_bytes(session.header.unknown) + heap_bytes(session.unknown);
+         heap_bytes(session.header.unknown) + heap_bytes(session.unknown) + heap(session.deleted_by);
 }
 
 }  // namespace relmap::storage

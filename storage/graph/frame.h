@@ -325,6 +325,8 @@ struct Session {
   SessionState state = SessionState::kOpen;
   SessionState before_frozen = SessionState::kOpen;  // of a frozen session: what it was, and is again when it is thawed
   Extensions unknown;                                // from a later version, kept unchanged
+  // While it is being deleted: who wanted that (Submission::author); empty: not known. No part of hashes.
+  std::string deleted_by = {};
 };
 
 // Approximate bytes in memory, for the budget.

@@ -9,6 +9,7 @@
 #include "proto/base/ids.h"
 #include "proto/base/map_identity.h"
 #include "proto/keyframe/extensions.h"
+#include "storage/graph/chunk.h"
 #include "storage/graph/frame_set.h"
 
 namespace relmap::storage {
@@ -39,6 +40,15 @@ inline constexpr std::size_t kMaxEditKeyBytes = 128;
 // So many edits are remembered by their keys: the last ones.
 inline constexpr std::size_t kRememberedEdits = 4096;
 
+// Digests that were made anew in part: those of all chunks through this one are right as of a commit.
+struct DigestsMade {
+  std::uint64_t commit = 0;  // 0: none
+  ChunkId through;
+  std::uint64_t frames = 0;  // in these chunks
+
+  bool operator==(const DigestsMade&) const = default;
+};
+
 // All that must survive beside frames and sessions; it is written with every commit.
 struct MapState : MapFacts {
   FrameSet pending;                // frames queued for relaxation (docs/method.md, 4), durable
@@ -48,6 +58,7 @@ struct MapState : MapFacts {
   // The commit as of which the stored digests are right (storage/graph/digest.h); 0: none. A program that knows nothing
   // of digests keeps the number, and commits: from then on it is not that of the last commit.
   std::uint64_t digests_commit = 0;
+  DigestsMade digests_made = {};  // while they are being made; by its commit as believable as the number above
 };
 
 }  // namespace relmap::storage

@@ -299,6 +299,26 @@ bool take_extensions(SetSessionStateRecord& x, Extensions all) {
   return tags::take_edit_key(x.unknown, x.edit) && take_submission(x.unknown, x.submitted);
 }
 
+Extensions extensions_of(const RemoveChunkRecord& x) {
+  Extensions all = x.unknown;
+  add_submission(all, x.submitted);
+  return all;
+}
+bool take_extensions(RemoveChunkRecord& x, Extensions all) {
+  x.unknown = std::move(all);
+  return take_submission(x.unknown, x.submitted);
+}
+
+Extensions extensions_of(const UnseenRecord& x) {
+  Extensions all = x.unknown;
+  add_submission(all, x.submitted);
+  return all;
+}
+bool take_extensions(UnseenRecord& x, Extensions all) {
+  x.unknown = std::move(all);
+  return take_submission(x.unknown, x.submitted);
+}
+
 template <typename Record>
 Result<DecodedRecord> decode_as(ByteReader& r, std::uint16_t version, std::uint64_t acknowledged_through) {
   Record record;

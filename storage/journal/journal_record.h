@@ -21,7 +21,8 @@ namespace relmap::storage {
 // comparison of maps depends on it.
 struct Submission {
   std::int64_t time_us = 0;  // UTC; 0: not known
-  std::string author;        // the name in the caller's credentials; empty: a robot's own stream, or the daemon itself
+  std::string author;        // the name in the caller's credentials; empty: a robot's own stream, or the daemon itself.
+                             // The RPCs call that "relmapd"
 
   bool operator==(const Submission&) const = default;
 };
@@ -95,6 +96,8 @@ struct BindingRecord {
 struct UnseenRecord {
   FrameId frame;  // of the session of the closure's newer end, after it
   ClosureId closure;
+  Extensions unknown = {};  // from a later version
+  Submission submitted = {};
 };
 
 // An operator's edits.
@@ -137,6 +140,8 @@ struct SetSessionStateRecord {
 struct RemoveChunkRecord {
   SessionNumber session = 0;
   std::uint32_t chunk = 0;
+  Extensions unknown = {};    // from a later version
+  Submission submitted = {};  // the author is who wanted the session deleted
 };
 
 // Relaxation that was done in idle time. `budget` is the work, counted in linearised observations.

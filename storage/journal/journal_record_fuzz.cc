@@ -61,6 +61,9 @@ void try_extensions(ByteSpan bytes) {
   try_field<SessionState, SessionState>(*all, tags::take_before_frozen, tags::add_before_frozen, itself);
   try_field<std::uint64_t, std::uint64_t>(*all, tags::take_shown, tags::add_shown, itself);
   try_field<EditKey, const EditKey&>(*all, tags::take_edit_key, tags::add_edit_key, itself);
+  try_field<std::string, const std::string&>(*all, tags::take_author, tags::add_author, itself);
+  try_field<std::uint64_t, std::uint64_t>(*all, tags::take_digests_commit, tags::add_digests_commit, itself);
+  try_field<DigestsMade, const DigestsMade&>(*all, tags::take_digests_made, tags::add_digests_made, itself);
 }
 
 void try_all(ByteSpan bytes) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "storage/events/event_head.h"
 #include "storage/format/keys.h"
 
 namespace relmap::storage {
@@ -17,9 +18,7 @@ class EventCheck {
   EventCheck(std::uint64_t applied_sequence, const std::function<void(const EventDamage&)>& damaged)
       : applied_(applied_sequence), damaged_(damaged) {}
 
-  void add_head(const Status& read, const std::optional<Bytes>& bytes) {
-    if (read.ok() && !bytes) return;
-    const auto head = read.ok() ? decode_event_head(*bytes) : Result<EventLogHead>(read);
+  void add_head(const Result<std::optional<EventLogHead>>& head) {
     if (head.ok())
       head_ = *head;
     else
@@ -84,8 +83,7 @@ class EventCheck {
 std::optional<EventLogHead> check_events(const EngineSnapshot& snapshot, std::uint64_t applied_sequence,
                                          const std::function<void(const EventDamage&)>& damaged) {
   EventCheck check(applied_sequence, damaged);
-  const auto head = snapshot.get(keys::all_events());
-  check.add_head(head.status(), head.ok() ? *head : std::nullopt);
+  check.add_head(load_event_head(snapshot));
   const Status scanned =
       snapshot.scan(keys::all_events(), [&](std::string_view key, ByteSpan value) { return check.add(key, value); });
   if (!scanned.ok()) damaged({Reason::DATA_LOSS, "", "log of events: " + scanned.to_string()});

@@ -327,7 +327,8 @@ Status Map::commit() {
   return *impl_->finish_commit();
 }
 bool Map::digests_hold() const { return impl_->digests_hold; }
-Status Map::rebuild_digests(const DigestProgress& progress) { return impl_->rebuild_digests(progress); }
+Status Map::rebuild_digests(const DigestProgress& progress) { return impl_->make_digests(progress, false); }
+Status Map::complete_digests(const DigestProgress& progress) { return impl_->make_digests(progress, true); }
 Status Map::begin_commit(std::function<void()> written) { return impl_->begin_commit(std::move(written)); }
 std::optional<Status> Map::finish_commit() { return impl_->finish_commit(); }
 bool Map::commit_is_due() const {

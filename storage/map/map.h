@@ -99,11 +99,14 @@ class Map final : public EditableGraph {
   // Whether the digests on disk (storage/graph/digest.h) are right, so that commits keep them up and views read them.
   // They are not in a map that a program without digests wrote to last: views then make them from the frames.
   bool digests_hold() const;
-  // Called now and then with the frames done and the frames of the map; false: stop.
+  // Called after each chunk with the frames done and the frames of the map; false: stop.
   using DigestProgress = std::function<bool(std::uint64_t done, std::uint64_t total)>;
   // Makes the digests of all that is committed anew, in commits of their own and little memory. A frame that cannot be
-  // read gets none. SHUTTING_DOWN if stopped; whatever goes wrong, the next call begins anew. Worker only.
+  // read gets none. SHUTTING_DOWN if stopped. Worker only.
   Status rebuild_digests(const DigestProgress& progress);
+  // The same, but goes on where that was stopped, or failed, if the map has not been committed since. Those that were
+  // made before count as done.
+  Status complete_digests(const DigestProgress& progress);
 
   // Bytes that are dirty, without those that a commit under way is writing.
   std::size_t dirty_bytes() const;

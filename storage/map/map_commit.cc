@@ -266,6 +266,7 @@ void Map::Impl::write_rest(Batch& batch) {
   }
   write_pending(state.pending, batch.puts, batch.deletes);
   state.digests_commit = digests_hold ? batch.number : 0;
+  state.digests_made = {};
   batch.puts.push_back({keys::map_state(), encode_state(state)});
 }
 

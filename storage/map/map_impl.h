@@ -156,7 +156,7 @@ struct Map::Impl {
   void write_rest(Batch& batch);
   Status begin_commit(std::function<void()> written);
   std::optional<Status> finish_commit();
-  Status rebuild_digests(const DigestProgress& progress);
+  Status make_digests(const DigestProgress& progress, bool go_on);
   void complete(Commit& commit) noexcept;  // the engine has it
   void restore(Commit& commit) noexcept;   // it failed: what it held is dirty again
 };

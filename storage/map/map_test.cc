@@ -775,6 +775,92 @@ TEST_F(MapTest, MakingDigestsAnewGoesOnAfterItWasStoppedOrFailed) {
   EXPECT_EQ(digests_visited(*open()->view()), digests_of_frames(*map));
 }
 
+TEST_F(MapTest, DigestsThatWereMadeInPartAreCompletedUnlessTheMapWasCommittedSince) {
+  {
+    auto map = open();
+    for (const SessionNumber number : {1u, 2u, 4u, 5u}) begin(*map, number);
+    for (std::uint32_t i = 0; i < 200; ++i)
+      for (const SessionNumber number : {1u, 4u}) add(*map, {number, i});
+    for (std::uint32_t i = 0; i < 20; ++i)
+      for (const SessionNumber number : {2u, 5u}) add(*map, {number, i});
+    ASSERT_TRUE(map->commit().ok());
+  }
+  // As a program does that knows nothing of digests: two sessions go, one before and one behind where the first run is
+  // stopped.
+  std::vector<std::string> gone;
+  for (std::uint32_t i = 0; i < 20; ++i)
+    for (const SessionNumber number : {2u, 5u}) gone.push_back(keys::frame(Part::kHot, {number, i}));
+  ASSERT_TRUE(engine->commit(epoch, 0, {}, gone).ok());
+  const auto state = [&] { return decode_state(engine->snapshot()->get(keys::map_state()).value().value()).value(); };
+  const auto stop_after = [&](std::uint64_t chunks) {
+    auto map = open();
+    std::uint64_t told = 0;
+    EXPECT_EQ(map->complete_digests([&](std::uint64_t, std::uint64_t) { return ++told < chunks; }).reason(),
+              Reason::SHUTTING_DOWN);
+    EXPECT_EQ(told, chunks);
+    EXPECT_FALSE(map->digests_hold());
+    EXPECT_EQ(digests_visited(*map->view()), digests_of_frames(*map->view()));
+  };
+  stop_after(5);
+  EXPECT_EQ(state().digests_commit, 0u);
+  EXPECT_EQ(state().digests_made, (DigestsMade{engine->snapshot()->commit_number(), {4, 0}, 264}));
+  EXPECT_EQ(keys("d"), 9u) << "of what is gone, all before was deleted";
+  stop_after(2);
+  EXPECT_EQ(state().digests_made, (DigestsMade{engine->snapshot()->commit_number(), {4, 2}, 392}));
+  {
+    auto map = open();
+    std::uint64_t chunks = 0;
+    std::uint64_t last = 0;
+    ASSERT_TRUE(
+        map->complete_digests([&](std::uint64_t frames, std::uint64_t) { return last = frames, ++chunks; }).ok());
+    EXPECT_EQ(chunks, 1u) << "the others were made";
+    EXPECT_EQ(last, 400u);
+    EXPECT_EQ(state().digests_made, DigestsMade());
+    EXPECT_EQ(keys("d"), 8u);
+  }
+  EXPECT_TRUE(open()->digests_hold());
+  EXPECT_EQ(digests_visited(*open()->view()), digests_of_frames(*open()->view()));
+
+  const auto forget = [&] {
+    MapState forgetful = state();
+    forgetful.digests_commit = 0;
+    ASSERT_TRUE(engine->commit(epoch, 0, std::vector<Put>{{keys::map_state(), encode_state(forgetful)}}, {}).ok());
+  };
+  // A commit in between, of another program or this one, makes what was done in part worthless.
+  const auto complete = [&] {
+    std::uint64_t chunks = 0;
+    EXPECT_TRUE(open()->complete_digests([&](std::uint64_t, std::uint64_t) { return ++chunks > 0; }).ok());
+    EXPECT_TRUE(open()->digests_hold());
+    EXPECT_EQ(digests_visited(*open()->view()), digests_of_frames(*open()->view()));
+    return chunks;
+  };
+  forget();
+  stop_after(5);
+  const std::string key = keys::part(Part::kHot, {1, 1});
+  PartWriter writer(Part::kHot, {1, 1}, 9);
+  ByteWriter body;
+  encode_hot(body, {1, 64}, random.hot({1, 64}));
+  writer.add(0, body.bytes());
+  ASSERT_TRUE(engine->commit(epoch, 0, std::vector<Put>{{key, writer.finish()}}, {}).ok());
+  EXPECT_NE(state().digests_made, DigestsMade());
+  EXPECT_EQ(complete(), 8u);
+  forget();
+  stop_after(5);
+  {
+    auto map = open();
+    map->edit_hot({4, 1}).time_us = 5;
+    ASSERT_TRUE(map->commit().ok());
+  }
+  EXPECT_EQ(state().digests_made, DigestsMade());
+  EXPECT_EQ(complete(), 8u);
+  // Made anew, they are made anew in whole.
+  forget();
+  stop_after(5);
+  std::uint64_t chunks = 0;
+  ASSERT_TRUE(open()->rebuild_digests([&](std::uint64_t, std::uint64_t) { return ++chunks > 0; }).ok());
+  EXPECT_EQ(chunks, 8u);
+}
+
 TEST_F(MapTest, DamagedDigestsAreNamedAndMadeAnewWithTheNextEdit) {
   {
     auto map = open();

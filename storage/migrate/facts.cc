@@ -59,6 +59,7 @@ class Facts {
   void add_state(ByteSpan value) {
     MapState state = format_ == 1 ? format1::decode_state(value).or_throw() : decode_state(value).or_throw();
     state.digests_commit = 0;  // digests follow from frames
+    state.digests_made = {};
     add("state", encode_state(state));
   }
 

@@ -436,7 +436,10 @@ class Salvage {
         auto older = decode_state(value);
         if (older.ok() && (!state || older->applied_sequence > state->applied_sequence)) state = std::move(*older);
       });
-    if (state) state->digests_commit = 0;  // they are not copied: repair makes them anew
+    if (state) {  // they are not copied: repair makes them anew
+      state->digests_commit = 0;
+      state->digests_made = {};
+    }
     if (state)
       put(keys::map_state(), encode_state(*state));
     else

@@ -235,6 +235,7 @@ Session RandomFrames::session(SessionNumber number) {
   s.state = pick(*this, SessionState::kOpen, SessionState::kDeleting);
   if (is_frozen(s) && below(2) == 1) s.before_frozen = SessionState::kEnded;
   s.unknown = extensions();
+  if (is_going(s)) s.deleted_by = submission().author;
   return s;
 }
 
@@ -294,9 +295,9 @@ JournalRecord RandomFrames::unsubmitted() {
     case 8:
       return SetSessionStateRecord{below(100), pick(*this, SessionState::kOpen, SessionState::kDeleting), extensions()};
     case 9:
-      return RemoveChunkRecord{below(100), below(1000)};
+      return RemoveChunkRecord{below(100), below(1000), extensions()};
     case 10:
-      return UnseenRecord{frame_id(), edge_id()};
+      return UnseenRecord{frame_id(), edge_id(), extensions()};
     default:
       return IdleWorkRecord{rng_()};
   }

@@ -1,5 +1,10 @@
 // Watchers of the map beside a fleet, some of which read nothing: how long after a commit they have it, and what they
 // cost the worker and the memory.
+//
+// Whoever watches works on the same cores and in the same caches as the worker, so a worker beside watchers is slower
+// than one alone even if it does nothing for them. What it does for them is told by two daemons with equal fleets of
+// which one is watched at a time, in turn: the load of the machine is always the same, and only whose worker is
+// concerned differs.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -37,12 +42,12 @@ using std::chrono::milliseconds;
 using testing::RunningDaemon;
 
 constexpr double kSentEach_hz = 2;  // keyframes a second of each robot
-constexpr double kSettle_s = 2;     // of each phase, not measured
+constexpr double kSettle_s = 1;     // of each phase, not measured
 
 struct WatchBenchOptions {
   std::uint32_t robots = 20, watchers = 50, stalled = 10;
-  double seconds = 10;  // of a phase
-  std::uint32_t rounds = 4;
+  double seconds = 3;  // of a phase
+  std::uint32_t rounds = 12;
   std::size_t memory_budget_mb = 1024;
 };
 
@@ -56,10 +61,11 @@ class WatchedFleet {
                  .lcm = "",
                  .memory_budget_mb = options.memory_budget_mb,
                  .more = {"--no-closures"}}) {
-    robots_.emplace(folder, data(), options.robots, kSentEach_hz);
+    const std::uint32_t robots = std::max(1u, options.robots / 2);
+    robots_.emplace(folder, data(), robots, kSentEach_hz);
     const auto begin = Clock::now();
     const auto client = daemon_.client();
-    while (client->status().or_throw().frames < 4 * options.robots) {
+    while (client->status().or_throw().frames < 4 * robots) {
       if (seconds_since(begin) > 300) throw std::runtime_error("the robots do not send: " + daemon_.log());
       std::this_thread::sleep_for(milliseconds(100));
     }
@@ -172,23 +178,41 @@ struct Phase {
     frames += other.frames;
   }
   double per_frame_us(double s) const { return 1e6 * s / static_cast<double>(frames); }
+  double worker_us(const std::string& worker) const { return per_frame_us(threads_s.at(worker)); }
 };
 
-Phase measure(WatchedFleet& fleet, client::Client& client, double duration_s) {
-  std::this_thread::sleep_for(std::chrono::duration<double>(kSettle_s));
-  const auto before = fleet.thread_seconds();
-  const double cpu = fleet.daemon().process().cpu_seconds();
-  const std::uint64_t frames = client.status().or_throw().frames;
-  const auto begin = Clock::now();
-  std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
-  Phase phase;
-  phase.seconds = seconds_since(begin);
-  phase.frames = client.status().or_throw().frames - frames;
-  phase.process_s = fleet.daemon().process().cpu_seconds() - cpu;
-  for (const auto& [thread, s] : fleet.thread_seconds())
-    if (const auto found = before.find(thread); found != before.end()) phase.threads_s[thread] = s - found->second;
-  return phase;
-}
+// A daemon while something is measured.
+class Measured {
+ public:
+  explicit Measured(WatchedFleet& fleet) : fleet_(fleet), client_(fleet.daemon().client()) {}
+
+  void begin() {
+    threads_ = fleet_.thread_seconds();
+    cpu_ = fleet_.daemon().process().cpu_seconds();
+    frames_ = client_->status().or_throw().frames;
+    begun_ = Clock::now();
+  }
+  Phase end() {
+    Phase phase;
+    phase.seconds = seconds_since(begun_);
+    phase.frames = client_->status().or_throw().frames - frames_;
+    phase.process_s = fleet_.daemon().process().cpu_seconds() - cpu_;
+    for (const auto& [thread, s] : fleet_.thread_seconds())
+      if (const auto found = threads_.find(thread); found != threads_.end())
+        phase.threads_s[thread] = s - found->second;
+    if (phase.frames == 0) throw std::runtime_error("no keyframe came in a phase; --seconds is too short");
+    return phase;
+  }
+  client::Client& client() { return *client_; }
+
+ private:
+  WatchedFleet& fleet_;
+  const std::unique_ptr<client::Client> client_;
+  std::map<std::string, double> threads_;
+  double cpu_ = 0;
+  std::uint64_t frames_ = 0;
+  Clock::time_point begun_;
+};
 
 // Of the memory for replies, the part that is used.
 double replies_share(client::Client& client) {
@@ -197,50 +221,95 @@ double replies_share(client::Client& client) {
   throw std::runtime_error("no share is called replies");
 }
 
+// What one daemon did, phase by phase.
+struct Record {
+  std::vector<Phase> alone, other_watched, watched;  // nobody watches; the other daemon is watched; it is watched
+};
+
+// The thread that works most while nobody watches.
+std::string worker_of(const Record& record) {
+  Phase all;
+  for (const Phase& phase : record.alone) all.add(phase);
+  return std::max_element(all.threads_s.begin(), all.threads_s.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
 void run(const WatchBenchOptions& options, Report& report) {
   const storage::TemporaryFolder folder;
-  WatchedFleet fleet(folder / "fleet", options);
-  const auto client = fleet.daemon().client();
-  Phase quiet, watched;
+  WatchedFleet fleets[] = {WatchedFleet(folder / "one", options), WatchedFleet(folder / "other", options)};
+  Measured daemons[] = {Measured(fleets[0]), Measured(fleets[1])};
+  Record records[2];
+  constexpr int kNobody = 2;
   std::vector<double> ms;
-  double share = 0, resident_bytes = 0;
-  std::uint64_t events = 0;
-  for (std::uint32_t round = 0; round < options.rounds; ++round) {
-    // In turn, and the other way round each second time, since a map that grows costs more.
-    for (int half = 0; half < 2; ++half) {
-      if ((half == 0) == (round % 2 == 0)) {
-        quiet.add(measure(fleet, *client, options.seconds));
-        continue;
-      }
-      const double resident = static_cast<double>(client->status().or_throw().resident_bytes);
-      Onlookers onlookers(fleet.data(), options);
-      watched.add(measure(fleet, *client, options.seconds));
-      share = std::max(share, replies_share(*client));
-      resident_bytes =
-          std::max(resident_bytes, static_cast<double>(client->status().or_throw().resident_bytes) - resident);
-      const auto more = onlookers.latencies_ms();
-      ms.insert(ms.end(), more.begin(), more.end());
-      events += onlookers.events();
+  double share = 0, resident_bytes = 0, watched_s = 0;
+  std::uint64_t events = 0, frames = 0;
+  const auto phase = [&](int watched) {
+    const auto resident = [&] {
+      return static_cast<double>(daemons[watched].client().status().or_throw().resident_bytes);
+    };
+    const double before = watched == kNobody ? 0 : resident();
+    std::optional<Onlookers> onlookers;
+    if (watched != kNobody) onlookers.emplace(fleets[watched].data(), options);
+    std::this_thread::sleep_for(std::chrono::duration<double>(kSettle_s));
+    for (Measured& daemon : daemons) daemon.begin();
+    std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));
+    for (int d = 0; d < 2; ++d) {
+      const Phase told = daemons[d].end();
+      (watched == kNobody ? records[d].alone
+       : watched == d     ? records[d].watched
+                          : records[d].other_watched)
+          .push_back(told);
+      if (watched != d) continue;
+      watched_s += told.seconds;
+      frames += told.frames;
     }
+    if (!onlookers) return;
+    share = std::max(share, replies_share(daemons[watched].client()));
+    resident_bytes = std::max(resident_bytes, resident() - before);
+    const auto more = onlookers->latencies_ms();
+    ms.insert(ms.end(), more.begin(), more.end());
+    events += onlookers->events();
+  };
+  for (std::uint32_t round = 0; round < options.rounds; ++round) {
+    // In turn, since a map that grows costs more.
+    phase(kNobody);
+    for (int half = 0; half < 2; ++half) phase((half + static_cast<int>(round)) % 2);
   }
   if (ms.empty()) throw std::runtime_error("nobody heard of a commit");
-  const auto worker = std::max_element(quiet.threads_s.begin(), quiet.threads_s.end(),
-                                       [](const auto& a, const auto& b) { return a.second < b.second; });
-  const double quiet_us = quiet.per_frame_us(worker->second);
-  const double watched_us = watched.per_frame_us(watched.threads_s.at(worker->first));
+
+  std::vector<double> alone_us, other_us, watched_us, ratios, daemon_us, daemon_watched_us;
+  for (const Record& record : records) {
+    const std::string worker = worker_of(record);
+    for (std::uint32_t round = 0; round < options.rounds; ++round) {
+      alone_us.push_back(record.alone[round].worker_us(worker));
+      other_us.push_back(record.other_watched[round].worker_us(worker));
+      watched_us.push_back(record.watched[round].worker_us(worker));
+      ratios.push_back(watched_us.back() / other_us.back());
+      daemon_us.push_back(record.other_watched[round].per_frame_us(record.other_watched[round].process_s));
+      daemon_watched_us.push_back(record.watched[round].per_frame_us(record.watched[round].process_s));
+    }
+  }
   report.add("watchers", options.watchers, "of the map, and");
   report.add("stalled", options.stalled, "of them that read nothing");
-  report.add("robots", options.robots, "that send");
-  report.add("keyframes_per_s", static_cast<double>(watched.frames) / watched.seconds, "of all robots together");
+  report.add("robots", options.robots, "that send, half of them to a daemon that is not watched");
+  report.add("keyframes_per_s", static_cast<double>(frames) / watched_s,
+             "of the robots of the watched daemon together");
   report.add("commit_to_client_p50_ms", quantile(ms, 0.5), "from a commit until a watcher has all of it");
   report.add("commit_to_client_p99_ms", quantile(ms, 0.99), "");
   report.add("commit_to_client_max_ms", quantile(ms, 1), "");
-  report.add("messages_per_s", static_cast<double>(events) / watched.seconds, "told to all watchers that read");
-  report.add("worker_us", quiet_us, "the worker's processor time of a keyframe, without watchers");
-  report.add("worker_watched_us", watched_us, "with them");
-  report.add("worker_ratio", watched_us / quiet_us, "");
-  report.add("daemon_us", quiet.per_frame_us(quiet.process_s), "the daemon's processor time of a keyframe, without");
-  report.add("daemon_watched_us", watched.per_frame_us(watched.process_s), "with them");
+  report.add("messages_per_s", static_cast<double>(events) / watched_s, "told to all watchers that read");
+  report.add("worker_us", quantile(other_us, 0.5),
+             "the worker's processor time of a keyframe, while the other map is watched");
+  report.add("worker_watched_us", quantile(watched_us, 0.5), "while its own is");
+  report.add("worker_ratio", quantile(ratios, 0.5), "of these two, round by round: the median,");
+  report.add("worker_ratio_p25", quantile(ratios, 0.25), "and the middle half");
+  report.add("worker_ratio_p75", quantile(ratios, 0.75), "");
+  report.add("worker_alone_us", quantile(alone_us, 0.5),
+             "while nobody watches, so that cores and caches are the worker's");
+  report.add("daemon_us", quantile(daemon_us, 0.5),
+             "the daemon's processor time of a keyframe, while the other map is watched");
+  report.add("daemon_watched_us", quantile(daemon_watched_us, 0.5), "while its own is");
   report.add("replies_share", share, "of the memory for replies that is used, all watches and calls together");
   report.add("resident_growth_mb", 1e-6 * resident_bytes, "while they watch");
 }
@@ -249,11 +318,14 @@ void run(const WatchBenchOptions& options, Report& report) {
 
 Run declare_watch(CLI::App& app) {
   auto options = std::make_shared<WatchBenchOptions>();
-  app.add_option("--robots", options->robots, "that send 2 keyframes a second each")->capture_default_str();
+  app.add_option("--robots", options->robots,
+                 "that send 2 keyframes a second each, half of them to each of two daemons")
+      ->capture_default_str();
   app.add_option("--watchers", options->watchers, "of the map")->capture_default_str();
   app.add_option("--stalled", options->stalled, "of them, that read nothing")->capture_default_str();
-  app.add_option("--seconds", options->seconds, "of a phase with watchers, and again without")->capture_default_str();
-  app.add_option("--rounds", options->rounds, "of both phases")->capture_default_str();
+  app.add_option("--seconds", options->seconds, "of a phase: nobody watches, one map is watched, the other is")
+      ->capture_default_str();
+  app.add_option("--rounds", options->rounds, "of the three phases")->capture_default_str();
   app.add_option("--memory-budget-mb", options->memory_budget_mb, "of the daemon")->capture_default_str();
   return [options](Report& report) { run(*options, report); };
 }

@@ -15,8 +15,10 @@ namespace relmap::cli {
 
 namespace {
 
+// Only people are named: most of what happens, nobody asked for.
 std::string by_text(const client::WatchEvent& event) {
-  return (event.author.empty() ? "" : ", by " + event.author) + (event.note.empty() ? "" : ": " + event.note);
+  const bool nobody = event.author.empty() || event.author == "relmapd";
+  return (nobody ? "" : ", by " + event.author) + (event.note.empty() ? "" : ": " + event.note);
 }
 
 std::string why_text(Reason reason) {

@@ -49,6 +49,11 @@ TEST_F(WatchViewTest, ALineSaysWhenWhatWhyAndWho) {
               ElementsAre("2025-11-24 16:00:00  session 4 'noon' of cart is frozen, by anna"));
   EXPECT_THAT(tell(client::FramesRemoved{4, 64}),
               ElementsAre("2025-11-24 16:00:00  session 4 'noon': frames from 64 on are deleted"));
+  EXPECT_THAT(tell(client::SessionDeleted{4, ""}, "anna"),
+              ElementsAre("2025-11-24 16:00:00  session 4 'noon' is deleted, by anna"));
+  EXPECT_THAT(tell(client::EdgeRemoved{{{9, 1}, 2}}, "relmapd"),
+              ElementsAre("2025-11-24 16:00:00  closure 9:1/2 went with its session"))
+      << "nobody asked for it";
   EXPECT_THAT(tell(client::LabelsChanged{{3, 7}, {"dock", "gate"}}),
               ElementsAre("2025-11-24 16:00:00  frame 3:7 is labelled 'dock', 'gate'"));
   EXPECT_THAT(tell(client::LabelsChanged{{3, 7}, {}}),

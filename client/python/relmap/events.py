@@ -23,7 +23,8 @@ class EventOrigin:
 
     Attributes:
         time_us: when the record that brought it about was submitted, microseconds UTC.
-        author: who did it, by his credentials; empty: a robot's own stream, or the daemon.
+        author: who did it, by his credentials, or "relmapd" for what no caller did: the daemon itself, or a robot's
+            own stream; empty: not of the log.
         journal_sequence: of that record.
         note: an operator's.
         resume_token: goes on after this event.
