@@ -87,7 +87,7 @@ class RawCamera:
     k3: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RawStereo(Record):
     """A stereo rig, or a single camera, before rectification. ValueError: a size or transform is impossible.
 

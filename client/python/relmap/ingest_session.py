@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import time as clock
 import uuid as uuids
-from typing import List, Optional, Tuple, Union
+from collections import deque
+from typing import Deque, List, Optional, Tuple, Union
 
 import numpy as np
 
@@ -75,12 +76,21 @@ class IngestState:
         self.ending = False
         self.ended = False
         self.rate_hz = 0.0
-        self._news: List[KeyframeLocalisation] = []
+        self._news: Deque[KeyframeLocalisation] = deque()
         self._last_us: Optional[int] = None
         self._gone_since: Optional[float] = None
         self._unanswered_since: Optional[float] = None
         self._end_at = 0.0
         self._pause = FIRST_PAUSE_S
+
+    def check(self, is_open: bool, is_closed: bool) -> None:
+        """Raises why the session cannot go on: RelmapError; ValueError: it is not open."""
+        if is_closed:
+            raise ValueError("the session is closed; go on with it by client.session(..., uuid=session.uuid)")
+        if self.failure is not None:
+            raise self.failure
+        if not is_open:
+            raise ValueError("the session is not open: use it as a context manager, or call open()")
 
     # ---- Keyframes
 
@@ -154,9 +164,8 @@ class IngestState:
             raise KeyframesRefused(refusals)
 
     def take_news(self) -> Tuple[KeyframeLocalisation, ...]:
-        """News that were not taken before."""
-        news, self._news = tuple(self._news), []
-        return news
+        """News that were not taken before. May be called without a guard."""
+        return tuple(self._news.popleft() for _ in range(len(self._news)))
 
     # ---- One stream
 

@@ -36,7 +36,7 @@ def _count(what: str, count: int) -> None:
         raise ValueError(f"{count} {what}; at most {MAX_MEASUREMENTS}")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Tracks(Record):
     """Tracked points of a keyframe, one element each in every array. ValueError: shapes differ, or a number is impossible.
 
@@ -81,7 +81,7 @@ class Tracks(Record):
         return len(self.sequence)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Features(Record):
     """Appearance features: SIFT at blobs, by which a place is recognised. ValueError: shapes differ, or numbers are impossible.
 

@@ -27,7 +27,7 @@ _LEAST_VARIANCE = 1e-10
 _CARRIED_VARIANCE = (1e4, 10.0)  # m^2, rad^2: what is known of a ride beside what closures measured
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RelaxedPicture(Record):
     """Positions of a skeleton's points for a picture. Parts that no edge joins are placed by themselves, each in the frame of
     its first point.

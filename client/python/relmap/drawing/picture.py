@@ -57,6 +57,9 @@ class Drawing:
     def __str__(self) -> str:
         return self.svg
 
+    def __repr__(self) -> str:
+        return f"<Drawing of {len(self.svg)} bytes; save() writes it, a notebook shows it>"
+
 
 def _check_width(width: int) -> None:
     if not 200 <= width <= 4000:
