@@ -22,7 +22,7 @@ class EventOrigin:
     """Where an event comes from.
 
     Attributes:
-        time_us: when the record that brought it about was submitted, microseconds UTC.
+        time_us: when the record that brought it about was submitted, microseconds UTC; 0: no record did.
         author: who did it, by his credentials; empty: a robot's own stream, or the daemon.
         journal_sequence: of that record.
         note: an operator's.
@@ -47,9 +47,9 @@ class MapEvent(Record):
     origin: EventOrigin
 
     @property
-    def time(self) -> datetime.datetime:
-        """The time, UTC."""
-        return as_datetime(self.origin.time_us)
+    def time(self) -> Optional[datetime.datetime]:
+        """The time, UTC; None: it belongs to none, as CaughtUp and StorageChanged."""
+        return as_datetime(self.origin.time_us) if self.origin.time_us else None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

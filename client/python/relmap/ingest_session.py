@@ -6,12 +6,14 @@ import os
 import time as clock
 import uuid as uuids
 from collections import deque
+from pathlib import Path
 from typing import Deque, List, Optional, Tuple, Union
 
 import numpy as np
 
 from relmap.address import ServerAddress
 from relmap.camera import RawStereo, StereoCamera
+from relmap.choices import choice
 from relmap.connection import Connection
 from relmap.crc32c import crc32c
 from relmap.errors import RelmapError, Unreachable, error_of
@@ -99,7 +101,7 @@ class IngestState:
         time: TimeLike,
         T_odom_frame: ArrayLike,
         step_cov: Optional[ArrayLike],
-        source: Optional[MotionSource],
+        source: Union[None, MotionSource, str],
         tracks: Optional[Tracks],
         features: Optional[Features],
         picture: Union[bytes, "os.PathLike[str]", str],
@@ -112,7 +114,9 @@ class IngestState:
         if self._last_us is not None and time_us <= self._last_us:
             raise ValueError(f"a keyframe of {time_us} us after one of {self._last_us} us: times ascend")
         index = self.core.next_sequence if sequence is None else sequence
-        if source is None:
+        if source is not None:
+            source = choice("source", MotionSource, source)
+        else:
             first = self._last_us is None and index == 0
             source = MotionSource.START if first or not self.header.camera.is_stereo else MotionSource.VISION
         if step_cov is None:
@@ -124,7 +128,9 @@ class IngestState:
             driven_us = max(elapsed - standing_us, 0)
         if self._last_us is not None and driven_us + standing_us > elapsed:
             raise ValueError(f"driven {driven_us} us and standing {standing_us} us, in {elapsed} us")
-        data = picture if isinstance(picture, bytes) else open(picture, "rb").read()
+        if not isinstance(picture, (bytes, str, os.PathLike)):
+            raise TypeError(f"picture is the bytes or the path of a JPEG, not {type(picture).__name__}")
+        data = picture if isinstance(picture, bytes) else Path(picture).read_bytes()
         return Keyframe(
             header=self.header,
             sequence=index,

@@ -72,13 +72,18 @@ class ClientBase:
             last = reply
         return last
 
-    async def _pages(self, method: Any, request: Any, until: float) -> AsyncIterator[Any]:
+    async def _pages(self, method: Any, request: Any, limit: Callable[[], Optional[float]]) -> AsyncIterator[Any]:
         while True:
-            reply = await self._ask(method, request, max(until - time.monotonic(), 0.001))
+            reply = await self._ask(method, request, limit())
             yield reply
             if not reply.next_page_token:
                 return
             request.page_token = reply.next_page_token
+
+    def _left_of(self, timeout: Optional[float]) -> Callable[[], float]:
+        """Counts down: tells how much of the timeout is left."""
+        until = self._until(timeout)
+        return lambda: max(until - time.monotonic(), 0.001)
 
     def _until(self, timeout: Optional[float]) -> float:
         return time.monotonic() + (self._connection.timeout if timeout is None else checked_timeout(timeout))
@@ -92,11 +97,11 @@ class ClientBase:
         timeout: Optional[float],
     ) -> List[T]:
         """All pages of a list; if its version of the map expires, once more from the beginning."""
-        until = self._until(timeout)
+        left = self._left_of(timeout)
 
         async def whole() -> List[T]:
             found: List[T] = []
-            async for reply in self._pages(method, request(), until):
+            async for reply in self._pages(method, request(), left):
                 found.extend(read(item) for item in items(reply))
             return found
 
@@ -119,7 +124,7 @@ class ClientBase:
                 last = error
         raise last
 
-    async def _iterate(
+    def _iterate(
         self,
         method: Any,
         request: Callable[[], Any],
@@ -127,14 +132,12 @@ class ClientBase:
         read: Callable[[Any], T],
         timeout: Optional[float],
     ) -> AsyncIterator[T]:
-        """The items of a list, page by page."""
-        until = self._until(timeout)
+        """The items of a list, page by page; the timeout is for each page."""
 
         def replies() -> AsyncIterator[Any]:
-            return self._pages(method, request(), until)
+            return self._pages(method, request(), lambda: timeout)
 
-        async for item in self._given(replies, items, read, "items", "list"):
-            yield item
+        return self._given(replies, items, read, "items", "list")
 
     async def _given(
         self,

@@ -53,7 +53,7 @@ class ExportCalls(ClientBase):
         files = await self.export_trajectories(ExportFormat.TUM, number, timeout=timeout)
         return parse_tum(number, b"".join(file.data for file in files))
 
-    async def export_frames(
+    def export_frames(
         self, sessions: SessionsLike = (), *, landmarks: bool = False, timeout: Optional[float] = LONG_S
     ) -> AsyncIterator[ExportedFrame]:
         """The frames of each session, ascending, with their landmarks if `landmarks` is set. A stream that breaks goes on.
@@ -73,5 +73,4 @@ class ExportCalls(ClientBase):
         def replies() -> AsyncIterator[Any]:
             return self._caller.resumed(self._map.Export, copied(request), until - time.monotonic())
 
-        async for frame in self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export"):
-            yield frame
+        return self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export")

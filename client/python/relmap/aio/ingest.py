@@ -53,6 +53,10 @@ class AsyncIngestSession:
         )
         self._line = Line(self._state)
 
+    def __repr__(self) -> str:
+        added, safe = self.next_sequence, self.settled_sequence
+        return f"<{type(self).__name__} {self.header.name!r} of {self.header.robot}: {added} sequences, {safe} of them settled>"
+
     async def __aenter__(self) -> "AsyncIngestSession":
         await self.open()
         return self
@@ -125,7 +129,7 @@ class AsyncIngestSession:
         T_odom_frame: ArrayLike,
         step_cov: Optional[ArrayLike] = None,
         *,
-        source: Optional[MotionSource] = None,
+        source: Union[None, MotionSource, str] = None,
         tracks: Optional[Tracks] = None,
         features: Optional[Features] = None,
         picture: Union[bytes, str, "os.PathLike[str]"] = b"",

@@ -175,12 +175,12 @@ class OperatorCalls(ClientBase):
             failed=failed,
             page_size=min(limit, 1000),
         )
-        until_s = self._until(timeout)
+        left = self._left_of(timeout)
 
         async def read() -> AuditLog:
             entries: List[Any] = []
             if limit > 0:
-                async for reply in self._pages(self._admin.ListAudit, copied(request), until_s):
+                async for reply in self._pages(self._admin.ListAudit, copied(request), left):
                     entries.extend(read_audit_entry(entry) for entry in reply.entries)
                     if len(entries) >= limit:
                         break

@@ -88,7 +88,7 @@ class StoredCalls(ClientBase):
 
         return Edges(await self._list(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout))
 
-    async def iter_edges(
+    def iter_edges(
         self,
         *,
         states: StatesLike = (),
@@ -115,6 +115,7 @@ class StoredCalls(ClientBase):
             states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges, around_metres,
                 order: as in edges().
             page_size: how many are asked for at once; 0: as many as the daemon likes.
+            timeout: seconds for each page, since what is done with the edges takes time, too.
         """
 
         def request() -> map_pb2.ListEdgesRequest:
@@ -125,8 +126,8 @@ class StoredCalls(ClientBase):
             made.page_size = page_size
             return made
 
-        async for edge in self._iterate(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout):
-            yield edge
+        request()  # so that wrong arguments are told here, and not when the first edge is asked for
+        return self._iterate(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout)
 
     async def labels(
         self, prefix: str = "", words: str = "", *, timeout: Optional[float] = None

@@ -19,7 +19,7 @@ from relmap.v1 import watch_pb2
 class WatchCalls(ClientBase):
     """The call that follows the map."""
 
-    async def watch(
+    def watch(
         self,
         *,
         sessions: SessionsLike = (),
@@ -53,6 +53,11 @@ class WatchCalls(ClientBase):
         request = watch_pb2.WatchMapRequest(
             sessions=as_sessions(sessions), resume_token=resume_token, no_frames=no_frames, **{"from": start}
         )
+        return self._watch(request, patience, silence)
+
+    async def _watch(
+        self, request: watch_pb2.WatchMapRequest, patience: Optional[float], silence: float
+    ) -> AsyncIterator[MapEvent]:
         caller = self._caller
         gone_since: Optional[float] = None
         pause = FIRST_PAUSE_S

@@ -74,5 +74,4 @@ class ExportCalls(ClientBase):
         def replies() -> Iterator[Any]:
             return self._caller.resumed(self._map.Export, copied(request), until - time.monotonic())
 
-        for frame in self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export"):
-            yield frame
+        return self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export")

@@ -54,6 +54,10 @@ class IngestSession:
         )
         self._line = Line(self._state)
 
+    def __repr__(self) -> str:
+        added, safe = self.next_sequence, self.settled_sequence
+        return f"<{type(self).__name__} {self.header.name!r} of {self.header.robot}: {added} sequences, {safe} of them settled>"
+
     def __enter__(self) -> "IngestSession":
         self.open()
         return self
@@ -126,7 +130,7 @@ class IngestSession:
         T_odom_frame: ArrayLike,
         step_cov: Optional[ArrayLike] = None,
         *,
-        source: Optional[MotionSource] = None,
+        source: Union[None, MotionSource, str] = None,
         tracks: Optional[Tracks] = None,
         features: Optional[Features] = None,
         picture: Union[bytes, str, "os.PathLike[str]"] = b"",

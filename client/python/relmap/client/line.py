@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import threading
 import time as clock
+import warnings
+import weakref
 from types import TracebackType
 from typing import Any, Iterator, Optional, Type
 
@@ -14,6 +17,12 @@ from relmap.errors import DeadlineExceeded, RelmapError, error_of, error_of_rpc
 from relmap.ingest_session import TICK_S, IngestState
 from relmap.reason import Reason
 from relmap.v1 import ingest_pb2
+
+
+AT_EXIT_S = 5.0
+"""Seconds for which a program that ends without having closed a session waits for the daemon's disk."""
+
+_open_lines: "weakref.WeakSet[Line]" = weakref.WeakSet()
 
 
 class Line:
@@ -46,10 +55,16 @@ class Line:
         """Whether open() was called."""
         return self._thread is not None
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether close() was called."""
+        return self._stopping
+
     def open(self) -> None:
         """Begins to stream."""
         self._thread = threading.Thread(target=self._run, name="relmap ingest", daemon=True)
         self._thread.start()
+        _open_lines.add(self)
 
     def close(self) -> None:
         """Ends the stream at once."""
@@ -58,6 +73,25 @@ class Line:
             self._changed.notify_all()
         if self._thread is not None:
             self._thread.join()
+
+    def finish(self) -> None:
+        """At the end of the program, which should have closed the session: waits for the daemon's disk, but not for long, and
+        warns if that was not enough."""
+        core = self._state.core
+        until = clock.monotonic() + AT_EXIT_S
+        try:
+            with self:
+                while not core.all_settled and not self._stopping:
+                    self.wait(until)
+        except RelmapError:
+            pass
+        if not core.all_settled:
+            lost = core.next_sequence - core.settled_sequence
+            warnings.warn(
+                f"the session {self._state.header.name!r} was not closed: {lost} of its keyframes are not on the daemon's"
+                " disk, and lost; use `with client.session(...)`",
+                RuntimeWarning,
+            )
 
     def check(self) -> None:
         """Raises why the session cannot go on: RelmapError; ValueError: it is not open."""
@@ -138,6 +172,13 @@ class Line:
                 if self._stopping or self._state.is_silent:
                     break
         call.cancel()
+
+
+@atexit.register
+def _finish_all() -> None:
+    for line in tuple(_open_lines):
+        if not line.is_closed:
+            line.finish()
 
 
 __all__ = ["Line"]

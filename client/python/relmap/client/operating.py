@@ -176,12 +176,12 @@ class OperatorCalls(ClientBase):
             failed=failed,
             page_size=min(limit, 1000),
         )
-        until_s = self._until(timeout)
+        left = self._left_of(timeout)
 
         def read() -> AuditLog:
             entries: List[Any] = []
             if limit > 0:
-                for reply in self._pages(self._admin.ListAudit, copied(request), until_s):
+                for reply in self._pages(self._admin.ListAudit, copied(request), left):
                     entries.extend(read_audit_entry(entry) for entry in reply.entries)
                     if len(entries) >= limit:
                         break

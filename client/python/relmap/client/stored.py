@@ -116,6 +116,7 @@ class StoredCalls(ClientBase):
             states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges, around_metres,
                 order: as in edges().
             page_size: how many are asked for at once; 0: as many as the daemon likes.
+            timeout: seconds for each page, since what is done with the edges takes time, too.
         """
 
         def request() -> map_pb2.ListEdgesRequest:
@@ -126,8 +127,8 @@ class StoredCalls(ClientBase):
             made.page_size = page_size
             return made
 
-        for edge in self._iterate(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout):
-            yield edge
+        request()  # so that wrong arguments are told here, and not when the first edge is asked for
+        return self._iterate(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout)
 
     def labels(
         self, prefix: str = "", words: str = "", *, timeout: Optional[float] = None

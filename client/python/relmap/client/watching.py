@@ -53,6 +53,11 @@ class WatchCalls(ClientBase):
         request = watch_pb2.WatchMapRequest(
             sessions=as_sessions(sessions), resume_token=resume_token, no_frames=no_frames, **{"from": start}
         )
+        return self._watch(request, patience, silence)
+
+    def _watch(
+        self, request: watch_pb2.WatchMapRequest, patience: Optional[float], silence: float
+    ) -> Iterator[MapEvent]:
         caller = self._caller
         gone_since: Optional[float] = None
         pause = FIRST_PAUSE_S

@@ -54,9 +54,6 @@ class Drawing:
     def _repr_svg_(self) -> str:
         return self.svg
 
-    def __str__(self) -> str:
-        return self.svg
-
     def __repr__(self) -> str:
         return f"<Drawing of {len(self.svg)} bytes; save() writes it, a notebook shows it>"
 
