@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time as clock
 import uuid as uuids
+import warnings
 from collections import deque
 from pathlib import Path
 from typing import Deque, List, Optional, Tuple, Union
@@ -93,6 +94,17 @@ class IngestState:
             raise self.failure
         if not is_open:
             raise ValueError("the session is not open: use it as a context manager, or call open()")
+
+    def warn_of_loss(self) -> None:
+        """Warns if keyframes are not on the daemon's disk: of a session that was not closed when the program ends."""
+        if not self.core.all_settled:
+            lost = self.core.next_sequence - self.core.settled_sequence
+            warnings.warn(
+                f"the session {self.header.name!r} was not closed: {lost} of its keyframes are not on the daemon's disk, and"
+                " lost; use `with client.session(...)`",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     # ---- Keyframes
 

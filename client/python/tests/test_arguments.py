@@ -188,6 +188,18 @@ elif how == "interrupted":
             session.add(step.time, step.T_odom_frame, step.step_cov, tracks=step.tracks, features=step.features)
         print("added", flush=True)
         sys.stdin.read()
+elif how == "forgotten by asyncio":
+    import asyncio
+    import relmap.aio
+
+    async def main():
+        async with await relmap.aio.connect(server) as client:
+            session = client.session("cart", points_world.CAMERA, name=how)
+            await session.open()
+            for step in points_world.drive(3):
+                await session.add(step.time, step.T_odom_frame, step.step_cov, tracks=step.tracks, features=step.features)
+
+    asyncio.run(main())
 else:
     print("watching", flush=True)
     for event in client.watch():
@@ -207,6 +219,8 @@ def test_programs_that_end_early_lose_nothing(own_daemon: Daemon) -> None:
     """A session that is not closed, and Ctrl-C: what was added reaches the disk; the sessions stay open."""
     forgetful = _program(own_daemon, "forgotten")
     assert forgetful.communicate(timeout=PATIENCE_S)[1] == "" and forgetful.returncode == 0
+    hasty = _program(own_daemon, "forgotten by asyncio")  # whose loop does not wait
+    assert "3 of its keyframes" in hasty.communicate(timeout=PATIENCE_S)[1] and hasty.returncode == 0
     for how in ("interrupted", "watching"):
         running = _program(own_daemon, how)
         assert running.stdout is not None and running.stdout.readline()

@@ -81,12 +81,19 @@ class Line:
         self.check()
 
     async def _run(self) -> None:
-        while True:
-            pause = self._state.broken(await self._talk())
-            self._heard.set()
-            if self._state.failure is not None:
-                return
-            await asyncio.sleep(pause)
+        try:
+            while True:
+                pause = self._state.broken(await self._talk())
+                self._heard.set()
+                if self._state.failure is not None:
+                    return
+                await asyncio.sleep(pause)
+        except asyncio.CancelledError:
+            if self._closed:
+                raise
+            # The loop ends. The exception ends here, too: its frames would keep objects of gRPC until the interpreter ends,
+            # at which grpcio 1.51 sometimes hangs.
+            self._state.warn_of_loss()
 
     async def _talk(self) -> RelmapError:
         """Runs one stream until it ends, and returns why it did."""
@@ -108,8 +115,8 @@ class Line:
         except RelmapError as error:
             return error
         except asyncio.CancelledError:
-            if self._closed:
-                raise
+            if self._closed or not self._state.is_silent:
+                raise  # it is this task that is cancelled, by close() or at the loop's end; else _send() has cancelled the call
             return error_of(Reason.UNREACHABLE, "the daemon does not answer")
         except Exception as error:  # so that who waits learns of it
             return error_of(Reason.INTERNAL, f"{type(error).__name__}: {error}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import threading
 import time as clock
-import warnings
 import weakref
 from types import TracebackType
 from typing import Any, Iterator, Optional, Type
@@ -85,13 +84,7 @@ class Line:
                     self.wait(until)
         except RelmapError:
             pass
-        if not core.all_settled:
-            lost = core.next_sequence - core.settled_sequence
-            warnings.warn(
-                f"the session {self._state.header.name!r} was not closed: {lost} of its keyframes are not on the daemon's"
-                " disk, and lost; use `with client.session(...)`",
-                RuntimeWarning,
-            )
+        self._state.warn_of_loss()
 
     def check(self) -> None:
         """Raises why the session cannot go on: RelmapError; ValueError: it is not open."""
