@@ -12,7 +12,6 @@ import grpc
 from relmap.client.silence import Heard
 from relmap.connection import Connection, Stubs, check_boot, checked_timeout, unreachable
 from relmap.errors import ClientClosed, DeadlineExceeded, RelmapError, Unreachable, error_of_rpc
-from relmap.reason import Reason
 from relmap.v1 import status_pb2
 
 MAX_RESUMPTIONS = 3
@@ -61,9 +60,11 @@ class Caller:
     def _failed(self, error: Any, timeout: Optional[float]) -> RelmapError:
         if self.closed:
             return ClientClosed()
-        if error.code() == grpc.StatusCode.DEADLINE_EXCEEDED and error.details() == "Deadline Exceeded":  # gRPC's own words
-            return DeadlineExceeded(Reason.DEADLINE, f"no answer within {self._limit(timeout):g} s (timeout)")
-        return error_of_rpc(error)
+        failed = error_of_rpc(error)
+        limit = self._limit(timeout)
+        if isinstance(failed, DeadlineExceeded) and limit is not None:
+            return DeadlineExceeded(failed.reason, f"{failed.message}; the timeout was {limit:g} s", failed.request_id)
+        return failed
 
     def _limit(self, timeout: Optional[float]) -> Optional[float]:
         limit = self.connection.timeout if timeout is None else checked_timeout(timeout)
