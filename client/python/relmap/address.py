@@ -33,7 +33,7 @@ class ServerAddress:
 
 def _is_host_port(text: str) -> bool:
     host, colon, port = text.rpartition(":")
-    return bool(colon and host) and port.isascii() and port.isdecimal() and 0 < int(port) < 65536
+    return bool(colon and host) and "/" not in host and port.isascii() and port.isdecimal() and 0 < int(port) < 65536
 
 
 def _uri_of_socket(path: str) -> str:
@@ -69,7 +69,9 @@ def resolve_server(server: "str | os.PathLike[str]") -> ServerAddress:
     if not folder:
         if _is_host_port(text) or text.startswith("unix:/"):
             return ServerAddress(text)
-        raise error_of(Reason.INVALID_ARGUMENT, f"'{text}' is neither a data folder nor HOST:PORT")
+        raise error_of(
+            Reason.INVALID_ARGUMENT, f"'{text}' is neither a data folder that exists nor HOST:PORT, such as map.lab:50070"
+        )
     path = Path(text) / "endpoint"
     try:
         lines = path.read_text().splitlines()

@@ -14,6 +14,8 @@ from relmap.v1 import common_pb2
 
 
 def _size(what: str, width: int, height: int) -> None:
+    if not (hasattr(width, "__index__") and hasattr(height, "__index__")):
+        raise ValueError(f"{what} of {width!r} x {height!r} pixels; must be whole numbers")
     if not (16 <= width <= 16384 and 16 <= height <= 16384):
         raise ValueError(f"{what} of {width} x {height} pixels; each side must have 16..16384")
 
@@ -87,7 +89,7 @@ class RawCamera:
     k3: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RawStereo(Record):
     """A stereo rig, or a single camera, before rectification. ValueError: a size or transform is impossible.
 

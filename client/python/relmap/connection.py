@@ -30,6 +30,15 @@ Metadata = Optional[Tuple[Tuple[str, str], ...]]
 """The metadata of a call."""
 
 
+def checked_timeout(timeout: float) -> float:
+    """The same timeout. ValueError: it is not above 0. TypeError: it is no number."""
+    if isinstance(timeout, (str, bytes)) or not hasattr(timeout, "__float__"):
+        raise TypeError(f"timeout is in seconds (math.inf: no limit), not {type(timeout).__name__}")
+    if not timeout > 0:
+        raise ValueError(f"timeout is {timeout} s; must be above 0")
+    return timeout
+
+
 @dataclass(frozen=True)
 class Connection:
     """What a client was connected with. Immutable; channels are opened from it, again after the daemon was restarted.
@@ -49,8 +58,7 @@ class Connection:
     traceparent: str = ""
 
     def __post_init__(self) -> None:
-        if not self.timeout > 0:
-            raise ValueError(f"a timeout of {self.timeout} s; must be above 0")
+        checked_timeout(self.timeout)
         for what, text in (("request_id", self.request_id), ("traceparent", self.traceparent)):
             if not re.fullmatch(r"[!-~]*", text):
                 raise ValueError(f"{what} is {text!r}; must be printable ASCII without spaces")

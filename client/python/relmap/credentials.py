@@ -97,9 +97,17 @@ def credentials_of(
         return None
     if tls is True:
         raise ValueError("tls needs the path or the bytes of the authority's certificate (ca.crt), or credentials")
+    word = (token or "").strip()  # a file that holds it ends with a new line
+    if token is not None and not re.fullmatch(r"[!-~]+", word):
+        raise ValueError("the token is empty, or holds characters that no token has")
     if isinstance(tls, bytes):
-        return Credentials(tls, token=token or "")
+        if b"-----BEGIN CERTIFICATE-----" not in tls:
+            raise ValueError("tls holds no certificate in PEM; it is the path or the bytes of the authority's certificate")
+        return Credentials(tls, token=word)
     try:
-        return Credentials(Path(tls).read_bytes(), token=token or "")
+        authority = Path(tls).read_bytes()
     except OSError as error:
         raise error_of(Reason.NO_SUCH_FILE, f"cannot read {os.fspath(tls)}: {error}") from error
+    if b"-----BEGIN CERTIFICATE-----" not in authority:
+        raise error_of(Reason.BAD_CONFIG, f"{os.fspath(tls)} holds no certificate in PEM")
+    return Credentials(authority, token=word)

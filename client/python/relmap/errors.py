@@ -13,7 +13,15 @@ import grpc
 from relmap.reason import Reason, ReasonGroup
 from relmap.v1 import reason_pb2
 
+E = TypeVar("E", bound="RelmapError")
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _unpickled(kind: Type[E], values: Mapping[str, Any], args: Any) -> E:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(values)
+    return error
 
 
 class RelmapError(Exception):
@@ -34,6 +42,9 @@ class RelmapError(Exception):
         self.reason = reason
         self.message = message
         self.request_id = request_id
+
+    def __reduce__(self) -> Any:  # for pickle: worker processes pass exceptions on
+        return _unpickled, (type(self), self.__dict__, self.args)
 
 
 class RobotDataError(RelmapError):

@@ -22,7 +22,7 @@ class EventOrigin:
     """Where an event comes from.
 
     Attributes:
-        time_us: when the record that brought it about was submitted, microseconds UTC.
+        time_us: when the record that brought it about was submitted, microseconds UTC; 0: no record did.
         author: who did it, by his credentials, or "relmapd" for what no caller did: the daemon itself, or a robot's
             own stream; empty: not of the log.
         journal_sequence: of that record.
@@ -37,7 +37,7 @@ class EventOrigin:
     resume_token: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MapEvent(Record):
     """Something that happened to the map. Its class says what: SessionChanged, EdgeChanged, FramesAdded, ..., CaughtUp.
 
@@ -48,12 +48,12 @@ class MapEvent(Record):
     origin: EventOrigin
 
     @property
-    def time(self) -> datetime.datetime:
-        """The time, UTC."""
-        return as_datetime(self.origin.time_us)
+    def time(self) -> Optional[datetime.datetime]:
+        """The time, UTC; None: it belongs to none, as CaughtUp and StorageChanged."""
+        return as_datetime(self.origin.time_us) if self.origin.time_us else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SessionChanged(MapEvent):
     """A session began, ended, was frozen or thawed, or its deletion began.
 
@@ -69,7 +69,7 @@ class SessionChanged(MapEvent):
     state: SessionState
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SessionDeleted(MapEvent):
     """The last frame of a deleted session is gone.
 
@@ -81,7 +81,7 @@ class SessionDeleted(MapEvent):
     uuid: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EdgeChanged(MapEvent):
     """A loop closure was proposed or changed its state. Of `edge` only its ends, state, reason, transform and evidence are
     set; Client.explain_edge() has the rest."""
@@ -89,14 +89,14 @@ class EdgeChanged(MapEvent):
     edge: Edge
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EdgeRemoved(MapEvent):
     """A closure went with a deleted session."""
 
     edge: EdgeId
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class AddedFrame(Record):
     """A frame that was added.
 
@@ -113,7 +113,7 @@ class AddedFrame(Record):
     source: MotionSource
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FramesAdded(MapEvent):
     """Frames of any sessions, in the order in which the map took them in."""
 
@@ -129,14 +129,14 @@ class FrameRange:
     last: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FramesMoved(MapEvent):
     """Frames whose edges were changed by relaxation."""
 
     ranges: tuple[FrameRange, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FramesRemoved(MapEvent):
     """Of a session that is being deleted: the frame with index `first` and all after it are gone."""
 
@@ -144,7 +144,7 @@ class FramesRemoved(MapEvent):
     first: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FramesSkipped(MapEvent):
     """Sequences that will have no frame.
 
@@ -161,7 +161,7 @@ class FramesSkipped(MapEvent):
     refused: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LabelsChanged(MapEvent):
     """The labels of a frame changed to these."""
 
@@ -169,21 +169,21 @@ class LabelsChanged(MapEvent):
     labels: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RobotChanged(MapEvent):
     """A robot appeared, fell silent, or is blocked for another reason. Not kept, so never told again."""
 
     robot: RobotStatus
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class StorageChanged(MapEvent):
     """Whether keyframes are taken in, or why not. Told at first, and when it changes."""
 
     storage: Condition
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Resync(MapEvent):
     """Events were lost to this watcher: list again what you hold. The events after it are of what happens from here on.
 
@@ -198,7 +198,7 @@ class Resync(MapEvent):
     missed_before: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CaughtUp(MapEvent):
     """Everything was told up to here; comes at least every 15 seconds.
 
@@ -211,7 +211,7 @@ class CaughtUp(MapEvent):
     committed_us: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class UnknownEvent(MapEvent):
     """An event of a newer relmapd, that this version does not know."""
 

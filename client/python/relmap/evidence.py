@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
+from relmap.choices import choice
 from relmap.errors import reads_reply
 from relmap.geometry import Array, frozen, read_covariance, read_transform
 from relmap.graph import (
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from relmap.drawing.picture import Drawing
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MotionVerdict(Record):
     """What the way between the ends without this closure says of it.
 
@@ -71,7 +72,7 @@ class Agreement:
     agrees: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Explanation(Record):
     """What a loop closure is believed for.
 
@@ -148,20 +149,16 @@ class ClosureMatrix(Table[ClosureCount]):
         """The names of the columns of to_pandas()."""
         return "session_a session_b candidate accepted quarantined removed suspicion most_suspicious".split()
 
-    def counts(self, state: EdgeState = EdgeState.ACCEPTED) -> tuple[tuple[int, ...], Array]:
+    def counts(self, state: Union[EdgeState, str] = EdgeState.ACCEPTED) -> tuple[tuple[int, ...], Array]:
         """The n sessions that have closures, and the symmetric matrix (n, n) of the numbers of those in this state."""
+        name = choice("state", EdgeState, state).name.lower()
         sessions = sorted({s for count in self for s in (count.session_a, count.session_b)})
         place = {session: i for i, session in enumerate(sessions)}
         matrix = np.zeros((len(sessions), len(sessions)), np.int64)
         for count in self:
             a, b = place[count.session_a], place[count.session_b]
-            matrix[a, b] = matrix[b, a] = getattr(count, state.name.lower())
+            matrix[a, b] = matrix[b, a] = getattr(count, name)
         return tuple(sessions), frozen(matrix)
-
-    def _repr_html_(self) -> str:
-        from relmap.drawing.html import table_html
-
-        return table_html(self.columns(), [_count_row(count) for count in self[:100]], len(self), "pairs of sessions")
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +186,7 @@ class ClosureChange:
     bound_frames: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class EdgeEdit(Record):
     """The result of an edit of a closure or of a proposal; of a dry run, the result that it would have.
 

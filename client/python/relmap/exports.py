@@ -24,7 +24,7 @@ class ExportFormat(enum.IntEnum):
     """Lines with the upper three rows of the pose matrix, row by row."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TrajectoryFile(Record):
     """The trajectory of one session, as a file.
 
@@ -39,7 +39,7 @@ class TrajectoryFile(Record):
     doubtful: Edges
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ExportedFrame(Record):
     """A frame, with the landmarks that are based in it if they were asked for.
 

@@ -74,6 +74,26 @@ def so3_log(R: Array) -> Array:
     return np.asarray(2.0 * math.atan2(sine, w) / sine * v)
 
 
+def so3_exp_all(phi: Array) -> Array:
+    """The rotations (n, 3, 3) of rotation vectors (n, 3, radians)."""
+    angle = np.sqrt(np.sum(phi * phi, axis=1))[:, None, None]
+    K = np.zeros((len(phi), 3, 3))
+    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = phi.T
+    K -= np.swapaxes(K, 1, 2)
+    safe = np.where(angle < 1e-8, 1.0, angle)
+    first = np.where(angle < 1e-8, 1.0, np.sin(safe) / safe)
+    second = np.where(angle < 1e-8, 0.5, (1 - np.cos(safe)) / safe**2)
+    return np.asarray(np.eye(3) + first * K + second * (K @ K))
+
+
+def so3_log_all(R: Array) -> Array:
+    """The rotation vectors (n, 3, radians, of length 0..pi) of rotations (n, 3, 3). Of half a turn the axis is lost."""
+    axis = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1) / 2
+    sine = np.sqrt(np.sum(axis * axis, axis=1))
+    angle = np.arctan2(sine, (np.trace(R, axis1=1, axis2=2) - 1) / 2)
+    return np.asarray(np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)[:, None] * axis)
+
+
 def _left_jacobian(phi: Array) -> Array:
     angle = float(np.sqrt(np.dot(phi, phi)))
     K = skew(phi)

@@ -210,7 +210,7 @@ class UnmeasuredStretch:
     distance_m: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Edge(Record):
     """An edge of the map: a step of a robot's motion, or a loop closure.
 
@@ -308,12 +308,6 @@ class Edges(Table[Edge]):
             "id a b kind state reason carries metres support verification inliers probability spread suspicion time_us"
         ).split()
 
-    def _repr_html_(self) -> str:
-        from relmap.drawing.html import table_html
-
-        shown = [_edge_row(edge) for edge in self[:50]]
-        return table_html(self.columns(), shown, len(self), "edges")
-
 
 @dataclass(frozen=True, slots=True)
 class Session:
@@ -382,7 +376,7 @@ class Sessions(Table[Session]):
         raise KeyError(f"no session is named {name!r}; there are " + ", ".join(repr(s.name) for s in self[:20]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FramePicture(Record):
     """The picture that the map keeps of a frame: of the rectified left camera, grey, possibly reduced.
 
@@ -401,7 +395,7 @@ class FramePicture(Record):
     message: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Landmarks(Record):
     """Landmarks that are based in a frame, one element each in every array.
 
@@ -419,7 +413,7 @@ class Landmarks(Record):
         return len(self.slot)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Observations(Record):
     """What a frame sees of landmarks, one element each in every array.
 
@@ -441,7 +435,7 @@ class Observations(Record):
         return len(self.landmark)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Frame(Record):
     """A keyframe of the map.
 
@@ -482,6 +476,21 @@ class LabelledFrames:
 
     label: str
     frames: tuple[FrameId, ...]
+
+
+def _label_row(labelled: LabelledFrames) -> Mapping[str, Any]:
+    return {"label": labelled.label, "frames": ", ".join(str(frame) for frame in labelled.frames)}
+
+
+class Labels(Table[LabelledFrames]):
+    """Labels, ascending, with their frames."""
+
+    row = staticmethod(_label_row)
+
+    @classmethod
+    def columns(cls) -> Sequence[str]:
+        """The names of the columns of to_pandas()."""
+        return ("label", "frames")
 
 
 def _edge_ids(messages: Iterable[Any]) -> tuple[EdgeId, ...]:

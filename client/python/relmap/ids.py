@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from dataclasses import dataclass
-from typing import Union
+from typing import Any, Protocol, Sequence, Union, cast
 
 from relmap.v1 import common_pb2
 
@@ -82,10 +83,38 @@ class LandmarkId:
         return f"{self.base}.{self.slot}"
 
 
-FrameLike = Union[FrameId, str]
-"""A frame, or its text "3:120"."""
-EdgeLike = Union[EdgeId, str]
-"""An edge, or its text "3:120/1"."""
+class HasFrameId(Protocol):
+    """A record of a frame."""
+
+    @property
+    def id(self) -> FrameId:
+        """Its identity."""
+
+
+class HasEdgeId(Protocol):
+    """A record of an edge."""
+
+    @property
+    def id(self) -> EdgeId:
+        """Its identity."""
+
+
+class HasNumber(Protocol):
+    """A session of the map, or one into which keyframes are streamed."""
+
+    @property
+    def number(self) -> int:
+        """Its number in the map, from 1."""
+
+
+FrameLike = Union[FrameId, str, HasFrameId]
+"""A frame: its id, its text "3:120", or a Frame."""
+EdgeLike = Union[EdgeId, str, HasEdgeId]
+"""An edge: its id, its text "3:120/1", or an Edge."""
+SessionLike = Union[int, HasNumber]
+"""A session: its number, or a Session."""
+SessionsLike = Union[SessionLike, Sequence[SessionLike]]
+"""Sessions: one, or several."""
 
 
 def as_frame(frame: FrameLike) -> FrameId:
@@ -94,7 +123,10 @@ def as_frame(frame: FrameLike) -> FrameId:
         return frame
     if isinstance(frame, str):
         return FrameId.parse(frame)
-    raise TypeError(f"a frame is a FrameId or a text such as '3:120', not {type(frame).__name__}")
+    known = getattr(frame, "id", None)
+    if isinstance(known, FrameId):
+        return known
+    raise TypeError(f"a frame is a FrameId, a Frame or a text such as '3:120', not {type(frame).__name__}")
 
 
 def as_edge(edge: EdgeLike) -> EdgeId:
@@ -103,7 +135,28 @@ def as_edge(edge: EdgeLike) -> EdgeId:
         return edge
     if isinstance(edge, str):
         return EdgeId.parse(edge)
-    raise TypeError(f"an edge is an EdgeId or a text such as '3:120/1', not {type(edge).__name__}")
+    known = getattr(edge, "id", None)
+    if isinstance(known, EdgeId):
+        return known
+    raise TypeError(f"an edge is an EdgeId, an Edge or a text such as '3:120/1', not {type(edge).__name__}")
+
+
+def as_session(session: SessionLike, what: str = "session", least: int = 1) -> int:
+    """The number of the session that is meant. ValueError: it is below `least`, or too large. TypeError: it is no session."""
+    known: Any = getattr(session, "number", session)
+    if isinstance(known, bool) or not hasattr(known, "__index__"):
+        raise TypeError(f"{what} is a session's number or a Session, not {type(session).__name__}")
+    number = operator.index(known)
+    if not least <= number <= _MAX_U32:
+        raise ValueError(f"{what} is {number}; must be a session's number, {least} or more")
+    return number
+
+
+def as_sessions(sessions: SessionsLike) -> list[int]:
+    """The numbers of the sessions that are meant. ValueError, TypeError as as_session()."""
+    if hasattr(sessions, "number") or hasattr(sessions, "__index__"):
+        return [as_session(cast(SessionLike, sessions))]
+    return [as_session(session, "a session") for session in cast(Sequence[SessionLike], sessions)]
 
 
 def read_frame_id(message: common_pb2.FrameId) -> FrameId:

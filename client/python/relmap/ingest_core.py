@@ -79,7 +79,7 @@ class SessionStatus:
     credits: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class KeyframeLocalisation(Record):
     """News: a keyframe of the session was found elsewhere in the map, or its closure is no longer in force.
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import time as clock
 import uuid as uuids
-from typing import List, Optional, Tuple, Union
+import warnings
+from collections import deque
+from pathlib import Path
+from typing import Deque, List, Optional, Tuple, Union
 
 import numpy as np
 
 from relmap.address import ServerAddress
 from relmap.camera import RawStereo, StereoCamera
+from relmap.choices import choice
 from relmap.connection import Connection
 from relmap.crc32c import crc32c
 from relmap.errors import RelmapError, Unreachable, error_of
@@ -75,12 +79,32 @@ class IngestState:
         self.ending = False
         self.ended = False
         self.rate_hz = 0.0
-        self._news: List[KeyframeLocalisation] = []
+        self._news: Deque[KeyframeLocalisation] = deque()
         self._last_us: Optional[int] = None
         self._gone_since: Optional[float] = None
         self._unanswered_since: Optional[float] = None
         self._end_at = 0.0
         self._pause = FIRST_PAUSE_S
+
+    def check(self, is_open: bool, is_closed: bool) -> None:
+        """Raises why the session cannot go on: RelmapError; ValueError: it is not open."""
+        if is_closed:
+            raise ValueError("the session is closed; go on with it by client.session(..., uuid=session.uuid)")
+        if self.failure is not None:
+            raise self.failure
+        if not is_open:
+            raise ValueError("the session is not open: use it as a context manager, or call open()")
+
+    def warn_of_loss(self) -> None:
+        """Warns if keyframes are not on the daemon's disk: of a session that was not closed when the program ends."""
+        if not self.core.all_settled:
+            lost = self.core.next_sequence - self.core.settled_sequence
+            warnings.warn(
+                f"the session {self.header.name!r} was not closed: {lost} of its keyframes are not on the daemon's disk, and"
+                " lost; use `with client.session(...)`",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     # ---- Keyframes
 
@@ -89,7 +113,7 @@ class IngestState:
         time: TimeLike,
         T_odom_frame: ArrayLike,
         step_cov: Optional[ArrayLike],
-        source: Optional[MotionSource],
+        source: Union[None, MotionSource, str],
         tracks: Optional[Tracks],
         features: Optional[Features],
         picture: Union[bytes, "os.PathLike[str]", str],
@@ -102,7 +126,9 @@ class IngestState:
         if self._last_us is not None and time_us <= self._last_us:
             raise ValueError(f"a keyframe of {time_us} us after one of {self._last_us} us: times ascend")
         index = self.core.next_sequence if sequence is None else sequence
-        if source is None:
+        if source is not None:
+            source = choice("source", MotionSource, source)
+        else:
             first = self._last_us is None and index == 0
             source = MotionSource.START if first or not self.header.camera.is_stereo else MotionSource.VISION
         if step_cov is None:
@@ -114,7 +140,9 @@ class IngestState:
             driven_us = max(elapsed - standing_us, 0)
         if self._last_us is not None and driven_us + standing_us > elapsed:
             raise ValueError(f"driven {driven_us} us and standing {standing_us} us, in {elapsed} us")
-        data = picture if isinstance(picture, bytes) else open(picture, "rb").read()
+        if not isinstance(picture, (bytes, str, os.PathLike)):
+            raise TypeError(f"picture is the bytes or the path of a JPEG, not {type(picture).__name__}")
+        data = picture if isinstance(picture, bytes) else Path(picture).read_bytes()
         return Keyframe(
             header=self.header,
             sequence=index,
@@ -154,9 +182,8 @@ class IngestState:
             raise KeyframesRefused(refusals)
 
     def take_news(self) -> Tuple[KeyframeLocalisation, ...]:
-        """News that were not taken before."""
-        news, self._news = tuple(self._news), []
-        return news
+        """News that were not taken before. May be called without a guard."""
+        return tuple(self._news.popleft() for _ in range(len(self._news)))
 
     # ---- One stream
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import os
 import struct
 import uuid as uuids
 from dataclasses import dataclass, field
-from typing import Iterator, Sequence, Tuple
+from typing import BinaryIO, Iterator, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -63,7 +65,7 @@ def check_name(what: str, name: str) -> str:
     return name
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SessionHeader(Record):
     """What a session begins with, and every keyframe repeats. ValueError: a name, or a nil uuid.
 
@@ -91,7 +93,7 @@ class SessionHeader(Record):
             raise ValueError("the session's uuid is nil")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Keyframe(Record):
     """A keyframe, as a robot sends it.
 
@@ -339,10 +341,30 @@ def decode_keyframe(data: bytes) -> Keyframe:
     )
 
 
-def read_keyframes(data: bytes) -> Iterator[Keyframe]:
-    """The keyframes of a file as relmap-sim and `relmap-frontend --out` write it: u32 length, then the bytes, of each.
-    ValueError: the file is none."""
-    reader = _Reader(data)
-    while reader.position < len(data):
-        (size,) = struct.unpack("<I", reader.take(4))
-        yield decode_keyframe(reader.take(size))
+def _parts(file: BinaryIO) -> Iterator[bytes]:
+    while head := file.read(4):
+        if len(head) < 4:
+            raise ValueError("the file of keyframes ends within a length")
+        (size,) = struct.unpack("<I", head)
+        if size > MAX_KEYFRAME_BYTES:
+            raise ValueError(f"a keyframe of {size} bytes, at most {MAX_KEYFRAME_BYTES}: is this a file of keyframes?")
+        data = file.read(size)
+        if len(data) < size:
+            raise ValueError(f"the file of keyframes ends within a keyframe, {size - len(data)} bytes early")
+        yield data
+
+
+def read_keyframes(file: Union[bytes, str, "os.PathLike[str]"]) -> Iterator[Keyframe]:
+    """The keyframes of a file as relmap-sim and `relmap-frontend --out` write it: u32 length, then the bytes, of each. They
+    are read one by one, so the file may be larger than the memory.
+
+    Args:
+        file: its path, or its bytes.
+
+    Raises:
+        ValueError: the file is none, or ends early; what comes before is given out.
+        OSError: the file cannot be read.
+    """
+    with io.BytesIO(file) if isinstance(file, bytes) else open(file, "rb") as opened:
+        for data in _parts(opened):
+            yield decode_keyframe(data)

@@ -36,7 +36,7 @@ def _count(what: str, count: int) -> None:
         raise ValueError(f"{count} {what}; at most {MAX_MEASUREMENTS}")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Tracks(Record):
     """Tracked points of a keyframe, one element each in every array. ValueError: shapes differ, or a number is impossible.
 
@@ -81,16 +81,16 @@ class Tracks(Record):
         return len(self.sequence)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Features(Record):
     """Appearance features: SIFT at blobs, by which a place is recognised. ValueError: shapes differ, or numbers are impossible.
 
     Attributes:
         u, v: float32 (n,), pixels in the rectified left picture.
-        disparity: float32 (n,), u_left - u_right in pixels, at least 0; NaN if it was not measured. None: of none.
         scale: float32 (n,), diameter of the described region in pixels, above 0.
         angle: float32 (n,), radians.
-        sift: uint8 (n, 128), descriptors.
+        sift: uint8 (n, 128), descriptors; as whole float numbers 0..255, too, as OpenCV gives them.
+        disparity: float32 (n,), u_left - u_right in pixels, at least 0; NaN if it was not measured. None: of none.
         track: int16 (n,), the position of its track among the keyframe's tracks, or -1. None: none has one.
     """
 
@@ -112,8 +112,10 @@ class Features(Record):
         object.__setattr__(self, "disparity", _column("disparity", self.disparity, np.float32, n, nan=True))
         object.__setattr__(self, "track", _column("track", self.track, np.int16, n))
         sift = np.array(self.sift)
+        if sift.dtype.kind == "f" and np.all((sift >= 0) & (sift <= 255) & (sift == np.rint(sift))):
+            sift = sift.astype(np.uint8)  # as OpenCV gives them
         if sift.shape != (n, 128) or sift.dtype != np.uint8:
-            raise ValueError(f"sift has shape {sift.shape} of {sift.dtype}; must be ({n}, 128) of uint8")
+            raise ValueError(f"sift has shape {sift.shape} of {sift.dtype}; must be ({n}, 128) of uint8, or of whole numbers 0..255")
         object.__setattr__(self, "sift", frozen(sift))
         if np.any(self.scale <= 0):
             raise ValueError("scale must be above 0")

@@ -15,6 +15,9 @@ from relmap.geometry import Array
 PictureLike = Union[str, "os.PathLike[str]", bytes, Array]
 """A picture: the path of a JPEG or PNG file, the bytes of one, or an array, H x W (grey) or H x W x 3 (RGB), of uint8."""
 
+KINDS_OF_PICTURES = "a path, bytes (of an open file: file.read()) or an array of uint8 (of another picture: numpy.asarray)"
+"""What a picture may be, for messages."""
+
 MAX_PICTURE_BYTES = 16 * 2**20
 """The largest file that relmapd takes."""
 
@@ -28,6 +31,8 @@ def encode_png(pixels: Array) -> bytes:
     if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8:
         kind = pixels.dtype if isinstance(pixels, np.ndarray) else type(pixels).__name__
         raise ValueError(f"a picture of {kind}; must be an array of uint8")
+    if pixels.ndim == 3 and pixels.shape[2] == 1:
+        pixels = pixels[:, :, 0]
     if not (pixels.ndim == 2 or (pixels.ndim == 3 and pixels.shape[2] == 3)) or 0 in pixels.shape:
         raise ValueError(f"a picture of shape {pixels.shape}; must be H x W (grey) or H x W x 3 (RGB)")
     height, width = pixels.shape[:2]
@@ -55,7 +60,7 @@ def picture_bytes(picture: PictureLike) -> bytes:
     elif isinstance(picture, (str, os.PathLike)):
         data = Path(picture).read_bytes()
     else:
-        raise TypeError(f"a picture is a path, bytes or an array, not {type(picture).__name__}")
+        raise TypeError(f"a picture is {KINDS_OF_PICTURES}, not {type(picture).__name__}")
     if len(data) > MAX_PICTURE_BYTES:
         raise ValueError(f"a picture of {len(data)} bytes; at most {MAX_PICTURE_BYTES}")
     if not data.startswith((b"\xff\xd8\xff", b"\x89PNG")):

@@ -17,7 +17,7 @@ from relmap.tables import Table
 from relmap.v1 import evidence_pb2, map_pb2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Correspondences(Record):
     """Points that a view and a frame of the map both show, one element each in every array.
 
@@ -40,7 +40,7 @@ class Correspondences(Record):
         return len(self.inlier)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Localisation(Record):
     """The pose of a view, relative to a frame of the map. There are no global coordinates.
 
@@ -85,7 +85,7 @@ class Localisation(Record):
         return PoseKind.RELATIVE
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlaceMatch(Record):
     """A place that a view could show.
 

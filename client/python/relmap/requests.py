@@ -10,6 +10,7 @@ from typing import Iterator, Optional, Sequence, Union
 
 import numpy as np
 
+from relmap.choices import choice, choices
 from relmap.geometry import (
     Array,
     ArrayLike,
@@ -20,7 +21,7 @@ from relmap.geometry import (
     transform_message,
 )
 from relmap.graph import EdgeKind, EdgeState
-from relmap.ids import EdgeLike, FrameLike, edge_message, frame_message
+from relmap.ids import EdgeLike, FrameLike, SessionLike, as_session, as_sessions, edge_message, frame_message
 from relmap.record import Record
 from relmap.routes import RouteBy, RouteEnd, RouteFilter, RouteWeights, end_message
 from relmap.times import TimeLike, as_us
@@ -55,7 +56,15 @@ class EdgeOrder(enum.IntEnum):
     """Loop closures only, the newest first."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+OrderLike = Union[EdgeOrder, str]
+"""An order, or its name: "id", "suspicion", "time"."""
+StatesLike = Union[EdgeState, str, Sequence[Union[EdgeState, str]]]
+"""States, or their names, such as "accepted"; one, or several."""
+KindsLike = Union[EdgeKind, str, Sequence[Union[EdgeKind, str]]]
+"""Kinds, or their names, such as "loop"; one, or several."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ImportedLoop(Record):
     """A loop closure of a graph that is imported. ValueError: not finite, or no transform or covariance.
 
@@ -95,10 +104,10 @@ def _finite(what: str, value: float, low: float = 0.0, high: float = math.inf) -
 
 
 def edges_request(
-    states: Sequence[EdgeState],
-    kinds: Sequence[EdgeKind],
-    session: int,
-    other_session: int,
+    states: StatesLike,
+    kinds: KindsLike,
+    session: SessionLike,
+    other_session: SessionLike,
     frame: Optional[FrameLike],
     since: Optional[TimeLike],
     until: Optional[TimeLike],
@@ -106,22 +115,23 @@ def edges_request(
     around: Optional[FrameLike],
     around_edges: int,
     around_metres: float,
-    order: EdgeOrder,
+    order: OrderLike,
 ) -> map_pb2.ListEdgesRequest:
     """The request of Client.edges(). ValueError: a filter that means nothing."""
     request = map_pb2.ListEdgesRequest(
-        session=session,
-        other_session=other_session,
+        session=as_session(session, "session", 0),
+        other_session=as_session(other_session, "other_session", 0),
         from_us=0 if since is None else as_us(since),
         until_us=0 if until is None else as_us(until),
         min_suspicion=_finite("min_suspicion", min_suspicion, 0.0, 1.0),
     )
-    if other_session and not session:
+    if request.other_session and not request.session:
         raise ValueError("other_session needs session")
-    request.states.extend(int(state) for state in states)
-    request.kinds.extend(int(kind) for kind in kinds)
-    if order != EdgeOrder.ID:
-        request.order = int(order)  # type: ignore[assignment]
+    request.states.extend(int(state) for state in choices("states", EdgeState, states))
+    request.kinds.extend(int(kind) for kind in choices("kinds", EdgeKind, kinds))
+    by = choice("order", EdgeOrder, order)
+    if by != EdgeOrder.ID:
+        request.order = int(by)  # type: ignore[assignment]
     if frame is not None:
         request.frame.CopyFrom(frame_message(frame))
     if around is not None:
@@ -165,7 +175,7 @@ def edge_state_request(
 def route_request(
     start: RouteEnd,
     goal: RouteEnd,
-    by: RouteBy,
+    by: Union[RouteBy, str],
     weights: Optional[RouteWeights],
     count_standing: bool,
     max_cost: float,
@@ -180,7 +190,7 @@ def route_request(
         raise ValueError(f"alternatives is {alternatives}; must be 0..5")
     request = map_pb2.FindRouteRequest(
         to=end_message(goal),
-        by=int(RouteBy(by)),  # type: ignore[arg-type]
+        by=int(choice("by", RouteBy, by)),  # type: ignore[arg-type]
         count_standing=count_standing,
         max_cost=_finite("max_cost", max_cost),
         or_from=[end_message(end) for end in or_from],
@@ -197,7 +207,7 @@ def route_request(
         request.weights.CopyFrom(map_pb2.RouteWeights(**values))
     request.filter.CopyFrom(
         map_pb2.RouteFilter(
-            sessions=filter.sessions,
+            sessions=as_sessions(filter.sessions),
             avoid_frames=[frame_message(frame) for frame in filter.avoid_frames],
             avoid_labels=filter.avoid_labels,
             min_support=filter.min_support,

@@ -27,7 +27,7 @@ from relmap.graph import (
     read_carried,
     read_edge,
 )
-from relmap.ids import EdgeId, FrameId, FrameLike, frame_message, read_edge_id, read_frame_id
+from relmap.ids import EdgeId, FrameId, FrameLike, HasFrameId, SessionsLike, frame_message, read_edge_id, read_frame_id
 from relmap.places import Localisation, read_localisation
 from relmap.record import Record
 from relmap.tables import make_table
@@ -52,8 +52,8 @@ class Robot:
     name: str
 
 
-RouteEnd = Union[FrameId, Label, Robot, View, str]
-"""An end of a route. A text is a frame if it has the form "3:120", else a label."""
+RouteEnd = Union[FrameId, HasFrameId, Label, Robot, View, str]
+"""An end of a route: a frame, the frames of a label, a robot, or a view. A text is a frame if it has the form "3:120", else a label."""
 
 
 class RouteBy(enum.IntEnum):
@@ -96,7 +96,7 @@ class RouteFilter:
         suppose_candidates, suppose_quarantined: treat such closures as edges.
     """
 
-    sessions: Sequence[int] = ()
+    sessions: SessionsLike = ()
     avoid_frames: Sequence[FrameLike] = ()
     avoid_labels: Sequence[str] = ()
     min_support: int = 0
@@ -105,7 +105,7 @@ class RouteFilter:
     suppose_quarantined: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Route(Record):
     """A route, step by step: n frames, one element each in every list and array.
 
@@ -202,7 +202,7 @@ class Route(Record):
         return self.draw().svg
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TransformBetween(Record):
     """The transform between two frames along the path between them.
 
@@ -238,7 +238,7 @@ class TransformBetween(Record):
         return PoseKind.RELATIVE
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Neighbourhood(Record):
     """The part of the map around a frame, in that frame's coordinates: n frames in the order of discovery.
 
@@ -301,7 +301,7 @@ class Neighbourhood(Record):
         return self.draw().svg
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Trajectory(Record):
     """The motion of one session, chained along its odometry edges: n frames.
 
@@ -334,8 +334,8 @@ def end_message(end: RouteEnd) -> map_pb2.RouteEnd:
     """An end of a route as a message. TypeError: it is none."""
     if isinstance(end, str):
         end = FrameId.parse(end) if re.fullmatch(r"\d+:\d+", end) else Label(end)
-    if isinstance(end, FrameId):
-        return map_pb2.RouteEnd(frame=frame_message(end))
+    if isinstance(end, FrameId) or isinstance(getattr(end, "id", None), FrameId):
+        return map_pb2.RouteEnd(frame=frame_message(end))  # type: ignore[arg-type]
     if isinstance(end, Label):
         return map_pb2.RouteEnd(label=end.text)
     if isinstance(end, Robot):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from relmap.relaxation import RelaxedPicture
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SkeletonChain(Record):
     """Kept frames of one session that motion joins: n points, one element each in every array.
 
@@ -46,7 +46,7 @@ class SkeletonChain(Record):
         return len(self.index)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SkeletonClosures(Record):
     """Loop closures of a skeleton: n, one element each in every array.
 
@@ -80,7 +80,7 @@ class SkeletonClosures(Record):
         return EdgeId(FrameId(int(self.b[i, 0]), int(self.b[i, 1])), int(self.ordinal[i]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Skeleton(Record):
     """The shape of the map, or of some sessions, of one version.
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, field
 from typing import Any, Optional, Union
 
 import numpy as np
 
 from relmap.camera import RawStereo, StereoCamera, camera_message, raw_message
-from relmap.ids import FrameId, frame_message
+from relmap.ids import FrameId, HasFrameId, SessionLike, as_frame, as_session, frame_message
 from relmap.measurements import Features, feature_set_message
-from relmap.pictures import PictureLike, picture_bytes
+from relmap.pictures import KINDS_OF_PICTURES, PictureLike, picture_bytes
 from relmap.v1 import common_pb2
 
-CameraLike = Union[StereoCamera, RawStereo, int]
+CameraLike = Union[StereoCamera, RawStereo, SessionLike]
 """The camera that took a view: a rectified one (the pictures are rectified), a rig before rectification (they are not),
-or the number of a session of the map, whose camera took the raw pictures."""
+or a session of the map (its number, or a Session), whose camera took the raw pictures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +71,7 @@ class View:
         elif isinstance(self.camera, RawStereo):
             message.raw.CopyFrom(raw_message(self.camera))
         elif self.camera is not None:
-            if isinstance(self.camera, bool) or not isinstance(self.camera, int) or self.camera < 1:
-                raise ValueError(f"the camera is {self.camera!r}; must be a camera, or the number of a session")
-            message.session = self.camera
+            message.session = as_session(self.camera, "a camera other than StereoCamera and RawStereo")
         object.__setattr__(self, "_message", message)
 
     @property
@@ -81,8 +80,8 @@ class View:
         return self._message
 
 
-ViewLike = Union[View, FrameId, PictureLike]
-"""A view, a frame of the map (what it saw), or a picture: a path, bytes, or an array of uint8."""
+ViewLike = Union[View, FrameId, HasFrameId, PictureLike]
+"""A view, a frame of the map (what it saw; its text "3:120", too), or a picture: a path, bytes, or an array of uint8."""
 
 
 def as_view(view: ViewLike, right: Optional[PictureLike] = None, camera: Optional[CameraLike] = None) -> View:
@@ -91,11 +90,13 @@ def as_view(view: ViewLike, right: Optional[PictureLike] = None, camera: Optiona
         if right is not None or camera is not None:
             raise ValueError("a View has its right picture and its camera itself")
         return view
-    if isinstance(view, FrameId):
-        return View(frame=view, right=right, camera=camera)
+    if isinstance(view, FrameId) or isinstance(getattr(view, "id", None), FrameId):
+        return View(frame=as_frame(view), right=right, camera=camera)  # type: ignore[arg-type]
+    if isinstance(view, str) and re.fullmatch(r"\d+:\d+", view):
+        return View(frame=FrameId.parse(view), right=right, camera=camera)
     if isinstance(view, (str, os.PathLike, bytes, np.ndarray)):
         return View(left=view, right=right, camera=camera)
-    raise TypeError(f"a view is a View, a FrameId, a path, bytes or an array, not {type(view).__name__}")
+    raise TypeError(f"a view is a View, a FrameId, or {KINDS_OF_PICTURES}, not {type(view).__name__}")
 
 
 def view_message(view: Any, right: Optional[PictureLike] = None, camera: Optional[CameraLike] = None) -> common_pb2.View:

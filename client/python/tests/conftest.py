@@ -79,8 +79,11 @@ class Daemon:
 
 
 def program(name: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    """Runs a program of the build to its end."""
-    return subprocess.run([str(BIN / name), *arguments], check=True, capture_output=True, text=True)
+    """Runs a program of the build to its end. RuntimeError, with what it said: it failed."""
+    done = subprocess.run([str(BIN / name), *arguments], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"{name} ended with {done.returncode}: {done.stderr[-2000:]}")
+    return done
 
 
 def ingest(client: relmap.Client, name: str, frames: int, start: int = 0) -> int:

@@ -310,7 +310,7 @@ def test_an_address_that_nobody_serves_is_told(tmp_path: Any) -> None:
         relmap.connect(tmp_path)
     with pytest.raises(relmap.Unreachable, match="nothing answers at 127.0.0.1:9"):
         relmap.connect("127.0.0.1:9", timeout=5)
-    with pytest.raises(relmap.RequestError, match="neither a data folder nor HOST:PORT"):
+    with pytest.raises(relmap.RequestError, match="neither a data folder that exists nor HOST:PORT"):
         relmap.connect("nowhere")
     (tmp_path / "endpoint").write_text("socket /nowhere/socket\npid 7\nboot 0a\n")
     with pytest.raises(relmap.Unreachable, match="written by process 7"):

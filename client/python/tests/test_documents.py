@@ -24,7 +24,7 @@ def documented(
     """A daemon with a drive of pictures as session 1 and drives through points; and a folder with pictures."""
     folder = tmp_path_factory.mktemp("documented")
     running = Daemon(folder / "map", "--backup-root", str(folder))
-    keyframes = list(relmap.read_keyframes(keyframe_files[1].read_bytes()))
+    keyframes = list(relmap.read_keyframes(keyframe_files[1]))
     header = keyframes[0].header
     with relmap.connect(running.server, timeout=PATIENCE_S) as client:
         with client.session(header.robot, header.camera, name=header.name, uuid=header.uuid, raw=header.raw) as session:
@@ -54,7 +54,7 @@ REPLACED = (
     (r'"1:45", "charging', '"2:45", "charging'),
     (r"FrameId\(2, 8\)", "FrameId(2, 30)"),
     (r"client\.localise\(picture\) ", "client.localise(picture, camera=1) "),
-    (r"by=relmap\.RouteBy\.TIME", 'by=relmap.RouteBy.TIME, or_from=["2:30"]'),
+    (r'by="time"', 'by="time", or_from=["2:30"]'),
     (r"place\.frame, \"charging", '"2:12", "charging'),
     (r'Robot\("cart"\)', 'Robot("cart")'),
 )

@@ -151,7 +151,7 @@ def test_what_is_wrong_is_not_sent(client: relmap.Client) -> None:
                 wrong()
         assert session.next_sequence == 0
     assert len(client.sessions()) == before
-    with pytest.raises(ValueError, match="not open"):
+    with pytest.raises(ValueError, match="session is closed"):
         session.add(first.time, np.eye(4))
     for wrong in ({"robot": ""}, {"robot": "x" * 65}, {"name": "a\nb"}, {"uuid": "none"}, {"max_unsettled_bytes": 5}):
         with pytest.raises(ValueError):
@@ -164,7 +164,9 @@ def test_keyframes_of_cpp_make_the_same_map(tmp_path: pathlib.Path) -> None:
     """Of one drive, sent by relmap-frontend and from Python, two deterministic daemons make equal maps; with 10,000 keyframes
     bench/compare_ingest.py does the same."""
     result = compare_ingest.compare(tmp_path, 160)
-    assert result["equal"] and result["frames"] == 160 and result["closures"] > 5, result
+    assert result["equal"], result
+    assert result["python"]["frames"] == 160 and result["python"]["closures"] > 5, result
+    assert result["python"]["observations"] > 160 * 20, result
 
 
 # ---- The state machine alone

@@ -123,11 +123,12 @@ def test_views_are_one_thing() -> None:
         {"right": pixels, "frame": relmap.FrameId(1, 1)},
         {"features": nan},
         {"left": pixels, "camera": 0},
-        {"left": pixels, "camera": True},
         {"frame": relmap.FrameId(1, 1), "camera": 2},
     ):
         with pytest.raises(ValueError):
             relmap.View(**wrong)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="StereoCamera"):
+        relmap.View(left=pixels, camera=True)
 
 
 def _tracks(**change: object) -> Tracks:
@@ -170,7 +171,7 @@ def test_features_are_checked() -> None:
         {"scale": np.zeros(2)},
         {"scale": np.full(2, np.nan)},
         {"disparity": np.full(2, -1.0)},
-        {"sift": np.zeros((2, 128))},
+        {"sift": np.full((2, 128), 0.5)},
         {"sift": np.zeros((2, 64), np.uint8)},
         {"track": np.array([-2, 0])},
         {"u": np.ones(3)},

@@ -54,8 +54,8 @@ class Drawing:
     def _repr_svg_(self) -> str:
         return self.svg
 
-    def __str__(self) -> str:
-        return self.svg
+    def __repr__(self) -> str:
+        return f"<Drawing of {len(self.svg)} bytes; save() writes it, a notebook shows it>"
 
 
 def _check_width(width: int) -> None:

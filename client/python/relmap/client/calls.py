@@ -1,4 +1,5 @@
-"""Calls over gRPC, for the blocking client. Made of relmap/aio_calls.py by client/python/make_sync; do not edit."""
+# Made of relmap/aio/calls.py by client/python/make_sync; do not edit.
+"""Calls over gRPC with their deadlines, names and errors; a stream of replies that breaks goes on where it broke."""
 
 from __future__ import annotations
 
@@ -8,9 +9,9 @@ from typing import Any, Iterator, Optional
 
 import grpc
 
-from relmap.silence import Heard
-from relmap.connection import Connection, Stubs, check_boot, unreachable
-from relmap.errors import ClientClosed, RelmapError, Unreachable, error_of_rpc
+from relmap.client.silence import Heard
+from relmap.connection import Connection, Stubs, check_boot, checked_timeout, unreachable
+from relmap.errors import ClientClosed, DeadlineExceeded, RelmapError, Unreachable, error_of_rpc
 from relmap.v1 import status_pb2
 
 MAX_RESUMPTIONS = 3
@@ -56,20 +57,25 @@ class Caller:
             raise ClientClosed
         return method(request, timeout=self._limit(timeout), metadata=self._metadata)
 
-    def _failed(self, error: Any) -> RelmapError:
-        return ClientClosed() if self.closed else error_of_rpc(error)
+    def _failed(self, error: Any, timeout: Optional[float]) -> RelmapError:
+        if self.closed:
+            return ClientClosed()
+        failed = error_of_rpc(error)
+        limit = self._limit(timeout)
+        if isinstance(failed, DeadlineExceeded) and limit is not None:
+            return DeadlineExceeded(failed.reason, f"{failed.message}; the timeout was {limit:g} s", failed.request_id)
+        return failed
 
     def _limit(self, timeout: Optional[float]) -> Optional[float]:
-        if timeout is None:
-            return self.connection.timeout
-        return None if timeout == math.inf else timeout
+        limit = self.connection.timeout if timeout is None else checked_timeout(timeout)
+        return None if limit == math.inf else limit
 
     def ask(self, method: Any, request: Any, timeout: Optional[float] = None) -> Any:
         """The reply to a request. RelmapError: why there is none."""
         try:
             return self._call(method, request, timeout)
         except grpc.RpcError as error:
-            raise self._failed(error) from None
+            raise self._failed(error, timeout) from None
 
     def stream(
         self, method: Any, request: Any, timeout: Optional[float] = None, silence: Optional[float] = None
@@ -81,7 +87,7 @@ class Caller:
             for reply in call if silence is None else Heard(call, silence):
                 yield reply
         except grpc.RpcError as error:
-            raise self._failed(error) from None
+            raise self._failed(error, timeout) from None
         finally:
             call.cancel()
 

@@ -1,4 +1,4 @@
-"""Streams that fall silent, for the blocking client: see relmap/aio_silence.py."""
+"""Streams that fall silent, for the blocking client: see relmap/aio/silence.py."""
 
 from __future__ import annotations
 

@@ -8,16 +8,16 @@ from typing import Any, AsyncIterator, Optional
 
 import grpc.aio
 
-from relmap.aio_silence import AioHeard
-from relmap.connection import Connection, Stubs, check_boot, unreachable
-from relmap.errors import ClientClosed, RelmapError, Unreachable, error_of_rpc
+from relmap.aio.silence import Heard
+from relmap.connection import Connection, Stubs, check_boot, checked_timeout, unreachable
+from relmap.errors import ClientClosed, DeadlineExceeded, RelmapError, Unreachable, error_of_rpc
 from relmap.v1 import status_pb2
 
 MAX_RESUMPTIONS = 3
 """How often a stream is resumed without progress in between."""
 
 
-class AioCaller:
+class Caller:
     """Calls over one channel of grpc.aio, from one event loop.
 
     Attributes:
@@ -34,10 +34,10 @@ class AioCaller:
         self._metadata = connection.metadata
 
     @staticmethod
-    async def open(connection: Connection) -> "AioCaller":
+    async def open(connection: Connection) -> "Caller":
         """Connects, and checks that the daemon answers. RelmapError: why not."""
         where = connection.resolve()
-        caller = AioCaller(connection, connection.open_aio(where))
+        caller = Caller(connection, connection.open_aio(where))
         try:
             reply = await caller.ask(caller.stubs.map.GetStatus, status_pb2.GetStatusRequest())
             check_boot(connection, where, reply.boot_id)
@@ -56,20 +56,25 @@ class AioCaller:
             raise ClientClosed
         return method(request, timeout=self._limit(timeout), metadata=self._metadata)
 
-    def _failed(self, error: Any) -> RelmapError:
-        return ClientClosed() if self.closed else error_of_rpc(error)
+    def _failed(self, error: Any, timeout: Optional[float]) -> RelmapError:
+        if self.closed:
+            return ClientClosed()
+        failed = error_of_rpc(error)
+        limit = self._limit(timeout)
+        if isinstance(failed, DeadlineExceeded) and limit is not None:
+            return DeadlineExceeded(failed.reason, f"{failed.message}; the timeout was {limit:g} s", failed.request_id)
+        return failed
 
     def _limit(self, timeout: Optional[float]) -> Optional[float]:
-        if timeout is None:
-            return self.connection.timeout
-        return None if timeout == math.inf else timeout
+        limit = self.connection.timeout if timeout is None else checked_timeout(timeout)
+        return None if limit == math.inf else limit
 
     async def ask(self, method: Any, request: Any, timeout: Optional[float] = None) -> Any:
         """The reply to a request. RelmapError: why there is none."""
         try:
             return await self._call(method, request, timeout)
         except grpc.aio.AioRpcError as error:
-            raise self._failed(error) from None
+            raise self._failed(error, timeout) from None
 
     async def stream(
         self, method: Any, request: Any, timeout: Optional[float] = None, silence: Optional[float] = None
@@ -78,10 +83,10 @@ class AioCaller:
         With `silence`, Unreachable is raised if no reply comes for so many seconds."""
         call = self._call(method, request, timeout)
         try:
-            async for reply in call if silence is None else AioHeard(call, silence):
+            async for reply in call if silence is None else Heard(call, silence):
                 yield reply
         except grpc.aio.AioRpcError as error:
-            raise self._failed(error) from None
+            raise self._failed(error, timeout) from None
         finally:
             call.cancel()
 

@@ -8,14 +8,14 @@ from typing import Any
 from relmap.errors import silent
 
 
-class AioHeard:
+class Heard:
     """The replies of a call, asynchronous. Unreachable: none came for a while. Only the time waited for one counts."""
 
     def __init__(self, call: Any, silence: float) -> None:
         self._replies = call.__aiter__()
         self._silence = silence
 
-    def __aiter__(self) -> "AioHeard":
+    def __aiter__(self) -> "Heard":
         return self
 
     async def __anext__(self) -> Any:
@@ -25,4 +25,4 @@ class AioHeard:
             raise silent(self._silence) from None
 
 
-__all__ = ["AioHeard"]
+__all__ = ["Heard"]

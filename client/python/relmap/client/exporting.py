@@ -1,0 +1,77 @@
+# Made of relmap/aio/exporting.py by client/python/make_sync; do not edit.
+"""Exports: trajectories and frames."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Iterator, List, Optional, Union
+
+from relmap.client.base import LONG_S, ClientBase, copied
+from relmap.choices import choice
+from relmap.exports import ExportedFrame, ExportFormat, TrajectoryFile, read_exported_frame
+from relmap.graph import Edges, read_edge
+from relmap.ids import SessionLike, SessionsLike, as_session, as_sessions
+from relmap.routes import Trajectory, parse_tum
+from relmap.v1 import map_pb2
+
+
+class ExportCalls(ClientBase):
+    """Calls that export the map."""
+
+    def export_trajectories(
+        self,
+        format: Union[ExportFormat, str] = ExportFormat.TUM,
+        sessions: SessionsLike = (),
+        *,
+        timeout: Optional[float] = LONG_S,
+    ) -> tuple[TrajectoryFile, ...]:
+        """The trajectory of each session as a file: its odometry edges, chained. Closures do not bend it. All are of one
+        version of the map: if that expires meanwhile, they are read again.
+
+        Args:
+            format: TUM, or "tum" ("time tx ty tz qx qy qz qw") or KITTI (the upper three rows of the pose matrix).
+            sessions: empty: all but mono sessions.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION, NOT_STEREO: a mono session, which has no motion.
+            ViewExpired: the version expired again and again; export one session at a time.
+        """
+        request = map_pb2.ExportRequest(format=int(choice("format", ExportFormat, format)), sessions=as_sessions(sessions))  # type: ignore[arg-type]
+        files: List[TrajectoryFile] = []
+        for reply in self._replies(self._map.Export, request, timeout):
+            doubtful = Edges(read_edge(edge) for edge in reply.unmeasured)
+            if files and files[-1].session == reply.session:
+                last = files[-1]
+                files[-1] = TrajectoryFile(last.session, last.data + reply.data, Edges(last.doubtful + doubtful))
+            else:
+                files.append(TrajectoryFile(reply.session, reply.data, doubtful))
+        return tuple(files)
+
+    def odometry(self, session: SessionLike, *, timeout: Optional[float] = LONG_S) -> Trajectory:
+        """The motion of a session, chained along its odometry edges: it drifts, and knows of no closure. Raises as
+        export_trajectories()."""
+        number = as_session(session)
+        files = self.export_trajectories(ExportFormat.TUM, number, timeout=timeout)
+        return parse_tum(number, b"".join(file.data for file in files))
+
+    def export_frames(
+        self, sessions: SessionsLike = (), *, landmarks: bool = False, timeout: Optional[float] = LONG_S
+    ) -> Iterator[ExportedFrame]:
+        """The frames of each session, ascending, with their landmarks if `landmarks` is set. A stream that breaks goes on.
+
+        All are of one version of the map. If it expires before the first frame was given out, the export begins again by
+        itself; afterwards ViewExpired is raised, since frames of two versions do not go together: begin again.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION, NOT_STEREO.
+            ViewExpired: as above; the message says how many frames were given out.
+        """
+        request = map_pb2.ExportRequest(
+            format=map_pb2.EXPORT_FORMAT_FRAMES, sessions=as_sessions(sessions), landmarks=landmarks
+        )
+        until = self._until(timeout)
+
+        def replies() -> Iterator[Any]:
+            return self._caller.resumed(self._map.Export, copied(request), until - time.monotonic())
+
+        return self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export")

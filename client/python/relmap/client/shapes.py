@@ -1,0 +1,96 @@
+# Made of relmap/aio/shapes.py by client/python/make_sync; do not edit.
+"""The shape of the map, and pictures of it."""
+
+from __future__ import annotations
+
+from typing import List, Optional
+
+from relmap.client.stored import StoredCalls
+from relmap.drawing.picture import Drawing, draw_map
+from relmap.errors import DaemonError
+from relmap.graph import EdgeState
+from relmap.ids import SessionsLike, as_sessions
+from relmap.reason import Reason
+from relmap.skeleton import Skeleton, SkeletonChain, joined_chains, read_chain, read_closures, skeleton_of_edges
+from relmap.v1 import skeleton_pb2
+
+
+class ShapeCalls(StoredCalls):
+    """Calls that draw the map."""
+
+    def skeleton(
+        self,
+        level: int = 1,
+        *,
+        sessions: SessionsLike = (),
+        candidates: bool = False,
+        timeout: Optional[float] = None,
+    ) -> Skeleton:
+        """The shape of the map, small enough to draw; of one version: if that expires meanwhile, it is read again.
+
+        Args:
+            level: beside junctions, of 64 consecutive frames about 1 (0), 4 (1), 16 (2), or all (3); 1 is for drawing.
+            sessions: only these; empty: all.
+            candidates: with closures that are not in force.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION.
+            ViewExpired: the version expired again and again; ask for a lower level, or for fewer sessions.
+            ValueError: the level.
+        """
+        if level not in (0, 1, 2, 3):
+            raise ValueError(f"level is {level!r}; must be 0, 1, 2 or 3")
+        request = skeleton_pb2.GetSkeletonRequest(level=level, sessions=as_sessions(sessions), candidates=candidates)
+        chains: List[SkeletonChain] = []
+        closures: List[skeleton_pb2.SkeletonClosures] = []
+        total, version = 0, 0
+        for reply in self._replies(self._map.GetSkeleton, request, timeout):
+            chains.extend(read_chain(chain) for chain in reply.chains)
+            closures.append(reply.closures)
+            total, version = reply.frames_total, reply.map_version
+        return Skeleton(joined_chains(chains), read_closures(closures), total, version)
+
+    def draw_map(
+        self,
+        *,
+        sessions: SessionsLike = (),
+        level: int = 1,
+        candidates: bool = False,
+        labels: bool = True,
+        width: int = 900,
+        timeout: Optional[float] = None,
+    ) -> Drawing:
+        """The map seen from above, as an SVG that notebooks show.
+
+        Positions are a relaxed picture: cycles are bent until they close. Never measure distances in it; ask
+        transform_between() instead.
+
+        Args:
+            sessions: only these; empty: all.
+            level: as in skeleton().
+            candidates: with closures that are not in force.
+            labels: with labels.
+            width: of the picture, points.
+
+        Raises:
+            RequestError: NO_SUCH_SESSION.
+            ViewExpired: as skeleton().
+        """
+        try:
+            skeleton = self.skeleton(level, sessions=sessions, candidates=candidates, timeout=timeout)
+        except DaemonError as error:
+            if error.reason != Reason.UNIMPLEMENTED:
+                raise
+            skeleton = self._skeleton_of_edges(sessions, candidates, timeout)  # of an older daemon
+        named = self.labels(timeout=timeout) if labels else ()
+        names = {session.number: session.name for session in self.sessions(timeout=timeout)}
+        return draw_map(skeleton.relaxed_picture(), width, names, named)
+
+    def _skeleton_of_edges(
+        self, sessions: SessionsLike, candidates: bool, timeout: Optional[float]
+    ) -> Skeleton:
+        edges = self.edges(states=() if candidates else (EdgeState.ACCEPTED,), timeout=timeout)
+        wanted = set(as_sessions(sessions))
+        return skeleton_of_edges(
+            edge for edge in edges if not wanted or {edge.a.session, edge.b.session} <= wanted
+        )
