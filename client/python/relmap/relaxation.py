@@ -218,7 +218,7 @@ def _place_chains(step: Array, is_step: Array, begin: Array) -> Array:
         reaches = np.flatnonzero(place >= shift)
         T[reaches] = T[reaches - shift] @ T[reaches]
         shift *= 2
-    return T
+    return np.asarray(T)
 
 
 def relaxed_picture(skeleton: Skeleton) -> RelaxedPicture:
