@@ -1,9 +1,5 @@
 // A skeleton laid out in one frame for each connected part, for drawing, by pose-graph relaxation
-// (client/relaxation.h).
-//
-// Edges count as in all pictures of the map: a measured step, and a closure that is an edge of the graph and in force,
-// with its covariance; a guess of the robot's motion only where nothing measured connects its ends; a step along which
-// the robot was carried next to nothing.
+// (client/relaxation.h); client/springs.h says which edges count.
 #pragma once
 
 #include <cstddef>

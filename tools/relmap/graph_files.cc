@@ -288,7 +288,7 @@ void write_ply_tail(const RelaxedMap& map, std::size_t number, std::ostream& out
   const MapPart& part = map.parts.at(number);
   const auto numbers = numbers_of(part);
   for (const std::size_t index : part.edges) {
-    const Spring& spring = map.springs[index];
+    const client::Spring& spring = map.springs[index];
     const int kind = spring.kind == client::EdgeKind::kLoop ? 2 : spring.kind == client::EdgeKind::kPrior ? 1 : 0;
     out << printf_text("%zu %zu %d %d\n", numbers.at(spring.relaxed.a), numbers.at(spring.relaxed.b), kind,
                        spring.doubtful ? 1 : 0);
@@ -303,7 +303,7 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
   std::set<std::pair<FrameId, FrameId>> joined;
   std::set<EdgeId> torn;
   for (const std::size_t index : part.edges) {
-    const Spring& spring = map.springs[index];
+    const client::Spring& spring = map.springs[index];
     if (spring.kind != client::EdgeKind::kLoop && !spring.doubtful) joined.insert({spring.relaxed.a, spring.relaxed.b});
   }
   for (const Tear& tear : part.tears) torn.insert(tear.edge);
@@ -323,7 +323,7 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
   }
   end_run();
   for (const std::size_t index : part.edges) {
-    const Spring& spring = map.springs[index];
+    const client::Spring& spring = map.springs[index];
     if (spring.kind == client::EdgeKind::kOdometry && !spring.doubtful) continue;
     features.add({spring.relaxed.a, spring.relaxed.b}, Json()
                                                            .add("edge", spring.edge.to_string())

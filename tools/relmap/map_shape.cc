@@ -16,42 +16,6 @@ using client::Skeleton;
 
 constexpr std::size_t kMaxStrained = 10;
 
-// The covariance with these traces that is the same in all directions. A step without any would be infinitely stiff.
-Matrix6 isotropic(double translation_trace, double rotation_trace) {
-  constexpr double kLeast = 1e-10;
-  Vector6 diagonal;
-  diagonal << Vector3::Constant(std::max(translation_trace / 3, kLeast)),
-      Vector3::Constant(std::max(rotation_trace / 3, kLeast));
-  return diagonal.asDiagonal();
-}
-
-std::vector<Spring> skeleton_springs(const Skeleton& skeleton) {
-  std::vector<Spring> springs;
-  for (const Skeleton::Chain& chain : skeleton.chains)
-    for (std::size_t i = 1; i < chain.points.size(); ++i) {
-      const Skeleton::Point& point = chain.points[i];
-      Spring& spring = springs.emplace_back();
-      if (point.frames == 1) spring.edge = {point.frame, 0};
-      spring.kind = point.unmeasured ? client::EdgeKind::kPrior : client::EdgeKind::kOdometry;
-      spring.doubtful = point.unmeasured || point.carried;
-      spring.relaxed = {
-          chain.points[i - 1].frame, point.frame, point.T_before_this,
-          point.carried ? carried_covariance() : isotropic(point.translation_variance, point.rotation_variance),
-          client::RelaxationEdgeKind::kOdometry};
-    }
-  for (const Skeleton::Closure& closure : skeleton.closures) {
-    if (closure.state != client::EdgeState::kAccepted || !closure.carries) continue;
-    Spring& spring = springs.emplace_back();
-    spring.edge = closure.id;
-    spring.kind = client::EdgeKind::kLoop;
-    spring.relaxed = {closure.a, closure.id.frame, closure.T_ab,
-                      isotropic(closure.translation_variance, closure.rotation_variance),
-                      client::RelaxationEdgeKind::kLoop};
-  }
-  choose_pulling(springs);
-  return springs;
-}
-
 // Divides the step to `point` from the point before it: returns the point that is made of frame `index`, and makes
 // `point` the end of what follows it.
 Skeleton::Point divide(const Skeleton::Point& before, Skeleton::Point& point, std::uint32_t index) {
@@ -72,14 +36,14 @@ Skeleton::Point divide(const Skeleton::Point& before, Skeleton::Point& point, st
 }
 
 // The strains of edges that the layout was made of and could have stretched.
-std::vector<Tear> strains_of(const MapShape& shape, const std::function<bool(const Spring&, const Tear&)>& wanted) {
+std::vector<Tear> strains_of(const MapShape& shape,
+                             const std::function<bool(const client::Spring&, const Tear&)>& wanted) {
   std::vector<Tear> strains;
-  for (const Spring& spring : shape.springs) {
+  for (const client::Spring& spring : shape.springs) {
     const SE3* const a = shape.find(spring.relaxed.a);
     const SE3* const b = shape.find(spring.relaxed.b);
     if (spring.doubtful || !a || !b) continue;
-    if (const Tear strain = strain_of(spring, spring.relaxed, *a, *b); wanted(spring, strain))
-      strains.push_back(strain);
+    if (const Tear strain = strain_of(spring, *a, *b); wanted(spring, strain)) strains.push_back(strain);
   }
   sort_worst_first(strains);
   return strains;
@@ -142,7 +106,7 @@ Status lay_out(MapShape& shape) {
   for (std::size_t part = 0; part < shape.layout.parts.size(); ++part)
     for (std::size_t place = 0; place < shape.layout.parts[part].places.size(); ++place)
       shape.at[shape.layout.parts[part].places[place].frame] = {part, place};
-  shape.springs = skeleton_springs(shape.skeleton);
+  shape.springs = client::springs_of(shape.skeleton);
   return {};
 }
 
@@ -172,11 +136,11 @@ std::string shape_text(const MapShape& shape) {
 }
 
 std::vector<Tear> tears_of(const MapShape& shape) {
-  return strains_of(shape, [](const Spring&, const Tear& strain) { return strain.sigmas > kTearSigmas; });
+  return strains_of(shape, [](const client::Spring&, const Tear& strain) { return strain.sigmas > kTearSigmas; });
 }
 
 std::vector<Tear> strained_of(const MapShape& shape) {
-  std::vector<Tear> strained = strains_of(shape, [](const Spring& spring, const Tear& strain) {
+  std::vector<Tear> strained = strains_of(shape, [](const client::Spring& spring, const Tear& strain) {
     return spring.kind == client::EdgeKind::kLoop && strain.sigmas > 1;
   });
   if (strained.size() > kMaxStrained) strained.resize(kMaxStrained);
@@ -185,7 +149,7 @@ std::vector<Tear> strained_of(const MapShape& shape) {
 
 std::vector<std::vector<double>> uncertainty_of(const MapShape& shape) {
   std::vector<std::vector<client::RelaxationEdge>> edges(shape.layout.parts.size());
-  for (const Spring& spring : shape.springs)
+  for (const client::Spring& spring : shape.springs)
     if (const auto at = shape.at.find(spring.relaxed.a); spring.pulls && at != shape.at.end())
       edges[at->second.part].push_back(spring.relaxed);
   std::vector<std::vector<double>> sigmas;

@@ -25,15 +25,16 @@ client::RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
 bool is_doubtful(const client::Edge& edge) { return edge.unmeasured || !edge.carried_by.empty(); }
 bool holds_nothing(const client::Edge& edge) { return edge.unmeasured && edge.source == MotionSource::kUnsensed; }
 
-std::vector<Spring> springs_of(const MapGraph& graph) {
-  std::vector<Spring> springs;
+std::vector<client::Spring> springs_of(const MapGraph& graph) {
+  std::vector<client::Spring> springs;
   for (const client::Edge& edge : graph.edges) {
     if (!in_graph(edge) || holds_nothing(edge)) continue;
-    Spring& spring = springs.emplace_back();
+    client::Spring& spring = springs.emplace_back();
     spring.edge = edge.id;
     spring.kind = edge.kind;
     spring.doubtful = is_doubtful(edge);
-    spring.relaxed = {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : carried_covariance(),
+    spring.relaxed = {edge.a, edge.b, edge.T_ab,
+                      edge.carried_by.empty() ? edge.covariance : client::carried_covariance(),
                       relaxation_kind(edge.kind)};
   }
   return springs;
@@ -122,14 +123,10 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   map.graph = std::move(graph);
   map.springs = springs_of(map.graph);
   std::vector<client::RelaxationEdge> edges;
-  std::vector<const Spring*> spring_of;  // by edge
   edges.reserve(map.springs.size());
-  MeasuredSets measured = choose_pulling(map.springs);
-  for (const Spring& spring : map.springs) {
-    if (!spring.pulls) continue;
-    edges.push_back(spring.relaxed);
-    spring_of.push_back(&spring);
-  }
+  client::MeasuredSets measured = client::choose_pulling(map.springs);
+  for (const client::Spring& spring : map.springs)
+    if (spring.pulls) edges.push_back(spring.relaxed);
   const auto relaxed = client::relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
   if (!relaxed.ok()) return relaxed.status();
   map.parts = parts_of(*relaxed, root);
@@ -138,11 +135,10 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   for (MapPart& part : map.parts)
     for (const PlacedFrame& placed : part.frames) part_of[placed.frame] = &part;
   for (std::size_t i = 0; i < map.springs.size(); ++i) part_of.at(map.springs[i].relaxed.a)->edges.push_back(i);
-  for (std::size_t e = 0; e < edges.size(); ++e) {
-    const Spring& spring = *spring_of[e];
+  for (const client::Spring& spring : map.springs) {
     if (spring.doubtful) continue;
     MapPart& part = *part_of.at(spring.relaxed.a);
-    const Tear strain = strain_of(spring, edges[e], *part.find(edges[e].a), *part.find(edges[e].b));
+    const Tear strain = strain_of(spring, *part.find(spring.relaxed.a), *part.find(spring.relaxed.b));
     if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
   }
   for (const client::Edge& edge : map.graph.edges) {

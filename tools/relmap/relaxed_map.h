@@ -18,7 +18,7 @@
 
 #include "client/relaxation.h"
 #include "tools/relmap/map_graph.h"
-#include "tools/relmap/springs.h"
+#include "tools/relmap/tear.h"
 
 namespace relmap::cli {
 
@@ -69,8 +69,8 @@ struct MapPart {
 
 struct RelaxedMap {
   MapGraph graph;
-  std::vector<Spring> springs;  // the edges of the graph that may count in the relaxation
-  std::vector<MapPart> parts;   // the one with the chosen root first, then the others, largest first
+  std::vector<client::Spring> springs;  // the edges of the graph that may count in the relaxation
+  std::vector<MapPart> parts;           // the one with the chosen root first, then the others, largest first
 
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
 };

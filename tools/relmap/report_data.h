@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/relmap_client.h"
-#include "tools/relmap/springs.h"
+#include "tools/relmap/tear.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::cli {
