@@ -29,11 +29,12 @@ struct RelaxationEdge {
 
 struct RelaxationOptions {
   int max_iterations = 50;
-  double relative_tolerance = 1e-7;  // stops when the cost falls by a smaller share
+  double relative_tolerance = 1e-7;  // stops when the cost falls by a smaller share (iteratively: 1e-5 at least)
   double loop_huber = 4;             // Huber's width for loop edges, in sigmas; 0: quadratic
   // The steps of a component with more frames, or with so many loops that a step would take seconds, are solved for
   // iteratively, from a start in which its cycles are closed already (client/linear_start.h), in time proportional to
-  // its size. Then it converges slowly to the last digits, which no picture shows.
+  // the number of its frames and edges, but for the start, which factorises one number for each of them. Then it
+  // converges slowly to the last digits, which no picture shows.
   int max_direct = 20'000;
 };
 
@@ -58,7 +59,7 @@ struct Relaxation {
 Status check_graph(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges);
 
 // Relaxes each connected component by Levenberg-Marquardt on SE(3).
-// The reasons of check_graph(); NUMERICAL: the damped system is singular.
+// The reasons of check_graph(); NUMERICAL: the cost is not finite.
 Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges,
                          const RelaxationOptions& options = {});
 

@@ -16,9 +16,9 @@ inline constexpr std::uint32_t stride(std::uint32_t level) {
 }
 
 // Closures of the same state that join the same two stretches of so many frames, aligned to multiples of it, are alike:
-// one of them is told. The newer stretch is no longer than a chunk. A closure costs as much as five points, since its
-// ends are points, too, and a map has about one for each place at which two robots were; so these stretches decide how
-// large a skeleton is.
+// one of them is told, and the most suspicious one if it is suspicious. The newer stretch is no longer than a chunk. A
+// closure costs as much as five points, since its ends are points, too, and a map has about one for each place at which
+// two robots were; so these stretches decide how large a skeleton is.
 inline constexpr std::uint32_t closure_stretch(std::uint32_t level) {
   constexpr std::uint32_t kStretches[kLevels] = {8 * storage::kFramesPerChunk, storage::kFramesPerChunk, 16, 1};
   return kStretches[level];

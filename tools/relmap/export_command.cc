@@ -55,7 +55,11 @@ class Report {
     tell(part.tears, "tear ");
     tell(part.doubtful, "");
   }
-  void tell_relaxed(const RelaxedMap& map) { relaxed_frames_ = map.graph.frames.size(); }
+  void tell_relaxed(const RelaxedMap& map) {
+    relaxed_frames_ = map.graph.frames.size();
+    converged_ = map.converged;
+    if (!converged_) advise(kNotConverged);
+  }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
     if (json_)
       left_out_.push_back(Json().add("root", root).add("frames", frames));
@@ -71,7 +75,7 @@ class Report {
       advise(file + " was written by an earlier export and is no part of this one.");
     if (!stale.empty()) whole_.add("stale", stale);
     whole_.add("files", files_).add("leftOut", left_out_);
-    if (relaxed_frames_) whole_.add("relaxedFrames", *relaxed_frames_);
+    if (relaxed_frames_) whole_.add("relaxedFrames", *relaxed_frames_).add("converged", converged_);
     if (json_) out_ << whole_.text() << '\n';
   }
 
@@ -117,6 +121,7 @@ class Report {
   Json whole_;
   std::vector<Json> files_, left_out_;
   std::optional<std::size_t> relaxed_frames_;  // nullopt if nothing was relaxed
+  bool converged_ = true;
 };
 
 std::string title_of(const RelaxedMap& map, std::size_t number) {

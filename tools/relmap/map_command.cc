@@ -64,6 +64,7 @@ void tell(const MapOptions& options, const MapShape& shape, const MapPicture& pi
   if (picture.parts.size() > 1) err << ", in " << picture.parts.size() << " parts that nothing connects";
   err << '\n';
   if (const std::string text = shape_text(shape); !text.empty()) err << text << '\n';
+  if (!shape.layout.converged) err << kNotConverged << '\n';
   if (picture.mono_sessions > 0) err << not_placed_text(picture.mono_sessions, "drawn") << '\n';
   if (picture.query && !shape.find(picture.query->frame))
     err << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
@@ -75,7 +76,8 @@ void tell(const MapOptions& options, const MapShape& shape, const MapPicture& pi
       .add("points", shape.skeleton.points())
       .add("loopClosures", shape.closures_in_force())
       .add("parts", picture.parts.size())
-      .add("monoSessions", picture.mono_sessions);
+      .add("monoSessions", picture.mono_sessions)
+      .add("converged", shape.layout.converged);
   if (options.tears) json.add("tears", picture.tears.size());
   console.out() << json.text() << '\n';
 }
@@ -111,7 +113,7 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
   picture.png_scale = options.width / picture.width;
   picture.query = query;
   if (route) {
-    std::erase_if(route->frames, [&](FrameId frame) { return !shape->find(frame); });
+    route->frames = drawn_of(*shape, route->frames);
     picture.route = route;
   }
   const std::vector<Tear> tears = options.tears ? tears_of(*shape) : std::vector<Tear>();

@@ -118,4 +118,11 @@ std::vector<FrameId> corners_of(const std::vector<FrameId>& route) {
   return corners;
 }
 
+std::vector<FrameId> drawn_of(const MapShape& shape, const std::vector<FrameId>& route) {
+  std::vector<FrameId> drawn;
+  for (const FrameId frame : route)
+    if (shape.find(frame) || !shape.chosen.sessions.contains(frame.session)) drawn.push_back(frame);
+  return drawn;
+}
+
 }  // namespace relmap::cli

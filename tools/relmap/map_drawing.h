@@ -19,5 +19,8 @@ void colour_by_uncertainty(const MapShape& shape, client::MapPicture& picture);
 // What of a route has to be a point of the shape for its line to be drawn where it leads: its ends, and the ends of the
 // closures that it takes.
 std::vector<FrameId> corners_of(const std::vector<FrameId>& route);
+// The frames of a route by which its line is drawn: without those between two points of the shape. Frames of sessions
+// that are not drawn stay, and interrupt the line.
+std::vector<FrameId> drawn_of(const MapShape& shape, const std::vector<FrameId>& route);
 
 }  // namespace relmap::cli

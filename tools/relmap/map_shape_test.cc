@@ -151,5 +151,15 @@ TEST(MapShape, OfARouteItsEndsAndTheEndsOfItsClosuresAreKept) {
   EXPECT_THAT(corners_of({point_at(1)}), ElementsAre(point_at(1)));
 }
 
+TEST(MapShape, ARouteIsInterruptedWhereASessionIsNotDrawn) {
+  Skeleton skeleton = drive();
+  MapShape shape = shape_of(skeleton);
+  shape.chosen.sessions[1] = {};
+  const std::vector<FrameId> route{point_at(10),   point_at(11),   point_at(20),
+                                   point_at(7, 2), point_at(8, 2), point_at(50)};
+  EXPECT_THAT(drawn_of(shape, route),
+              ElementsAre(point_at(10), point_at(20), point_at(7, 2), point_at(8, 2), point_at(50)));
+}
+
 }  // namespace
 }  // namespace relmap::cli

@@ -130,6 +130,7 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   const auto relaxed = client::relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
   if (!relaxed.ok()) return relaxed.status();
   map.parts = parts_of(*relaxed, root);
+  map.converged = relaxed->converged;
 
   std::unordered_map<FrameId, MapPart*> part_of;
   for (MapPart& part : map.parts)

@@ -72,6 +72,8 @@ struct RelaxedMap {
   std::vector<client::Spring> springs;  // the edges of the graph that may count in the relaxation
   std::vector<MapPart> parts;           // the one with the chosen root first, then the others, largest first
 
+  bool converged = true;  // false: the relaxation ended before
+
   const std::string& name(SessionNumber session) const { return graph.names.at(session); }
 };
 

@@ -20,6 +20,11 @@ struct Tear {
 };
 inline constexpr double kTearSigmas = 6;
 
+// Said of a picture or an export whose relaxation ended before it converged.
+inline constexpr char kNotConverged[] =
+    "the layout had not converged when its iterations ended: some cycles may be open by more than their measurements "
+    "say";
+
 // By how much poses in one frame contradict a spring.
 Tear strain_of(const client::Spring& spring, const SE3& T_root_a, const SE3& T_root_b);
 void sort_worst_first(std::vector<Tear>& tears);
