@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <thread>
 #include <utility>
 
 #include "client/channel.h"
@@ -54,6 +55,9 @@ Status check_names(const ClientOptions& options) {
   return {};
 }
 
+// After a kill another daemon serves the folder before its file `endpoint` says so.
+constexpr std::chrono::milliseconds kFileIsWrittenWithin{1000};
+
 }  // namespace
 
 ClientOptions ClientOptions::from_environment() {
@@ -87,9 +91,19 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   impl->begin(context, until);
   v1::GetStatusReply reply;
   if (Status status = status_of(impl->map->GetStatus(&context, {}, &reply)); !status.ok()) return status;
-  if (reply.boot_id() != where->boot_id)
-    return {Reason::UNREACHABLE, "the daemon that served " + server + " is gone; another answers at " + where->address};
-  return std::unique_ptr<Client>(new Client(std::move(impl)));
+  if (reply.boot_id() == where->boot_id) return std::unique_ptr<Client>(new Client(std::move(impl)));
+  // A daemon that has just started in its place writes the file anew.
+  for (const auto enough = std::min(until, Impl::Clock::now() + kFileIsWrittenWithin);;) {
+    const auto now = resolve_server(server);
+    if (now.ok() && now->boot_id != where->boot_id) {
+      ClientOptions again = impl->options;
+      again.connect_timeout = std::chrono::duration_cast<std::chrono::milliseconds>(until - Impl::Clock::now());
+      return connect(server, std::move(again));
+    }
+    if (Impl::Clock::now() >= enough) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return {Reason::UNREACHABLE, "the daemon that served " + server + " is gone; another answers at " + where->address};
 }
 
 Result<std::unique_ptr<Client>> Client::connect_again() const { return connect(impl_->server, impl_->options); }

@@ -280,6 +280,18 @@ TEST_F(ClientTest, IsNotFooledByAnotherDaemonOnTheSamePort) {
   EXPECT_EQ(Client::connect(folder_.string()).status().reason(), Reason::UNREACHABLE);
 }
 
+// After a kill the next daemon answers before it has written the file anew.
+TEST_F(ClientTest, WaitsForTheFileOfADaemonThatHasJustStarted) {
+  write_endpoint(address(), "boot-0");
+  std::thread starting([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    write_endpoint(address(), "boot-1");
+  });
+  const auto connected = Client::connect(folder_.string());
+  starting.join();
+  EXPECT_TRUE(connected.ok()) << connected.status().to_string();
+}
+
 TEST_F(ClientTest, SaysWhyNoDaemonCanBeReached) {
   ClientOptions hasty;
   hasty.connect_timeout = std::chrono::milliseconds(200);

@@ -20,9 +20,9 @@ constexpr std::chrono::milliseconds kFirstConnectTimeout{1000};
 
 // Failures that last, whatever daemon answers next.
 bool is_final(Reason reason) {
-  constexpr std::array kFinal{Reason::UNAUTHENTICATED, Reason::NOT_ALLOWED, Reason::INVALID_ARGUMENT,
-                              Reason::UNIMPLEMENTED,   Reason::CORRUPT,     Reason::NO_SUCH_FILE,
-                              Reason::BAD_CONFIG};
+  constexpr std::array kFinal{Reason::UNAUTHENTICATED, Reason::NOT_ALLOWED,    Reason::INVALID_ARGUMENT,
+                              Reason::UNIMPLEMENTED,   Reason::CORRUPT,        Reason::NO_SUCH_FILE,
+                              Reason::BAD_CONFIG,      Reason::NO_SUCH_SESSION};
   return std::find(kFinal.begin(), kFinal.end(), reason) != kFinal.end();
 }
 

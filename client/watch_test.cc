@@ -137,9 +137,12 @@ TEST_F(WatchTest, AConnectionOverWhichNothingComesIsDead) {
 }
 
 TEST_F(WatchTest, WhatNoOtherDaemonWouldAnswerOtherwiseEndsIt) {
-  serve({{{}, ended(Reason::INVALID_ARGUMENT, grpc::StatusCode::INVALID_ARGUMENT)}});
+  serve({{{}, ended(Reason::INVALID_ARGUMENT, grpc::StatusCode::INVALID_ARGUMENT)},
+         {{}, ended(Reason::NO_SUCH_SESSION, grpc::StatusCode::NOT_FOUND)}});
   EXPECT_EQ(watch({}, 1).reason(), Reason::INVALID_ARGUMENT);
   EXPECT_EQ(map_->requests().size(), 1u);
+  EXPECT_EQ(watch({}, 1).reason(), Reason::NO_SUCH_SESSION);
+  EXPECT_EQ(map_->requests().size(), 2u);
   EXPECT_TRUE(heard_.empty());
 }
 

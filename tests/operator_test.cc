@@ -373,6 +373,7 @@ TEST_F(Operator, ReportsOnTheMap) {
   EXPECT_THAT(without.standard_output, HasSubstr("\"shown\":0"));
   EXPECT_THAT(contents(folder_ / "report.html"), HasSubstr("of those in force")) << "how many are suspicious";
   EXPECT_EQ(relmap({"report", "--out", "-"}).standard_output.substr(0, 15), "<!DOCTYPE html>");
+  EXPECT_THAT(relmap({"report", "--out", folder_ / "report.txt"}).standard_error, HasSubstr("must end with .html"));
 }
 
 TEST_F(Operator, IsToldThatAnAnswerCannotBeWritten) {

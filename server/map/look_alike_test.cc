@@ -5,6 +5,7 @@
 
 #include "server/map/derived.h"
 #include "server/map/testing/ridden_drive.h"
+#include "storage/graph/digest.h"
 
 namespace relmap::map {
 namespace {
@@ -32,6 +33,11 @@ TEST(LookAlike, AFloorWithDifferencesAllAlongIsTakenBack) {
   EXPECT_EQ(drive.map().state().closures_accepted, 0u);
   EXPECT_EQ(drive.closure_of(kCircuit + 2).state, storage::EdgeState::kQuarantined);
   EXPECT_EQ(drive.closure_of(kCircuit + 2).reason, Reason::LOOKS_ALIKE);
+  storage::Edge taken_back = drive.closure_of(kCircuit + 2);
+  taken_back.history.push_back({0, storage::EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR, {}, ""});
+  EXPECT_TRUE(storage::digest_of(taken_back).looks_alike) << "whatever an operator does, the daemon's verdict stays";
+  taken_back.history.push_back({0, storage::EdgeState::kAccepted, Reason::CONSISTENT, {}, ""});
+  EXPECT_FALSE(storage::digest_of(taken_back).looks_alike);
   for (++i; i < kCircuit + kBeyond; ++i) EXPECT_EQ(drive.propose(drive.as_driven(i)).reason, Reason::LOOKS_ALIKE);
   EXPECT_EQ(drive.map().state().closures_accepted, 0u);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());

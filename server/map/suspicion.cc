@@ -73,7 +73,9 @@ double opposed(const ClosureDigest& c) {
 double against_motion(const ClosureDigest& c) { return motion_contradicts(c) ? 0.8 * std::exp2(-c.agreeing / 3.0) : 0; }
 double contradiction(const ClosureDigest& c) {
   const double once = c.was_contradicted ? 0.4 * std::max(0.2, alone(c)) : 0;
-  return 1 - (1 - opposed(c)) * (1 - std::max(against_motion(c), once));
+  // Those that agree are of the same two places, and mistook them likewise.
+  const double alike = c.looks_alike ? 0.7 : 0;
+  return 1 - (1 - opposed(c)) * (1 - std::max({against_motion(c), once, alike}));
 }
 
 double lonely(const ClosureDigest& c) { return c.verification == Verification::kCompounded ? 0 : 0.6 * alone(c); }
@@ -109,7 +111,9 @@ std::string say_contradiction(const ClosureDigest& c) {
     add("it says that the robot was carried: its odometry says otherwise");
   else if (motion_contradicts(c))
     add("the robot's own motion contradicts it");
-  else if (c.was_contradicted)
+  if (c.looks_alike)
+    add("the daemon refused it since the two places look alike, and much differs there");
+  else if (c.was_contradicted && !c.carried && !motion_contradicts(c))
     add("it was once refused or outvoted (see its history)");
   return text;
 }

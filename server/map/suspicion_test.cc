@@ -80,6 +80,7 @@ TEST(Suspicion, EachFactThatSpeaksAgainstAClosureRaisesIt) {
       {DoubtKind::kChanged, [](ClosureDigest& c) { c.uniqueness.differs = 0.6F; }, "60 %"},
       {DoubtKind::kContradiction, [](ClosureDigest& c) { c.tests.opposing = 7; }, "7 closures contradict"},
       {DoubtKind::kContradiction, [](ClosureDigest& c) { c.was_contradicted = true; }, "history"},
+      {DoubtKind::kContradiction, [](ClosureDigest& c) { c.looks_alike = true; }, "look alike"},
       {DoubtKind::kContradiction, [](ClosureDigest& c) { c.tests.motion = storage::MotionSays::kContradicts; },
        "motion contradicts"},
       {DoubtKind::kLonely, [](ClosureDigest& c) { c.agreeing = 0; }, "no other closure"},

@@ -156,6 +156,8 @@ TEST_F(ClosureHandlers, ARefusedProposalNamesItsReason) {
   v1::ProposeEdgeRequest long_note = between(kEarly, kLate);
   long_note.set_note(std::string(2000, 'x'));
   EXPECT_EQ(propose(long_note).reason(), Reason::INVALID_ARGUMENT);
+  long_note.set_note("red\x1b[31m");  // would colour the terminal of whoever reads it
+  EXPECT_EQ(propose(long_note).reason(), Reason::INVALID_ARGUMENT);
 }
 
 TEST_F(ClosureHandlers, EachEditReportsItsChangesAndCanBeUndone) {

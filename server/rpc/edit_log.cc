@@ -6,6 +6,7 @@
 
 #include "proto/base/crc32c.h"
 #include "proto/base/mutex.h"
+#include "proto/base/names.h"
 #include "server/rpc/request_context.h"
 
 namespace relmap::rpc {
@@ -83,9 +84,8 @@ Status write_and_wait(map::Mapper& mapper, EditLog& edits, const std::string& ke
 }
 
 Status check_note(const std::string& note) {
-  if (note.size() <= kMaxNoteBytes) return {};
-  return {Reason::INVALID_ARGUMENT,
-          "a note of " + std::to_string(note.size()) + " bytes; at most " + std::to_string(kMaxNoteBytes)};
+  const Status line = check_line("a note", note, kMaxNoteBytes);
+  return line.ok() ? Status() : Status(Reason::INVALID_ARGUMENT, line.message());
 }
 
 }  // namespace relmap::rpc

@@ -173,7 +173,8 @@ void put_closure(ByteWriter& w, FrameId id, const ClosureDigest& c) {
   w.put(static_cast<std::uint8_t>(
       flags_of(c.carries, c.was_contradicted, c.decided, c.carried, c.uniqueness.known, tested) |
       static_cast<std::uint8_t>(c.kind) << 6));
-  w.put(static_cast<std::uint8_t>(static_cast<std::uint8_t>(c.state) | static_cast<std::uint8_t>(c.verification) << 4));
+  w.put(static_cast<std::uint8_t>(static_cast<std::uint8_t>(c.state) | (c.looks_alike ? 8 : 0) |
+                                  static_cast<std::uint8_t>(c.verification) << 4));
   put_unsigned(w, c.id.ordinal);
   put_unsigned(w, static_cast<std::uint64_t>(c.reason));
   varint::put(w, c.a, id);
@@ -199,7 +200,8 @@ bool get_closure(ByteReader& r, FrameId id, ClosureDigest& c) {
   c.decided = flags & 4;
   c.carried = flags & 8;
   c.kind = static_cast<EdgeKind>(flags >> 6);
-  c.state = static_cast<EdgeState>(states & 15);
+  c.state = static_cast<EdgeState>(states & 7);
+  c.looks_alike = states & 8;
   c.verification = static_cast<Verification>(states >> 4);
   c.id = {id, get_as<std::uint32_t>(r)};
   const std::uint64_t reason = get_unsigned(r);
@@ -291,8 +293,8 @@ bool agree(const ClosureDigest& a, const ClosureDigest& b) {
          a.support == b.support && near(a.probability, b.probability, kEvidence) &&
          near(a.spread, b.spread, kEvidence) && a.agreeing == b.agreeing && a.unseen == b.unseen &&
          (near(a.tension, b.tension, kTension) || std::max(a.tension, b.tension) < kNoTension) &&
-         a.was_contradicted == b.was_contradicted && a.decided == b.decided && a.carried == b.carried &&
-         agree(a.uniqueness, b.uniqueness) && a.tests.opposing == b.tests.opposing &&
+         a.was_contradicted == b.was_contradicted && a.looks_alike == b.looks_alike && a.decided == b.decided &&
+         a.carried == b.carried && agree(a.uniqueness, b.uniqueness) && a.tests.opposing == b.tests.opposing &&
          a.tests.motion == b.tests.motion && near(a.tests.motion_sigma, b.tests.motion_sigma, kEvidence);
 }
 

@@ -24,6 +24,14 @@ bool is_contradiction(Reason reason) {
          reason == Reason::NOT_SEEN_BEYOND;
 }
 
+// Why the daemon left the closure in its state, by its own judgement: what operators did is passed over.
+Reason last_verdict(const Edge& closure) {
+  for (auto event = closure.history.rbegin(); event != closure.history.rend(); ++event)
+    if (event->reason != Reason::ACCEPTED_BY_OPERATOR && event->reason != Reason::REMOVED_BY_OPERATOR)
+      return event->reason;
+  return closure.reason;
+}
+
 }  // namespace
 
 float tension_of(const Edge& closure) {
@@ -56,6 +64,7 @@ ClosureDigest digest_of(const Edge& closure) {
       .unseen = at_most_16_bits(closure.unseen.size()),
       .tension = tension_of(closure),
       .was_contradicted = std::any_of(closure.history.begin(), closure.history.end(), contradicted),
+      .looks_alike = last_verdict(closure) == Reason::LOOKS_ALIKE,
       .decided = std::any_of(closure.history.begin(), closure.history.end(), by_operator),
       .carried = closure.carried.session != 0,
       .uniqueness = closure.uniqueness,

@@ -31,6 +31,7 @@ struct ClosureDigest {
   std::uint16_t unseen = 0;       // Edge::unseen, their number
   float tension = 0;              // standard deviations between what was measured and the estimate; see tension_of()
   bool was_contradicted = false;  // it was outvoted, or contradicted the robot's motion, at some time
+  bool looks_alike = false;       // the daemon refused it last because two places look alike (LOOKS_ALIKE)
   bool decided = false;           // an operator accepted it
   bool carried = false;           // it says that the robot was carried
   Uniqueness uniqueness = {};

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <memory>
 #include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -100,8 +101,6 @@ Result<client::EdgeFilter> make_filter(const EdgesOptions& options, client::Clie
                  : options.by == "time"                         ? client::EdgeOrder::kTime
                                                                 : client::EdgeOrder::kId;
   filter.limit = options.limit;
-  if (!options.out.empty())
-    filter.limit = options.limit > 0 ? std::min<std::size_t>(options.limit, kMaxSheetRows) : kSheetRows;
   return filter;
 }
 
@@ -123,8 +122,15 @@ Status write_sheet(const EdgesOptions& options, const client::EdgeFilter& filter
   const terminal::Console::Aside aside(console);
   const auto sessions = read_sessions(client, console);
   if (!sessions.ok()) return sessions.status();
+  const std::size_t rows =
+      std::min(edges.size(), options.limit > 0 ? std::min<std::size_t>(options.limit, kMaxSheetRows) : kSheetRows);
   client::PairSheet sheet{"Loop closures", subtitle_of(filter, edges.size()), {}};
-  for (const client::Edge& edge : edges) {
+  if (rows < edges.size()) {
+    sheet.subtitle += "; the first " + std::to_string(rows);
+    console.err() << options.out << " shows the first " << rows << " of " << counted_text(edges.size(), "loop closure")
+                  << " (--limit N: up to " << kMaxSheetRows << ")\n";
+  }
+  for (const client::Edge& edge : std::span(edges).first(rows)) {
     const auto explained = client.explain_edge(edge.id, /*with_pictures=*/true);
     if (!explained.ok()) return explained.status();
     sheet.pairs.push_back(pair_of(*explained, *sessions, client));
@@ -195,9 +201,10 @@ void add_edges(CLI::App& app, Action& action) {
           ->type_name("EDGE");
   for (CLI::Option* const option : lists) explain->excludes(option);
   command
-      ->add_option("--out", options->out,
-                   "write the pictures of both ends, with what both show joined by lines: of the edge that is "
-                   "explained, or of the loop closures that are listed (10; --limit N: up to 50); FILE.png or FILE.svg")
+      ->add_option(
+          "--out", options->out,
+          "write the pictures of both ends, with what both show joined by lines: of the edge that is "
+          "explained, or of the first loop closures that are listed (10; --limit N: up to 50); FILE.png or FILE.svg")
       ->type_name("FILE");
   command->footer(
       "A time is written 2026-11-30, 2026-11-30T08:15:00Z (UTC), or 90s, 15min, 2h, 3d for so long ago.\n"

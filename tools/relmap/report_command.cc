@@ -12,6 +12,8 @@ namespace relmap::cli {
 namespace {
 
 Status write_report(const ReportOptions& options, client::Client& client, terminal::Console& console) {
+  if (options.out != "-" && !options.out.ends_with(".html"))
+    return {Reason::INVALID_ARGUMENT, "a report is a page of HTML: " + options.out + " must end with .html, or be -"};
   const auto report = gather_report(options, client, console);
   if (!report.ok()) return report.status();
   const std::string page = report_page(*report);
