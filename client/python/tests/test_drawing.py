@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.dom.minidom
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,14 @@ def test_parts_that_nothing_joins_are_drawn_apart() -> None:
     apart = Skeleton(skeleton.chains, none, 60, 1).relaxed_picture()
     assert sorted(apart.parts) == [0, 1, 2]
     xml.dom.minidom.parseString(apart.draw().svg)
+
+
+def test_the_legend_counts_what_closures_stand_for() -> None:
+    skeleton, _ = _circle(60, 0.01, 4)
+    states = np.array([EdgeState.ACCEPTED, EdgeState.ACCEPTED, EdgeState.CANDIDATE, EdgeState.REMOVED])
+    closures = replace(skeleton.closures, state=frozen(states.astype(int)), alike=frozen(np.array([5, 1, 7, 30])))
+    drawn = replace(skeleton, closures=closures).draw().svg
+    assert "6 loop closures in force" in drawn and "37 others" in drawn
 
 
 def test_texts_are_escaped() -> None:
