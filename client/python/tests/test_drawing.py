@@ -92,7 +92,7 @@ def test_chains_without_pins_are_relaxed_as_well(monkeypatch: pytest.MonkeyPatch
 
     skeleton, _ = _circle(200, 0.01, 4)
     pinned = np.concatenate(skeleton.relaxed_picture().chains)
-    monkeypatch.setattr(relmap.network, "_MAX_PINS", 1)
+    monkeypatch.setattr(relmap.network, "_MAX_PINNED", 0)
     np.testing.assert_allclose(np.concatenate(skeleton.relaxed_picture().chains), pinned, atol=2e-3)
 
 
@@ -147,13 +147,16 @@ def test_guesses_beside_which_nothing_was_measured_have_their_own_variances() ->
     np.testing.assert_allclose(_z(ridden, three), [0, 1, 3.5, 4.5], atol=2e-2)
 
 
-@pytest.mark.parametrize("pins", [600, 1])
-def test_chains_of_many_pieces_are_laid_out_by_what_was_measured(pins: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("pins, pinned", [(600, 1500), (1, 1500), (1, 5)])
+def test_chains_of_many_pieces_are_laid_out_by_what_was_measured(
+    pins: int, pinned: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each of two drives round one circle has guesses, metres and radians off, beside which the other measured; a third drive
     elsewhere is a part of its own."""
     import relmap.network
 
     monkeypatch.setattr(relmap.network, "_MAX_PINS", pins)
+    monkeypatch.setattr(relmap.network, "_MAX_PINNED", pinned)
     rng = np.random.default_rng(5)
     skeleton, true = _circle(200, 1e-6)
     drive = skeleton.chains[0]
