@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+import time
 from dataclasses import dataclass, replace
-from typing import Any, Optional, Tuple
+from typing import Any, Optional, Tuple, Union
 
 import grpc
 import grpc.aio
@@ -37,6 +38,27 @@ def checked_timeout(timeout: float) -> float:
     if not timeout > 0:
         raise ValueError(f"timeout is {timeout} s; must be above 0")
     return timeout
+
+
+class Countdown:
+    """What is left of a timeout that several requests share. Begins when it is made.
+
+    Attributes:
+        asked: the timeout that the caller asked for, seconds; errors name it.
+    """
+
+    def __init__(self, asked: float) -> None:
+        self.asked = asked
+        self._until = time.monotonic() + asked
+
+    @property
+    def left(self) -> float:
+        """Seconds that are left; above 0, since a call with too little of them fails as it should."""
+        return max(self._until - time.monotonic(), 0.001)
+
+
+Timeout = Union[None, float, Countdown]
+"""Of one request: seconds, what is left of a countdown, or None: the timeout of the connection."""
 
 
 @dataclass(frozen=True)

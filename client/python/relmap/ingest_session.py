@@ -123,8 +123,6 @@ class IngestState:
     ) -> Keyframe:
         """A keyframe of the arguments of add(). ValueError: relmapd would refuse it."""
         time_us = as_us(time)
-        if self._last_us is not None and time_us <= self._last_us:
-            raise ValueError(f"a keyframe of {time_us} us after one of {self._last_us} us: times ascend")
         index = self.core.next_sequence if sequence is None else sequence
         if source is not None:
             source = choice("source", MotionSource, source)
@@ -138,7 +136,7 @@ class IngestState:
         elapsed = time_us - self._last_us if self._last_us is not None else 0
         if driven_us is None:
             driven_us = max(elapsed - standing_us, 0)
-        if self._last_us is not None and driven_us + standing_us > elapsed:
+        if 0 < elapsed < driven_us + standing_us:
             raise ValueError(f"driven {driven_us} us and standing {standing_us} us, in {elapsed} us")
         if not isinstance(picture, (bytes, str, os.PathLike)):
             raise TypeError(f"picture is the bytes or the path of a JPEG, not {type(picture).__name__}")
@@ -158,9 +156,12 @@ class IngestState:
         )
 
     def encode(self, keyframe: Keyframe) -> Tuple[int, bytes]:
-        """The checksum and the bytes of a keyframe. ValueError: it is of another session, or too large."""
+        """The checksum and the bytes of a keyframe. ValueError: it is of another session, or too large, or no later than the one
+        before."""
         if keyframe.header != self.header:
             raise ValueError("the keyframe's header is not that of this session")
+        if self._last_us is not None and keyframe.time_us <= self._last_us:
+            raise ValueError(f"a keyframe of {keyframe.time_us} us after one of {self._last_us} us: times ascend")
         payload = encode_keyframe(keyframe)
         return crc32c(payload), payload
 

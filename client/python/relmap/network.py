@@ -15,6 +15,7 @@ import numpy as np
 from relmap.geometry import Array
 
 _MAX_PINS = 600  # evenly spread; the ends of chains come on top
+_MAX_PINNED = 1500  # chains with pins
 _MAX_ITERATIONS = 1000
 # Of the energy (the sum of squared misfits in standard deviations) by which an answer is off, as the preconditioner sees
 # it: far less than the measurements themselves are off. Without pins it sees little of what bends the whole.
@@ -138,20 +139,24 @@ class Network:
         return np.asarray(z)
 
     def _place_pins(self) -> None:
-        """Pins at both ends of every long chain and evenly between. Nodes move with the pins around them, like beads on a rod,
-        in proportion to the variance of the way; so the system of the pins has the shape of the whole. Chains without pins
-        are left to the iterations."""
+        """Pins at both ends of every long chain and evenly between, and one for each short chain, which moves as a whole.
+        Nodes move with the pins around them, like beads on a rod, in proportion to the variance of the way; so the system of
+        the pins has the shape of the whole. Chains without pins, the shortest if they are many, are left to the
+        iterations."""
         begins = np.flatnonzero(np.concatenate([[True], self.step == 0]))
         ends = np.append(begins[1:], self.nodes) - 1
         apart = -(-self.nodes // _MAX_PINS)
         length = ends + 1 - begins
-        long = length >= (1 if len(length) <= _MAX_PINS else apart)
-        chain_is_long = np.repeat(long, length)
+        pinned = np.zeros(len(length), bool)
+        pinned[np.argsort(-length, kind="stable")[:_MAX_PINNED]] = True
+        both = pinned & (length >= (1 if len(length) <= _MAX_PINS else apart))
+        chain_of = np.repeat(np.arange(len(length)), length)
+        chain_is_pinned = pinned[chain_of]
         node = np.arange(self.nodes)
-        at = np.unique(np.concatenate([begins[long], ends[long], node[chain_is_long & (node % apart == 0)]]))
+        at = np.unique(np.concatenate([begins[pinned], ends[both], node[both[chain_of] & (node % apart == 0)]]))
         self.pins = len(at)
         self.beads = []  # the pins with which each node moves, and by how much with each
-        self.energy = _ENERGY if long.all() else _ENERGY_WITHOUT_PINS
+        self.energy = _ENERGY if pinned.all() else _ENERGY_WITHOUT_PINS
         if self.pins == 0:
             return
         before = np.maximum(np.searchsorted(at, node, side="right") - 1, 0)
@@ -159,8 +164,9 @@ class Network:
         ohms = np.divide(1.0, self.step, out=np.zeros_like(self.step), where=self.step > 0)
         along = np.concatenate([[0.0], np.cumsum(ohms)])
         gone, whole = along - along[at[before]], along[at[after]] - along[at[before]]
-        share = np.divide(gone, whole, out=np.zeros(self.nodes), where=chain_is_long & (whole > 0))
-        self.beads = [(before, np.where(chain_is_long, 1 - share, 0.0)), (after, share)]
+        between = chain_is_pinned & (chain_of[at[after]] == chain_of) & (whole > 0)
+        share = np.divide(gone, whole, out=np.zeros(self.nodes), where=between)
+        self.beads = [(before, np.where(chain_is_pinned, 1 - share, 0.0)), (after, share)]
         steps = np.flatnonzero(self.step > 0)
         system = np.zeros(self.pins * self.pins)
         for a, b, weight in (

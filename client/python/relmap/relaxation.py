@@ -2,7 +2,13 @@
 
 The map is relative: its cycles need not close, and it has no coordinates. A picture needs some, so the errors of cycles are
 spread over their edges, in proportion to their variances. Rotations are relaxed first, then positions; each is a network of
-resistors (a weighted Laplacian). Loop closures that fit badly count less (Huber). It is a picture, not a measurement: never take distances from it.
+resistors (a weighted Laplacian). Loop closures that fit badly count less (Huber).
+
+Measured steps, and closures that are edges of the graph and in force, count with their variances. A doubtful step, which
+nothing measured or along which the robot was carried, counts only where no measured edges connect its ends: a guess with its
+own variance, a ride next to nothing. C++ counts the same (client/springs.h).
+
+It is a picture, not a measurement: never take distances from it.
 """
 
 from __future__ import annotations
@@ -23,7 +29,7 @@ from relmap.tables import make_table
 _HUBER_SIGMAS = 3.0
 _ROTATION_ROUNDS, _POSITION_ROUNDS = 6, 4
 _LEAST_VARIANCE = 1e-10
-_CARRIED_VARIANCE = (1e4, 10.0)  # m^2, rad^2: what is known of a ride, or a guess, beside what closures measured
+_CARRIED_VARIANCE = (3e4, 3.0)  # m^2, rad^2: of a ride, next to nothing beside what closures measured
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -75,23 +81,35 @@ class RelaxedPicture(Record):
 
 
 class _Relaxation:
-    """One relaxation. The points of all chains lie one after another; chain c has those from begin[c] to begin[c + 1]."""
+    """One relaxation. The points of all chains lie one after another. Pieces are chains, or parts of chains between doubtful
+    steps that do not count; piece p has the points from begin[p] to begin[p + 1]."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         chains = skeleton.chains
-        self.begin = np.concatenate([[0], np.cumsum([len(chain) for chain in chains], dtype=np.int64)])
-        points = int(self.begin[-1])
-        self.chain_of = np.repeat(np.arange(len(chains)), np.diff(self.begin))
-        self.is_step = self.chain_of[1:] == self.chain_of[:-1]
+        self.chain_begin = np.concatenate([[0], np.cumsum([len(chain) for chain in chains], dtype=np.int64)])
+        points = int(self.chain_begin[-1])
+        chain_of = np.repeat(np.arange(len(chains)), np.diff(self.chain_begin))
+        self.is_step = chain_of[1:] == chain_of[:-1]
         self.step, self.step_variance = np.zeros((points - 1, 6)), np.ones((points - 1, 2))
+        doubtful = np.zeros(points - 1, bool)
         if self.is_step.any():
             self.step[self.is_step] = np.concatenate([chain.step for chain in chains])
             self.step_variance[self.is_step] = np.concatenate([_variances(chain) for chain in chains])
+            doubtful[self.is_step] = np.concatenate([chain.unmeasured | chain.carried for chain in chains])
         self._find_closures(skeleton)
+        self.is_step &= self._pull(doubtful)
+        begins = np.flatnonzero(np.concatenate([[True], ~self.is_step]))
+        self.begin = np.append(begins, points)
+        self.piece_of = np.repeat(np.arange(len(begins)), np.diff(self.begin))
         self.part_of, first_of_part = self._find_parts()
         self.fixed = self.begin[first_of_part]
         self.T = _place_chains(self.step, self.is_step, self.begin)
         self._place_parts(first_of_part)
+
+    @property
+    def chain_parts(self) -> Tuple[int, ...]:
+        """Of each chain its part; the pieces of a chain are all of one part."""
+        return tuple(self.part_of[p] for p in self.piece_of[self.chain_begin[:-1]].tolist())
 
     def run(self) -> None:
         """Relaxes rotations, then positions."""
@@ -102,8 +120,9 @@ class _Relaxation:
             for _ in range(rounds):
                 network.weigh(soft / self.variance[:, kind])
                 soft = self._round(kind, network)
+        part_of_point = np.array(self.part_of)[self.piece_of]
         for part, begin in enumerate(self.fixed.tolist()):  # in the frame of its first point
-            points = np.array(self.part_of)[self.chain_of] == part
+            points = part_of_point == part
             self.T[points] = np.linalg.inv(self.T[begin]) @ self.T[points]
 
     def _find_closures(self, skeleton: Skeleton) -> None:
@@ -127,36 +146,32 @@ class _Relaxation:
             np.concatenate([known.variance[counts], np.zeros((len(again), 2))]), _LEAST_VARIANCE
         )
 
+    def _pull(self, doubtful: Array) -> Array:
+        """Of each step (n - 1,) whether it counts: a doubtful one only if no measured edges connect its ends."""
+        measured = np.concatenate([[0], np.cumsum(~(self.is_step & ~doubtful))])  # of each point what measured steps join
+        root = _roots(int(measured[-1]) + 1, measured[self.a], measured[self.b])[measured]
+        return np.asarray(~doubtful | (root[1:] != root[:-1]))
+
     def _find_parts(self) -> Tuple[List[int], Array]:
-        """Of each chain its part, the one with the most points first; and of each part its first chain."""
-        root = list(range(len(self.begin) - 1))
-
-        def find(c: int) -> int:
-            while root[c] != c:
-                root[c] = root[root[c]]
-                c = root[c]
-            return c
-
-        for a, b in zip(self.chain_of[self.a].tolist(), self.chain_of[self.b].tolist()):
-            a, b = find(a), find(b)
-            root[max(a, b)] = min(a, b)
+        """Of each piece its part, the one with the most points first; and of each part its first piece."""
+        root = _roots(len(self.begin) - 1, self.piece_of[self.a], self.piece_of[self.b]).tolist()
         size: Dict[int, int] = {}
-        for c, points in enumerate(np.diff(self.begin).tolist()):
-            size[find(c)] = size.get(find(c), 0) + points
-        firsts = sorted(size, key=lambda c: (-size[c], c))
-        number = {c: part for part, c in enumerate(firsts)}
-        return [number[find(c)] for c in range(len(root))], np.array(firsts, np.intp)
+        for first, points in zip(root, np.diff(self.begin).tolist()):
+            size[first] = size.get(first, 0) + points
+        firsts = sorted(size, key=lambda first: (-size[first], first))
+        number = {first: part for part, first in enumerate(firsts)}
+        return [number[first] for first in root], np.array(firsts, np.intp)
 
     def _place_parts(self, firsts: Array) -> None:
-        """A start: each chain as a whole, breadth first from the first chain of its part."""
-        chain_a, chain_b = self.chain_of[self.a], self.chain_of[self.b]
+        """A start: each piece as a whole, breadth first from the first piece of its part."""
+        piece_a, piece_b = self.piece_of[self.a], self.piece_of[self.b]
         joins: List[List[Tuple[int, int]]] = [[] for _ in range(len(self.begin) - 1)]
-        # Of the closures between two chains one is enough.
-        _, one = np.unique(np.stack([chain_a, chain_b]), axis=1, return_index=True)
+        # Of the closures between two pieces one is enough.
+        _, one = np.unique(np.stack([piece_a, piece_b]), axis=1, return_index=True)
         for k in one.tolist():
-            if chain_a[k] != chain_b[k]:
-                joins[int(chain_a[k])].append((int(chain_b[k]), k))
-                joins[int(chain_b[k])].append((int(chain_a[k]), k))
+            if piece_a[k] != piece_b[k]:
+                joins[int(piece_a[k])].append((int(piece_b[k]), k))
+                joins[int(piece_b[k])].append((int(piece_a[k]), k))
         T_ab = _transforms(self.measured)
         done = np.zeros(len(joins), bool)
         done[firsts] = True
@@ -167,7 +182,7 @@ class _Relaxation:
                     continue
                 done[other] = True
                 queue.append(other)
-                forward = chain_b[k] == other
+                forward = piece_b[k] == other
                 end, start = (self.b[k], self.a[k]) if forward else (self.a[k], self.b[k])
                 T = T_ab[k] if forward else np.linalg.inv(T_ab[k])
                 move = self.T[start] @ T @ np.linalg.inv(self.T[end])
@@ -196,10 +211,25 @@ class _Relaxation:
 
 
 def _variances(chain: SkeletonChain) -> Array:
-    """Of each step (n, 2): one that is a guess, or along which the robot was carried, counts next to nothing."""
-    doubtful = (chain.carried | chain.unmeasured)[:, None]
-    least = np.maximum(chain.variance, _LEAST_VARIANCE)
-    return np.asarray(np.where(doubtful, np.maximum(least, _CARRIED_VARIANCE), least))
+    """Of each step (n, 2), if it counts."""
+    return np.asarray(np.where(chain.carried[:, None], _CARRIED_VARIANCE, np.maximum(chain.variance, _LEAST_VARIANCE)))
+
+
+def _roots(count: int, a: Array, b: Array) -> Array:
+    """Of things 0..count-1, of which a[k] and b[k] are joined: of each the first one that is joined with it (count,)."""
+    root = list(range(count))
+
+    def find(c: int) -> int:
+        while root[c] != c:
+            root[c] = root[root[c]]
+            c = root[c]
+        return c
+
+    pairs = np.unique(np.stack([np.minimum(a, b), np.maximum(a, b)]), axis=1)
+    for x, y in pairs.T.tolist():
+        x, y = find(x), find(y)
+        root[max(x, y)] = min(x, y)
+    return np.array([find(c) for c in range(count)], np.intp)
 
 
 def _transforms(xi: Array) -> Array:
@@ -227,5 +257,5 @@ def relaxed_picture(skeleton: Skeleton) -> RelaxedPicture:
         return RelaxedPicture((), (), skeleton)
     work = _Relaxation(skeleton)
     work.run()
-    chains = tuple(frozen(T) for T in np.split(work.T, work.begin[1:-1]))
-    return RelaxedPicture(chains, tuple(work.part_of), skeleton)
+    chains = tuple(frozen(T) for T in np.split(work.T, work.chain_begin[1:-1]))
+    return RelaxedPicture(chains, work.chain_parts, skeleton)

@@ -10,17 +10,18 @@ import signal
 import subprocess
 import sys
 import time
-from typing import Any, Callable
+from typing import Any, Callable, Iterator
 
+import grpc
 import numpy as np
 import points_world
 import pytest
 import relmap
 from conftest import PATIENCE_S, PYTHON, Daemon
-from fake_daemon import FakeDaemon
+from fake_daemon import FakeDaemon, refuse
 from relmap import events
 from relmap.credentials import credentials_of
-from relmap.v1 import map_pb2
+from relmap.v1 import map_pb2, reason_pb2
 
 LOOP = "2:5/1"  # a closure of the fixture's map
 
@@ -96,6 +97,31 @@ def test_a_timeout_may_be_infinite_and_is_named(daemon: Daemon) -> None:
     with FakeDaemon(ListEdges=slow) as busy, relmap.connect(busy.address, timeout=PATIENCE_S) as client:
         with pytest.raises(relmap.DeadlineExceeded, match="timeout was 0.2 s"):
             next(client.iter_edges(timeout=0.2))
+
+
+@pytest.mark.parametrize("call", [lambda c: c.edges(timeout=1.5), lambda c: c.find_route("1:1", "1:2", timeout=1.5)])
+def test_an_error_names_the_timeout_that_was_asked_for(call: Callable[[Any], Any]) -> None:
+    """Not what was left of it for the second page, or for the stream that went on."""
+    seen: list[Any] = []
+
+    def pages(request: Any, context: Any) -> map_pb2.ListEdgesReply:
+        seen.append(request)
+        time.sleep(0.2 if len(seen) == 1 else 3)
+        return map_pb2.ListEdgesReply(next_page_token="more")
+
+    def route(request: Any, context: Any) -> Iterator[map_pb2.FindRouteReply]:
+        seen.append(request)
+        if len(seen) == 1:
+            yield map_pb2.FindRouteReply(resume_token="more")
+            time.sleep(0.2)
+            refuse(context, grpc.StatusCode.UNAVAILABLE, reason_pb2.REASON_UNREACHABLE, "broken")
+        time.sleep(3)
+
+    with FakeDaemon(ListEdges=pages, FindRoute=route) as daemon:
+        with relmap.connect(daemon.address, timeout=PATIENCE_S) as client:
+            with pytest.raises(relmap.DeadlineExceeded, match="the timeout was 1.5 s"):
+                call(client)
+    assert len(seen) == 2
 
 
 def test_tokens_and_certificates_are_checked(tmp_path: pathlib.Path) -> None:

@@ -323,6 +323,9 @@ def test_an_address_that_nobody_serves_is_told(tmp_path: Any) -> None:
 def test_the_map_is_drawn(client: relmap.Client) -> None:
     drawing = client.draw_map()
     assert "morning" in drawing.svg and "fountain &lt;b&gt;&amp;" in drawing.svg and "Not for measuring" in drawing.svg
+    closures = client.edges(kinds="loop", states="accepted")
+    assert len(client.skeleton(1).closures) < len(closures)  # a drawn one stands for several
+    assert f"{len(closures)} loop closures in force" in client.draw_map(level=1).svg
     skeleton = client.skeleton(3, candidates=True)
     assert skeleton.frames_total >= 120 and len(skeleton.closures) > 0
     truth = np.array([points_world.pose(2 * np.pi * k / 60, 3.0) for k in range(80)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.dom.minidom
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -91,8 +92,88 @@ def test_chains_without_pins_are_relaxed_as_well(monkeypatch: pytest.MonkeyPatch
 
     skeleton, _ = _circle(200, 0.01, 4)
     pinned = np.concatenate(skeleton.relaxed_picture().chains)
-    monkeypatch.setattr(relmap.network, "_MAX_PINS", 1)
+    monkeypatch.setattr(relmap.network, "_MAX_PINNED", 0)
     np.testing.assert_allclose(np.concatenate(skeleton.relaxed_picture().chains), pinned, atol=2e-3)
+
+
+def _ahead(session: int, metres: list[float], unmeasured: int = -1, carried: int = -1, variance: float = 1e-6) -> SkeletonChain:
+    """A drive straight ahead, with a step of so many metres to each point but the first; that with the number `unmeasured` or
+    `carried` is doubtful, and has this variance."""
+    n = len(metres)
+    step, var = np.zeros((n, 6)), np.full((n, 2), 1e-6)
+    step[:, 2], var[[k for k in (unmeasured, carried) if k >= 0]] = metres, variance
+    return SkeletonChain(
+        session, frozen(np.arange(n + 1)), frozen(np.arange(n + 1)), frozen(step), frozen(var), frozen(np.ones(n, int)),
+        frozen(np.arange(n) == unmeasured), frozen(np.arange(n) == carried),
+    )  # fmt: skip
+
+
+def _same(*places: tuple[int, int, int, int]) -> SkeletonClosures:
+    """Closures that say of frames that they are at one place: session and index, twice each."""
+    n, ends = len(places), np.array(places, int).reshape(-1, 4)
+    return SkeletonClosures(
+        frozen(ends[:, :2]), frozen(ends[:, 2:]), frozen(np.ones(n, int)), frozen(np.full(n, int(EdgeState.ACCEPTED))),
+        frozen(np.ones(n, bool)), frozen(np.zeros((n, 6))), frozen(np.full((n, 2), 1e-6)), frozen(np.zeros(n)),
+        frozen(np.ones(n, int)),
+    )  # fmt: skip
+
+
+def _z(chains: tuple[SkeletonChain, ...], closures: SkeletonClosures) -> np.ndarray:  # type: ignore[type-arg]
+    """How far ahead the points of the first chain are."""
+    relaxed = Skeleton(chains, closures, 100, 1).relaxed_picture()
+    assert set(relaxed.parts) == {0} or len(closures) == 0
+    return np.asarray(relaxed.chains[0][:, 2, 3])
+
+
+def test_a_guess_counts_only_where_nothing_measured_is_beside() -> None:
+    """As in C++."""
+    chains = (_ahead(1, [1, 9, 1, 1], unmeasured=1, variance=1e-8), _ahead(2, [1, 1, 1, 1]))
+    np.testing.assert_allclose(_z(chains, _same()), [0, 1, 10, 11, 12], atol=1e-6)
+    np.testing.assert_allclose(_z(chains, _same((1, 0, 2, 0), (1, 4, 2, 4))), [0, 1, 2, 3, 4], atol=1e-3)
+
+
+def test_where_the_robot_was_carried_the_closures_say() -> None:
+    chains = (_ahead(1, [1, 5, 1], carried=1, variance=1e-8), _ahead(2, [1, 1, 1, 1]))
+    np.testing.assert_allclose(_z(chains, _same((1, 1, 2, 1), (1, 2, 2, 4))), [0, 1, 4, 5], atol=1e-3)
+
+
+def test_guesses_beside_which_nothing_was_measured_have_their_own_variances() -> None:
+    """Two guesses of one way, of 2 m and 4 m; the first is three times as certain. A ride beside them says next to nothing."""
+    guessed = (_ahead(1, [1, 2, 1], unmeasured=1, variance=0.1), _ahead(2, [1, 4, 1], unmeasured=1, variance=0.3))
+    both = _same((1, 1, 2, 1), (1, 2, 2, 2))
+    np.testing.assert_allclose(_z(guessed, both), [0, 1, 3.5, 4.5], atol=1e-2)
+    ridden = (*guessed, _ahead(3, [1, 99, 1], carried=1, variance=1e-8))
+    three = _same((1, 1, 2, 1), (1, 2, 2, 2), (1, 1, 3, 1), (3, 2, 1, 2))
+    np.testing.assert_allclose(_z(ridden, three), [0, 1, 3.5, 4.5], atol=2e-2)
+
+
+@pytest.mark.parametrize("pins, pinned", [(600, 1500), (1, 1500), (1, 5)])
+def test_chains_of_many_pieces_are_laid_out_by_what_was_measured(
+    pins: int, pinned: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of two drives round one circle has guesses, metres and radians off, beside which the other measured; a third drive
+    elsewhere is a part of its own."""
+    import relmap.network
+
+    monkeypatch.setattr(relmap.network, "_MAX_PINS", pins)
+    monkeypatch.setattr(relmap.network, "_MAX_PINNED", pinned)
+    rng = np.random.default_rng(5)
+    skeleton, true = _circle(200, 1e-6)
+    drive = skeleton.chains[0]
+    chains = []
+    for session, guesses in ((1, np.arange(5, 199, 20)), (2, np.arange(15, 199, 20))):
+        step, variance = np.array(drive.step), np.array(drive.variance)
+        step[guesses], variance[guesses] = rng.normal(0, 2, (len(guesses), 6)), 1e-14
+        unmeasured = np.isin(np.arange(199), guesses)
+        chains.append(replace(drive, session=session, step=step, variance=variance, unmeasured=unmeasured))
+    chains.insert(1, replace(_ahead(3, [1, 9, 1], unmeasured=1), session=3))
+    closures = _same(*((1, k, 2, k) for k in range(2, 200, 7)))
+    relaxed = Skeleton(tuple(chains), closures, 404, 1).relaxed_picture()
+    assert relaxed.parts == (0, 1, 0) and [len(T) for T in relaxed.chains] == [200, 4, 200]
+    np.testing.assert_allclose(relaxed.chains[1][:, 2, 3], [0, 1, 10, 11], atol=1e-6)
+    expected = geometry.inverse(true[0]) @ true
+    for T in (relaxed.chains[0], relaxed.chains[2]):
+        np.testing.assert_allclose(T, expected, atol=0.02)
 
 
 def test_parts_that_nothing_joins_are_drawn_apart() -> None:
@@ -101,6 +182,14 @@ def test_parts_that_nothing_joins_are_drawn_apart() -> None:
     apart = Skeleton(skeleton.chains, none, 60, 1).relaxed_picture()
     assert sorted(apart.parts) == [0, 1, 2]
     xml.dom.minidom.parseString(apart.draw().svg)
+
+
+def test_the_legend_counts_what_closures_stand_for() -> None:
+    skeleton, _ = _circle(60, 0.01, 4)
+    states = np.array([EdgeState.ACCEPTED, EdgeState.ACCEPTED, EdgeState.CANDIDATE, EdgeState.REMOVED])
+    closures = replace(skeleton.closures, state=frozen(states.astype(int)), alike=frozen(np.array([5, 1, 7, 30])))
+    drawn = replace(skeleton, closures=closures).draw().svg
+    assert "6 loop closures in force" in drawn and "37 others" in drawn
 
 
 def test_texts_are_escaped() -> None:

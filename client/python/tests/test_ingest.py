@@ -17,6 +17,7 @@ import relmap
 import relmap.aio
 from conftest import PATIENCE_S, Daemon
 from relmap.ingest_core import IngestCore
+from relmap.times import as_us
 from relmap.v1 import ingest_pb2
 
 
@@ -158,6 +159,22 @@ def test_what_is_wrong_is_not_sent(client: relmap.Client) -> None:
             client.session(**{"robot": "cart", "camera": points_world.CAMERA, **wrong})
     with pytest.raises(TypeError):
         client.session("cart", None)  # type: ignore[arg-type]
+
+
+def test_keyframes_that_do_not_ascend_are_not_sent(own_daemon: Daemon) -> None:
+    first, second = list(points_world.drive(2))
+    with relmap.connect(own_daemon.server, timeout=PATIENCE_S) as client:
+        with client.session("cart", points_world.CAMERA) as session:
+            _add(session, first)
+            with pytest.raises(ValueError, match="times ascend"):
+                session.add(first.time, second.T_odom_frame, second.step_cov)
+            late = relmap.Keyframe(
+                header=session.header, sequence=1, time_us=as_us(first.time), T_odom_frame=second.T_odom_frame,
+                step_cov=np.asarray(second.step_cov), source=relmap.MotionSource.VISION,
+            )  # fmt: skip
+            with pytest.raises(ValueError, match="times ascend"):
+                session.add_keyframe(late)
+            assert session.next_sequence == 1 and session.flush(PATIENCE_S) == 1
 
 
 def test_keyframes_of_cpp_make_the_same_map(tmp_path: pathlib.Path) -> None:

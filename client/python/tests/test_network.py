@@ -38,9 +38,10 @@ def _dense(step: Array, a: Array, b: Array, weight: Array, fixed: Array, step_wa
     return x
 
 
-@pytest.mark.parametrize("pins", [1, 6, 1000])
-def test_a_network_is_solved_as_dense_least_squares(pins: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("pins, pinned", [(1, 0), (1, 2), (1, 1000), (6, 1000), (1000, 1000)])
+def test_a_network_is_solved_as_dense_least_squares(pins: int, pinned: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(relmap.network, "_MAX_PINS", pins)
+    monkeypatch.setattr(relmap.network, "_MAX_PINNED", pinned)
     monkeypatch.setattr(relmap.network, "_ENERGY", 1e-20)
     monkeypatch.setattr(relmap.network, "_ENERGY_WITHOUT_PINS", 1e-20)
     # Three chains of 20, 1 and 30 nodes, of which the first and the last are joined; the single node stands alone.
@@ -68,3 +69,19 @@ def test_with_pins_everywhere_few_iterations_are_enough(monkeypatch: pytest.Monk
     assert np.allclose(
         network.solve(step_want, want), _dense(step, a, b, weight, fixed, step_want, want), atol=1e-2
     )
+
+
+def test_chains_that_are_many_and_short_have_a_pin_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that few iterations are enough for them, too: sixty chains of five nodes, in a row."""
+    monkeypatch.setattr(relmap.network, "_MAX_PINS", 20)
+    monkeypatch.setattr(relmap.network, "_MAX_ITERATIONS", 20)
+    monkeypatch.setattr(relmap.network, "_ENERGY", 1e-12)
+    monkeypatch.setattr(relmap.network, "_ENERGY_WITHOUT_PINS", 1e-12)
+    step = np.ones(299)
+    step[4::5] = 0
+    a, fixed = np.arange(2, 295, 5), np.array([0])
+    network = Network(step, a, a + 4, fixed)
+    weight, step_want, want = np.ones(59), RANDOM.normal(size=(299, 3)), RANDOM.normal(size=(59, 3))
+    network.weigh(weight)
+    expected = _dense(step, a, a + 4, weight, fixed, step_want, want)
+    assert np.allclose(network.solve(step_want, want), expected, atol=1e-2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any, AsyncIterator, List, Optional, Union
 
 from relmap.aio.base import LONG_S, ClientBase, copied
@@ -68,9 +67,9 @@ class ExportCalls(ClientBase):
         request = map_pb2.ExportRequest(
             format=map_pb2.EXPORT_FORMAT_FRAMES, sessions=as_sessions(sessions), landmarks=landmarks
         )
-        until = self._until(timeout)
+        countdown = self._caller.countdown(timeout)
 
         def replies() -> AsyncIterator[Any]:
-            return self._caller.resumed(self._map.Export, copied(request), until - time.monotonic())
+            return self._caller.resumed(self._map.Export, copied(request), countdown)
 
         return self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export")

@@ -8,7 +8,7 @@ import uuid as uuids
 from typing import Any, Iterator, Callable, List, Optional, Set, TypeVar
 
 from relmap.client.calls import Caller
-from relmap.connection import checked_timeout
+from relmap.connection import Timeout
 from relmap.errors import Unreachable, ViewExpired
 from relmap.operations import OnProgress, read_progress
 from relmap.v1 import admin_pb2
@@ -46,7 +46,7 @@ class ClientBase:
             self._own.discard(caller)
             caller.close()
 
-    def _ask(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+    def _ask(self, method: Any, request: Any, timeout: Timeout) -> Any:
         return self._caller.ask(method, request, timeout)
 
     def _edit(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
@@ -72,21 +72,13 @@ class ClientBase:
             last = reply
         return last
 
-    def _pages(self, method: Any, request: Any, limit: Callable[[], Optional[float]]) -> Iterator[Any]:
+    def _pages(self, method: Any, request: Any, timeout: Timeout) -> Iterator[Any]:
         while True:
-            reply = self._ask(method, request, limit())
+            reply = self._ask(method, request, timeout)
             yield reply
             if not reply.next_page_token:
                 return
             request.page_token = reply.next_page_token
-
-    def _left_of(self, timeout: Optional[float]) -> Callable[[], float]:
-        """Counts down: tells how much of the timeout is left."""
-        until = self._until(timeout)
-        return lambda: max(until - time.monotonic(), 0.001)
-
-    def _until(self, timeout: Optional[float]) -> float:
-        return time.monotonic() + (self._connection.timeout if timeout is None else checked_timeout(timeout))
 
     def _list(
         self,
@@ -97,11 +89,11 @@ class ClientBase:
         timeout: Optional[float],
     ) -> List[T]:
         """All pages of a list; if its version of the map expires, once more from the beginning."""
-        left = self._left_of(timeout)
+        countdown = self._caller.countdown(timeout)
 
         def whole() -> List[T]:
             found: List[T] = []
-            for reply in self._pages(method, request(), left):
+            for reply in self._pages(method, request(), countdown):
                 found.extend(read(item) for item in items(reply))
             return found
 
@@ -109,10 +101,10 @@ class ClientBase:
 
     def _replies(self, method: Any, request: Any, timeout: Optional[float]) -> List[Any]:
         """All replies of a stream; if its version of the map expires, once more from the beginning."""
-        until = self._until(timeout)
+        countdown = self._caller.countdown(timeout)
 
         def whole() -> List[Any]:
-            return [reply for reply in self._caller.resumed(method, copied(request), until - time.monotonic())]
+            return [reply for reply in self._caller.resumed(method, copied(request), countdown)]
 
         return self._restarted(whole)
 
@@ -135,7 +127,7 @@ class ClientBase:
         """The items of a list, page by page; the timeout is for each page."""
 
         def replies() -> Iterator[Any]:
-            return self._pages(method, request(), lambda: timeout)
+            return self._pages(method, request(), timeout)
 
         return self._given(replies, items, read, "items", "list")
 

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import Any, Iterator, Optional
 
 import grpc
 
 from relmap.client.silence import Heard
-from relmap.connection import Connection, Stubs, check_boot, checked_timeout, unreachable
+from relmap.connection import Connection, Countdown, Stubs, Timeout, check_boot, checked_timeout, unreachable
 from relmap.errors import ClientClosed, DeadlineExceeded, RelmapError, Unreachable, error_of_rpc
 from relmap.v1 import status_pb2
 
@@ -52,25 +51,31 @@ class Caller:
         self.closed = True
         self._channel.close()
 
-    def _call(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+    def _call(self, method: Any, request: Any, timeout: Timeout) -> Any:
         if self.closed:
             raise ClientClosed
-        return method(request, timeout=self._limit(timeout), metadata=self._metadata)
+        limit = timeout.left if isinstance(timeout, Countdown) else self._asked(timeout)
+        return method(request, timeout=None if limit == math.inf else limit, metadata=self._metadata)
 
-    def _failed(self, error: Any, timeout: Optional[float]) -> RelmapError:
+    def _failed(self, error: Any, timeout: Timeout) -> RelmapError:
         if self.closed:
             return ClientClosed()
         failed = error_of_rpc(error)
-        limit = self._limit(timeout)
-        if isinstance(failed, DeadlineExceeded) and limit is not None:
-            return DeadlineExceeded(failed.reason, f"{failed.message}; the timeout was {limit:g} s", failed.request_id)
+        asked = self._asked(timeout)
+        if isinstance(failed, DeadlineExceeded) and asked != math.inf:
+            return DeadlineExceeded(failed.reason, f"{failed.message}; the timeout was {asked:g} s", failed.request_id)
         return failed
 
-    def _limit(self, timeout: Optional[float]) -> Optional[float]:
-        limit = self.connection.timeout if timeout is None else checked_timeout(timeout)
-        return None if limit == math.inf else limit
+    def _asked(self, timeout: Timeout) -> float:
+        if isinstance(timeout, Countdown):
+            return timeout.asked
+        return self.connection.timeout if timeout is None else checked_timeout(timeout)
 
-    def ask(self, method: Any, request: Any, timeout: Optional[float] = None) -> Any:
+    def countdown(self, timeout: Optional[float]) -> Countdown:
+        """A countdown that begins now, from the timeout; None: from that of the connection."""
+        return Countdown(self._asked(timeout))
+
+    def ask(self, method: Any, request: Any, timeout: Timeout = None) -> Any:
         """The reply to a request. RelmapError: why there is none."""
         try:
             return self._call(method, request, timeout)
@@ -78,7 +83,7 @@ class Caller:
             raise self._failed(error, timeout) from None
 
     def stream(
-        self, method: Any, request: Any, timeout: Optional[float] = None, silence: Optional[float] = None
+        self, method: Any, request: Any, timeout: Timeout = None, silence: Optional[float] = None
     ) -> Iterator[Any]:
         """The replies to a request; not resumed. The timeout is for all of them; None: that of the connection, inf: none.
         With `silence`, Unreachable is raised if no reply comes for so many seconds."""
@@ -91,13 +96,12 @@ class Caller:
         finally:
             call.cancel()
 
-    def resumed(self, method: Any, request: Any, timeout: Optional[float] = None) -> Iterator[Any]:
+    def resumed(self, method: Any, request: Any, countdown: Countdown) -> Iterator[Any]:
         """The replies to a request with a resume_token: a stream that breaks goes on after the last reply."""
-        until = time.monotonic() + (self.connection.timeout if timeout is None else timeout)
         broken = 0
         while True:
             try:
-                for reply in self.stream(method, request, max(until - time.monotonic(), 0.001)):
+                for reply in self.stream(method, request, countdown):
                     yield reply
                     request.resume_token = reply.resume_token
                     broken = 0

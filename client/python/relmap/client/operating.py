@@ -176,12 +176,12 @@ class OperatorCalls(ClientBase):
             failed=failed,
             page_size=min(limit, 1000),
         )
-        left = self._left_of(timeout)
+        countdown = self._caller.countdown(timeout)
 
         def read() -> AuditLog:
             entries: List[Any] = []
             if limit > 0:
-                for reply in self._pages(self._admin.ListAudit, copied(request), left):
+                for reply in self._pages(self._admin.ListAudit, copied(request), countdown):
                     entries.extend(read_audit_entry(entry) for entry in reply.entries)
                     if len(entries) >= limit:
                         break

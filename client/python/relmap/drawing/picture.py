@@ -233,12 +233,13 @@ class _MapDrawing:
         ]
         if len(self.sessions) > _MOST_SESSIONS:
             entries.append(("none", INK, f"and {len(self.sessions) - _MOST_SESSIONS} more sessions"))
-        states = self.picture.skeleton.closures.state
-        in_force = int(np.sum(states == EdgeState.ACCEPTED))
+        closures = self.picture.skeleton.closures  # each stands for all that are alike
+        accepted = closures.state == EdgeState.ACCEPTED
+        in_force, others = int(closures.alike[accepted].sum()), int(closures.alike[~accepted].sum())
         if in_force:
             entries.append(("loop", LOOP, f"{in_force} loop closures in force"))
-        if len(states) > in_force:
-            entries.append(("dashed", NOT_IN_FORCE, f"{len(states) - in_force} others"))
+        if others:
+            entries.append(("dashed", NOT_IN_FORCE, f"{others} others"))
         if any(chain.unmeasured.any() for chain in self.chains):
             entries.append(("dotted", INK, "a guess of the motion"))
         if any(chain.carried.any() for chain in self.chains):
