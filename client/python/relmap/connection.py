@@ -145,6 +145,8 @@ def unreachable(connection: Connection, where: ServerAddress, error: RelmapError
 def check_boot(connection: Connection, where: ServerAddress, boot_id: str) -> None:
     """Unreachable if another daemon answers than the one that wrote DIR/endpoint, which remains after a crash."""
     if where.boot_id and boot_id != where.boot_id:
+        if connection.resolve().boot_id == boot_id:
+            return  # it started in that one's place while this connected
         raise Unreachable(
             Reason.UNREACHABLE,
             f"the daemon that served {connection.server} is gone; another answers at {where.address}",

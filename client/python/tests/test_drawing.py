@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 import xml.dom.minidom
 from dataclasses import replace
 
@@ -215,3 +216,17 @@ def test_an_empty_map_is_drawn() -> None:
     for width in (10, 5000):
         with pytest.raises(ValueError):
             Skeleton((), closures, 0, 1).draw(width)
+
+
+def test_a_drawing_is_saved_as_what_it_is(tmp_path: pathlib.Path) -> None:
+    drawing = _circle(60, 0.01)[0].relaxed_picture().draw()
+    drawing.save(tmp_path / "map.svg")
+    assert (tmp_path / "map.svg").read_text(encoding="utf-8") == drawing.svg
+    with pytest.raises(ValueError, match="does not end with .svg"):
+        drawing.save(tmp_path / "map.png")
+
+
+def test_the_level_of_a_picture_follows_from_the_number_of_frames() -> None:
+    from relmap.aio.shapes import _level_for
+
+    assert [_level_for(frames) for frames in (0, 20_000, 20_001, 1_000_000, 10_000_000)] == [3, 3, 2, 1, 0]

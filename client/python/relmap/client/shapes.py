@@ -15,6 +15,11 @@ from relmap.skeleton import Skeleton, SkeletonChain, joined_chains, read_chain, 
 from relmap.v1 import skeleton_pb2
 
 
+def _level_for(frames: int) -> int:
+    """How much of a map with so many frames a picture shows."""
+    return next((level for level, most in ((3, 20_000), (2, 300_000), (1, 3_000_000)) if frames <= most), 0)
+
+
 class ShapeCalls(StoredCalls):
     """Calls that draw the map."""
 
@@ -54,7 +59,7 @@ class ShapeCalls(StoredCalls):
         self,
         *,
         sessions: SessionsLike = (),
-        level: int = 1,
+        level: Optional[int] = None,
         candidates: bool = False,
         labels: bool = True,
         width: int = 900,
@@ -67,7 +72,7 @@ class ShapeCalls(StoredCalls):
 
         Args:
             sessions: only these; empty: all.
-            level: as in skeleton().
+            level: as in skeleton(); None: every frame of a map with up to 20,000 in these sessions, fewer points of more.
             candidates: with closures that are not in force.
             labels: with labels.
             width: of the picture, points.
@@ -76,6 +81,10 @@ class ShapeCalls(StoredCalls):
             RequestError: NO_SUCH_SESSION.
             ViewExpired: as skeleton().
         """
+        listed = self.sessions(timeout=timeout)
+        if level is None:
+            wanted = set(as_sessions(sessions))
+            level = _level_for(sum(session.frames for session in listed if not wanted or session.number in wanted))
         try:
             skeleton = self.skeleton(level, sessions=sessions, candidates=candidates, timeout=timeout)
         except DaemonError as error:
@@ -83,7 +92,7 @@ class ShapeCalls(StoredCalls):
                 raise
             skeleton = self._skeleton_of_edges(sessions, candidates, timeout)  # of an older daemon
         named = self.labels(timeout=timeout) if labels else ()
-        names = {session.number: session.name for session in self.sessions(timeout=timeout)}
+        names = {session.number: session.name for session in listed}
         return draw_map(skeleton.relaxed_picture(), width, names, named)
 
     def _skeleton_of_edges(

@@ -48,7 +48,9 @@ class Drawing:
     svg: str
 
     def save(self, path: "Union[str, os.PathLike[str]]") -> None:
-        """Writes the SVG file. OSError: it cannot be written."""
+        """Writes the SVG file. OSError: it cannot be written. ValueError: the name is that of another format."""
+        if Path(path).suffix.lower() != ".svg":
+            raise ValueError(f"a drawing is an SVG, and {os.fspath(path)!r} does not end with .svg")
         Path(path).write_text(self.svg, encoding="utf-8")
 
     def _repr_svg_(self) -> str:
