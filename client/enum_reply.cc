@@ -13,7 +13,8 @@ namespace {
 template <typename Enum>
 Status read_between(Enum first, Enum last, int wire, const char* what, Enum& value) {
   if (wire < static_cast<int>(first) || wire > static_cast<int>(last))
-    return {Reason::CORRUPT, std::string("the daemon's ") + what + " is not known here: " + std::to_string(wire)};
+    return {Reason::CORRUPT, std::string("the daemon's ") + what + " is not known here: " + std::to_string(wire) +
+                                 "; the daemon may be newer than this client"};
   value = static_cast<Enum>(wire);
   return {};
 }

@@ -14,7 +14,8 @@ enum Verification : int;
 
 namespace relmap::client {
 
-// CORRUPT, with `value` as it was: what the daemon says has no meaning here.
+// CORRUPT, with `value` as it was: what the daemon says has no meaning here. It may be newer than this client, since
+// enums grow. Of what decides nothing, callers leave such a value out instead.
 Status read_enum(v1::EdgeKind wire, EdgeKind& value);
 Status read_enum(v1::EdgeState wire, EdgeState& value);
 Status read_enum(v1::Verification wire, Verification& value);

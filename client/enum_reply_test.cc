@@ -10,6 +10,7 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/evidence.pb.h"
 #include "relmap/v1/map.pb.h"
+#include "relmap/v1/skeleton.pb.h"
 #include "relmap/v1/watch.pb.h"
 
 namespace relmap::client {
@@ -54,7 +55,8 @@ TEST(EnumReply, NumbersAreThoseOfTheProtocol) {
   EXPECT_EQ(state, EdgeState::kQuarantined);
   const Status refused = read_enum(unknown<v1::EdgeState>(), state);
   EXPECT_EQ(refused.reason(), Reason::CORRUPT);
-  EXPECT_EQ(refused.message(), "the daemon's state of an edge is not known here: 257");
+  EXPECT_EQ(refused.message(),
+            "the daemon's state of an edge is not known here: 257; the daemon may be newer than this client");
   EXPECT_EQ(state, EdgeState::kQuarantined);
 }
 
@@ -99,7 +101,6 @@ TEST(EnumReply, AnEdgeWithAnUnknownValueIsCorrupt) {
       [](v1::Edge& edge) { edge.set_source(unknown<v1::MotionSource>()); },
       [](v1::Edge& edge) { edge.set_verification(unknown<v1::Verification>()); },
       [](v1::Edge& edge) { edge.mutable_history(0)->set_state(unknown<v1::EdgeState>()); },
-      [](v1::Edge& edge) { edge.mutable_suspicion()->mutable_doubts(0)->set_kind(unknown<v1::DoubtKind>()); },
   };
   for (std::size_t i = 0; i < spoils.size(); ++i) {
     v1::Edge edge = an_edge();
@@ -108,6 +109,65 @@ TEST(EnumReply, AnEdgeWithAnUnknownValueIsCorrupt) {
     EXPECT_EQ(read.reason(), Reason::CORRUPT) << i;
     EXPECT_THAT(read.status().message(), HasSubstr("is not known here: ")) << i;
   }
+}
+
+// A watch would end for good with the first closure that a newer daemon doubts for another reason.
+TEST(EnumReply, DoubtsOfAnUnknownKindAreLeftOut) {
+  v1::Edge edge = an_edge();
+  edge.mutable_suspicion()->set_value(0.5);
+  for (const v1::DoubtKind kind : {unknown<v1::DoubtKind>(), v1::DOUBT_KIND_UNSPECIFIED, v1::DOUBT_KIND_LONELY})
+    edge.mutable_suspicion()->add_doubts()->set_kind(kind);
+  const auto read = read_edge(edge);
+  ASSERT_TRUE(read.ok()) << read.status().to_string();
+  EXPECT_EQ(read->suspicion->value, 0.5);
+  ASSERT_EQ(read->suspicion->doubts.size(), 2u);
+  EXPECT_EQ(read->suspicion->doubts[0].kind, DoubtKind::kUnseen);
+  EXPECT_EQ(read->suspicion->doubts[1].kind, DoubtKind::kLonely);
+  v1::MapEvent event;
+  *event.mutable_edge_changed() = edge;
+  EXPECT_TRUE(read_event(event).ok());
+}
+
+TEST(EnumReply, WhatAnEditChangesHasAStateOrNone) {
+  v1::EditEffect effect;
+  v1::ClosureChange& change = *effect.add_closures();
+  change.set_after(v1::EDGE_STATE_REMOVED);
+  const auto read = read_effect(effect);
+  ASSERT_TRUE(read.ok()) << read.status().to_string();
+  EXPECT_EQ(read->closures.at(0).before, std::nullopt) << "it did not exist";
+  EXPECT_EQ(read->closures.at(0).after, EdgeState::kRemoved);
+  change.set_before(unknown<v1::EdgeState>());
+  EXPECT_EQ(read_effect(effect).reason(), Reason::CORRUPT);
+  change.set_before(v1::EDGE_STATE_UNSPECIFIED);
+  change.set_after(unknown<v1::EdgeState>());
+  EXPECT_EQ(read_effect(effect).reason(), Reason::CORRUPT);
+}
+
+TEST(EnumReply, AClosureOfASkeletonHasAStateAndStandsForOneAtLeast) {
+  v1::GetSkeletonReply reply;
+  v1::SkeletonClosures& told = *reply.mutable_closures();
+  told.add_session_b(1);
+  told.add_index_b(5);
+  told.add_ordinal(1);
+  told.add_session_a(1);
+  told.add_index_a(2);
+  told.add_state(v1::EDGE_STATE_ACCEPTED);
+  told.add_carries(true);
+  for (int i = 0; i < 6; ++i) told.add_a_from_b(0);
+  for (int i = 0; i < 2; ++i) told.add_variance(0);
+  told.add_suspicion(0);
+  told.add_alike(1);
+  const auto read = [&] {
+    Skeleton skeleton;
+    return read_skeleton_part(reply, skeleton);
+  };
+  EXPECT_TRUE(read().ok());
+  told.set_state(0, unknown<v1::EdgeState>());
+  EXPECT_EQ(read().reason(), Reason::CORRUPT);
+  EXPECT_THAT(read().message(), HasSubstr("state of an edge is not known here: 257"));
+  told.set_state(0, v1::EDGE_STATE_ACCEPTED);
+  told.set_alike(0, 0);
+  EXPECT_EQ(read().reason(), Reason::CORRUPT);
 }
 
 TEST(EnumReply, OtherRepliesWithAnUnknownValueAreCorrupt) {

@@ -11,7 +11,7 @@ constexpr std::array<const char*, 4> kKinds = {"unknown", "odometry", "loop", "p
 constexpr std::array<const char*, 7> kVerifications = {"none",     "stereo",     "pnp",       "epipolar",
                                                        "imported", "homography", "compounded"};
 
-constexpr std::array<const char*, 10> kDoubts = {"other doubt",
+constexpr std::array<const char*, 10> kDoubts = {"unknown",
                                                  "few inliers",
                                                  "poor spread",
                                                  "improbable by appearance",

@@ -99,7 +99,7 @@ enum class DoubtKind : std::uint8_t {
   kTension = 8,        // refinement moved it away from what was measured
   kUnseen = 9          // going on from it, the robot did not see what the map shows there
 };
-// "few inliers", "another place fits", ...; "other doubt" for one that a newer daemon knows.
+// "few inliers", "another place fits", ...
 const char* name_of(DoubtKind kind);
 
 struct Doubt {
@@ -112,7 +112,7 @@ struct Doubt {
 // them.
 struct Suspicion {
   double value = 0;           // 0: nothing speaks against it; 1: it is wrong as far as the map can tell
-  std::vector<Doubt> doubts;  // the heaviest first
+  std::vector<Doubt> doubts;  // the heaviest first; without those of kinds that only a newer daemon knows
   // What else to know, in words: what the map does not know of the closure, or that an operator put it into force.
   std::string remark = {};
 };

@@ -266,7 +266,9 @@ Result<EdgeEdit> Client::edit_edge(EdgeId edge, EdgeAction action, const EditOpt
   if (Status status = impl_->ask_map(&MapStub::SetEdgeState, request, reply); !status.ok()) return status;
   auto after = read_edge(reply.edge());
   if (!after.ok()) return after.status();
-  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run, reply.shown()};
+  auto effect = read_effect(reply.effect());
+  if (!effect.ok()) return effect.status();
+  return EdgeEdit{std::move(after).value(), std::move(effect).value(), !options.dry_run, reply.shown()};
 }
 
 Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const EditOptions& options) {
@@ -281,7 +283,9 @@ Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const E
   if (Status status = impl_->ask_map(&MapStub::ProposeEdge, request, reply); !status.ok()) return status;
   auto after = read_edge(reply.edge());
   if (!after.ok()) return after.status();
-  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run};
+  auto effect = read_effect(reply.effect());
+  if (!effect.ok()) return effect.status();
+  return EdgeEdit{std::move(after).value(), std::move(effect).value(), !options.dry_run};
 }
 
 Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::string& label, bool present) {

@@ -126,13 +126,14 @@ Unmeasured read_unmeasured(const Way& message) {
   return unmeasured;
 }
 
-Status read_suspicion(const v1::Suspicion& message, Suspicion& suspicion) {
-  suspicion = {message.value(), {}, message.remark()};
+Suspicion read_suspicion(const v1::Suspicion& message) {
+  Suspicion suspicion{message.value(), {}, message.remark()};
   for (const v1::Doubt& doubt : message.doubts()) {
-    suspicion.doubts.push_back({{}, doubt.weight(), doubt.message()});
-    if (Status read = read_enum(doubt.kind(), suspicion.doubts.back().kind); !read.ok()) return read;
+    Doubt read{{}, doubt.weight(), doubt.message()};
+    // Doubts decide nothing: one of a kind that only a newer daemon knows is left out.
+    if (read_enum(doubt.kind(), read.kind).ok()) suspicion.doubts.push_back(std::move(read));
   }
-  return {};
+  return suspicion;
 }
 
 FramePicture read_picture(const v1::FramePicture& message) {
@@ -197,8 +198,7 @@ Result<Edge> read_edge(const v1::Edge& message) {
   }
   for (const v1::EdgeId& id : message.carried_by()) edge.carried_by.push_back(read_id(id));
   if (message.has_carried()) edge.carried = read_carried(message.carried());
-  if (message.has_suspicion())
-    if (Status read = read_suspicion(message.suspicion(), edge.suspicion.emplace()); !read.ok()) return read;
+  if (message.has_suspicion()) edge.suspicion = read_suspicion(message.suspicion());
   edge.time_us = message.time_us();
   if (!message.has_uniqueness()) return edge;
   const v1::Uniqueness& found = message.uniqueness();
@@ -280,17 +280,21 @@ AuditEntry read_audit(const v1::AuditEntry& message) {
   return entry;
 }
 
-EditEffect read_effect(const v1::EditEffect& message) {
-  const auto state = [](v1::EdgeState wire) {
-    EdgeState known = {};
-    return read_enum(wire, known).ok() ? std::optional(known) : std::nullopt;
+Result<EditEffect> read_effect(const v1::EditEffect& message) {
+  // Unspecified: the closure did not, or does not, exist.
+  const auto read_state = [](v1::EdgeState wire, std::optional<EdgeState>& state) {
+    return wire == v1::EDGE_STATE_UNSPECIFIED ? Status() : read_enum(wire, state.emplace());
   };
   EditEffect effect;
-  for (const v1::ClosureChange& change : message.closures())
-    effect.closures.push_back({read_id(change.id()), read_id(change.a()), read_id(change.b()), state(change.before()),
-                               state(change.after()), reason_from_wire(change.reason_before()),
+  for (const v1::ClosureChange& change : message.closures()) {
+    effect.closures.push_back({read_id(change.id()), read_id(change.a()), read_id(change.b()), std::nullopt,
+                               std::nullopt, reason_from_wire(change.reason_before()),
                                reason_from_wire(change.reason_after()), change.edge_before(), change.edge_after(),
                                change.bound(), change.bound_frames()});
+    ClosureChange& read = effect.closures.back();
+    if (Status known = read_state(change.before(), read.before); !known.ok()) return known;
+    if (Status known = read_state(change.after(), read.after); !known.ok()) return known;
+  }
   for (const v1::CarriedStretch& stretch : message.carried()) effect.carried.push_back(read_carried(stretch));
   for (const v1::CarriedStretch& stretch : message.not_carried()) effect.not_carried.push_back(read_carried(stretch));
   return effect;

@@ -42,7 +42,7 @@ Result<Edge> read_edge(const v1::Edge& message);
 Result<EdgeExplanation> read_explanation(const v1::ExplainEdgeReply& message);
 ClosureMatrixCell read_cell(const v1::ClosureMatrixCell& message);
 AuditEntry read_audit(const v1::AuditEntry& message);
-EditEffect read_effect(const v1::EditEffect& message);
+Result<EditEffect> read_effect(const v1::EditEffect& message);
 Result<ExportedFrame> read_exported(const v1::ExportedFrame& message);
 Result<Frame> read_frame(const v1::Frame& message);
 Result<Session> read_session(const v1::Session& message);

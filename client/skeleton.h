@@ -21,7 +21,7 @@ struct Skeleton {
   // A kept frame, and the step to it from the point before; of the first point of a chain there is none.
   struct Point {
     FrameId frame;
-    std::int64_t time_us = 0;  // UTC, in whole milliseconds
+    std::int64_t time_us = 0;  // UTC, in whole milliseconds; 0: not known
     SE3 T_before_this = {};    // p_before = T p_this
     // The traces of the covariance of the step, m^2 and rad^2.
     double translation_variance = 0, rotation_variance = 0;

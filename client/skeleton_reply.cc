@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "client/enum_reply.h"
 #include "client/replies.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
@@ -87,10 +88,8 @@ Status read_skeleton_part(const v1::GetSkeletonReply& message, Skeleton& skeleto
     Skeleton::Closure closure;
     closure.id = {{told.session_b(i), told.index_b(i)}, told.ordinal(i)};
     closure.a = {told.session_a(i), told.index_a(i)};
-    if (told.state(i) < v1::EDGE_STATE_CANDIDATE || told.state(i) > v1::EDGE_STATE_REMOVED ||
-        closure.a == closure.id.frame)
-      return {Reason::CORRUPT, kMalformed};
-    closure.state = static_cast<EdgeState>(told.state(i));
+    if (closure.a == closure.id.frame || told.alike(i) == 0) return {Reason::CORRUPT, kMalformed};
+    if (Status read = read_enum(told.state(i), closure.state); !read.ok()) return read;
     closure.carries = told.carries(i);
     closure.suspicion = told.suspicion(i);
     closure.alike = told.alike(i);

@@ -267,6 +267,15 @@ TEST_F(CredentialsTest, MistakesAreNamed) {
   }
   const Finished outside = admin({"credentials", "new", folder_ / "fleet", "../cart", "--role", "robot"});
   EXPECT_THAT(outside.standard_error, HasSubstr("'../cart' is no name for a file; --out FILE gives one"));
+  // In events and histories these mean what was done without credentials.
+  expect_done(admin({"credentials", "ca", folder_ / "fleet"}));
+  for (const std::string name : {"relmapd", "local", "anonymous"}) {
+    const Finished reserved =
+        admin({"credentials", "new", folder_ / "fleet", name, "--role", "operator", "--out", folder_ / "x.pem"});
+    EXPECT_EQ(reserved.exit_code, 1) << name;
+    EXPECT_THAT(reserved.standard_error, HasSubstr("BAD_NAME: '" + name + "' is no name for credentials"));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "x.pem")) << name;
+  }
   // Whoever the daemon runs as gets to its folder, and nobody else into it.
   expect_done(admin({"credentials", "ca", folder_ / "a/b/fleet/"}));
   for (const auto& [folder, mode] : {std::pair("a", 0755), {"a/b", 0755}, {"a/b/fleet", 0700}})

@@ -366,12 +366,18 @@ TEST_F(Operator, ReportsOnTheMap) {
   EXPECT_THAT(page, Not(HasSubstr("nan")));
   const Finished json = relmap({"--json", "report", "--out", folder_ / "report.html"});
   EXPECT_THAT(json.standard_output, ::testing::StartsWith("{\"out\":"));
-  for (const char* key : {"\"bytes\":", "\"findings\":[", "\"tears\":", "\"suspicious\":", "\"shown\":3"})
+  for (const char* key :
+       {"\"bytes\":", "\"findings\":[", "\"tears\":", "\"parts\":1", "\"suspicious\":", "\"shown\":3"})
     EXPECT_THAT(json.standard_output, HasSubstr(key));
   expect_keys_are_documented(json.standard_output);
   const Finished without = relmap({"--json", "report", "--out", folder_ / "report.html", "--suspicious", "0"});
   EXPECT_THAT(without.standard_output, HasSubstr("\"shown\":0"));
   EXPECT_THAT(contents(folder_ / "report.html"), HasSubstr("of those in force")) << "how many are suspicious";
+  const Finished undrawn = relmap({"--json", "report", "--out", folder_ / "report.html", "--no-map"});
+  ASSERT_EQ(undrawn.exit_code, 0) << undrawn.standard_error;
+  for (const char* key : {"\"tears\":", "\"parts\":"}) EXPECT_THAT(undrawn.standard_output, Not(HasSubstr(key)));
+  EXPECT_THAT(contents(folder_ / "report.html"), Not(HasSubstr("<h2>The map</h2>")));
+  EXPECT_THAT(contents(folder_ / "report.html"), Not(HasSubstr("--no-map")));
   EXPECT_EQ(relmap({"report", "--out", "-"}).standard_output.substr(0, 15), "<!DOCTYPE html>");
   EXPECT_THAT(relmap({"report", "--out", folder_ / "report.txt"}).standard_error, HasSubstr("must end with .html"));
 }

@@ -7,7 +7,6 @@
 
 #include "proto/access/file.h"
 #include "proto/base/hex.h"
-#include "proto/base/names.h"
 
 namespace relmap::access {
 
@@ -49,7 +48,7 @@ Result<Grant> parse_line(std::string_view line) {
   if (!expires) return bad("'" + std::string(expiry) + "' is no time like 2027-11-29T00:00:00Z");
   const std::string_view state = word_of(line);
   if (state != "valid" && state != "revoked") return bad("'" + std::string(state) + "' is neither valid nor revoked");
-  if (Status name = check_name("name", line); !name.ok()) return bad(name.message());
+  if (Status name = check_principal_name(line); !name.ok()) return bad(name.message());
   grant.principal = {*role, std::string(line)};
   grant.expires_s = *expires;
   grant.revoked = state == "revoked";

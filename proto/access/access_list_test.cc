@@ -57,6 +57,16 @@ TEST(AccessList, AMalformedLineIsNamed) {
   }
 }
 
+TEST(AccessList, NamesThatMeanNoCredentialsAreRefused) {
+  for (const char* name : {"relmapd", "local", "anonymous"}) {
+    const auto parsed = AccessList::parse(
+        AccessList().text() + "token " + kHash + " operator 2027-11-29T00:00:00Z valid " + name + "\n", "file");
+    EXPECT_EQ(parsed.reason(), Reason::BAD_CONFIG) << name;
+    EXPECT_THAT(parsed.status().message(), HasSubstr("file:2: '" + std::string(name) + "' is no name for credentials"))
+        << name;
+  }
+}
+
 TEST(AccessList, RevokingTakesAllOfAName) {
   AccessList list;
   list.add({Grant::Kind::kToken, kHash, {Role::kRobot, "cart"}, 0, false});

@@ -28,6 +28,16 @@ std::optional<Role> role_of(std::string_view name) {
   return std::nullopt;
 }
 
+Status check_principal_name(std::string_view name) {
+  if (Status valid = check_name("name", name); !valid.ok()) return valid;
+  for (const std::string_view reserved : {kDaemonName, kLocalName, kAnonymousName})
+    if (name == reserved)
+      return {Reason::BAD_NAME, "'" + std::string(name) +
+                                    "' is no name for credentials: in events and histories it means what was done "
+                                    "without any; choose another"};
+  return {};
+}
+
 std::string uri_of(const Principal& principal) {
   return std::string(kScheme).append(role_name(principal.role)).append(":").append(percent_encoded(principal.name));
 }
@@ -39,7 +49,7 @@ std::optional<Principal> principal_of(std::string_view uri) {
   if (colon == std::string_view::npos) return std::nullopt;
   const auto role = role_of(uri.substr(0, colon));
   auto name = percent_decoded(uri.substr(colon + 1));
-  if (!role || !name || !check_name("name", *name).ok()) return std::nullopt;
+  if (!role || !name || !check_principal_name(*name).ok()) return std::nullopt;
   return Principal{*role, std::move(*name)};
 }
 

@@ -21,5 +21,15 @@ TEST(Principal, OtherUrisNameNobody) {
   EXPECT_FALSE(principal_of("relmap:robot:" + std::string(65, 'x')));
 }
 
+TEST(Principal, NamesThatMeanNoCredentialsAreNobodys) {
+  for (const char* name : {"relmapd", "local", "anonymous"}) {
+    EXPECT_EQ(check_principal_name(name).reason(), Reason::BAD_NAME) << name;
+    for (const Role role : {Role::kReader, Role::kRobot, Role::kOperator})
+      EXPECT_FALSE(principal_of(uri_of({role, name}))) << name;
+  }
+  for (const char* name : {"relmapd2", "Local", "cart-1"}) EXPECT_TRUE(check_principal_name(name).ok()) << name;
+  EXPECT_EQ(check_principal_name(" ").reason(), Reason::BAD_NAME);
+}
+
 }  // namespace
 }  // namespace relmap::access

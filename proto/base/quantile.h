@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -29,6 +30,24 @@ inline double quantile(std::vector<double> samples, double share) {
   if (samples.empty()) return 0;
   const auto rank = static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1));
   return ranked(std::move(samples), rank);
+}
+
+// A sample that is there `weight` times.
+struct Weighted {
+  double value = 0;
+  std::uint64_t weight = 1;
+};
+
+// The quantile() of samples that are there several times each, ascending.
+inline double weighted_quantile(const std::vector<Weighted>& ascending, double share) {
+  std::uint64_t samples = 0;
+  for (const Weighted& sample : ascending) samples += sample.weight;
+  if (samples == 0) return 0;
+  const auto rank = static_cast<std::uint64_t>(share * static_cast<double>(samples - 1));
+  std::uint64_t passed = 0;
+  for (const Weighted& sample : ascending)
+    if ((passed += sample.weight) > rank) return sample.value;
+  return ascending.back().value;
 }
 
 }  // namespace relmap

@@ -270,15 +270,22 @@ Status Mapper::Impl::make_digests() {
   const std::uint64_t frames = map->state().keyframes;
   spdlog::info("the map has no digests of its {} frames, or they are of an earlier commit: they are made now", frames);
   bool left = false;
+  std::uint64_t done_before_leaving = 0;
   const Status made = map->complete_digests([&](std::uint64_t done, std::uint64_t total) {
     if (const Clock::time_point now = Clock::now(); now - told > std::chrono::seconds(5)) {
       told = now;
       spdlog::info("digests: {} of {} frames", done, total);
     }
     left = options.leaving && options.leaving();
-    if (left) spdlog::info("digests of {} of {} frames are made; the next start makes the others", done, total);
+    done_before_leaving = done;
     return !left;
   });
+  // They are made once they are committed, which complete_digests() does after it was stopped.
+  if (left && made.reason() == Reason::SHUTTING_DOWN)
+    spdlog::info("digests of {} of {} frames are made; the next start makes the others", done_before_leaving, frames);
+  else if (left)
+    spdlog::warn("the digests that were made last could not be kept; the next start makes them again: {}",
+                 made.to_string());
   if (left) return {Reason::SHUTTING_DOWN, "the daemon was told to stop while it was starting"};
   if (made.ok())
     spdlog::info("digests of {} frames were made in {:.1f} s", frames, duration<double>(Clock::now() - begun).count());

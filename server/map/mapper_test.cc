@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,6 +12,7 @@
 #include <random>
 #include <set>
 #include <span>
+#include <sstream>
 #include <stdexcept>
 #include <thread>
 
@@ -114,6 +117,74 @@ TEST(Mapper, TheIdentityOfAMapNeverChanges) {
   EXPECT_NE(open_mapper(storage::make_memory_engine())->identity().uuid, first.uuid);
 }
 
+// What is logged while it lives.
+class CapturedLog {
+ public:
+  CapturedLog() : before_(spdlog::default_logger()) {
+    spdlog::set_default_logger(
+        std::make_shared<spdlog::logger>("captured", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)));
+  }
+  ~CapturedLog() { spdlog::set_default_logger(before_); }
+  CapturedLog(const CapturedLog&) = delete;
+  CapturedLog& operator=(const CapturedLog&) = delete;
+  std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::logger> before_;
+};
+
+// Commits nothing more once it is told so.
+class FullEngine : public storage::ForwardingEngine {
+ public:
+  explicit FullEngine(std::shared_ptr<Engine> to) : ForwardingEngine(std::move(to)) {}
+  Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const storage::Put> puts,
+                std::span<const std::string> deletes) override {
+    if (full) return {Reason::DISK_FULL, "a commit"};
+    return ForwardingEngine::commit(epoch, applied_sequence, puts, deletes);
+  }
+  std::atomic<bool> full = false;
+};
+
+// As if a program that knows nothing of digests had written to the map last.
+void forget_digests(storage::Engine& engine) {
+  auto state = storage::decode_state(engine.snapshot()->get(storage::keys::map_state()).value().value()).or_throw();
+  EXPECT_NE(state.digests_commit, 0u);
+  state.digests_commit = 0;
+  const storage::Put put{storage::keys::map_state(), storage::encode_state(state)};
+  ASSERT_TRUE(
+      engine.commit(engine.acquire().or_throw(), state.applied_sequence, std::vector<storage::Put>{put}, {}).ok());
+}
+
+TEST(Mapper, DigestsAreSaidToBeMadeOnceTheyAreStored) {
+  const sim::PointsWorld world(small_world(200));
+  const auto engine = std::make_shared<FullEngine>(storage::make_memory_engine());
+  {
+    const auto mapper = open_mapper(engine);
+    ASSERT_TRUE(feed(*mapper, world, 0, 200).ok());
+    ASSERT_TRUE(mapper->stop().ok());
+  }
+  forget_digests(*engine);
+  MapperOptions options;
+  options.closures = false;
+  const auto stopped_start = [&](bool full) {
+    const CapturedLog log;
+    options.leaving = [&engine, full] {
+      engine->full = full;
+      return true;
+    };
+    EXPECT_EQ(Mapper::open(engine, std::make_shared<storage::Budget>(64u << 20), nullptr, options).reason(),
+              Reason::SHUTTING_DOWN);
+    engine->full = false;
+    return log.text();
+  };
+  const std::string lost = stopped_start(true);
+  EXPECT_THAT(lost, testing::Not(testing::HasSubstr("are made; the next start makes the others")));
+  EXPECT_THAT(lost, testing::HasSubstr("could not be kept; the next start makes them again: DISK_FULL: a commit"));
+  EXPECT_THAT(stopped_start(false),
+              testing::HasSubstr("digests of 64 of 200 frames are made; the next start makes the others"));
+}
+
 TEST(Mapper, AStopWhileDigestsAreMadeLeavesTheRestToTheNextStart) {
   const sim::PointsWorld world(small_world(200));
   const auto engine = storage::make_memory_engine();
@@ -124,12 +195,7 @@ TEST(Mapper, AStopWhileDigestsAreMadeLeavesTheRestToTheNextStart) {
     hash = storage::hash_map(*mapper->view());
     ASSERT_TRUE(mapper->stop().ok());
   }
-  auto state = storage::decode_state(engine->snapshot()->get(storage::keys::map_state()).value().value()).or_throw();
-  EXPECT_NE(state.digests_commit, 0u);
-  state.digests_commit = 0;
-  const storage::Put put{storage::keys::map_state(), storage::encode_state(state)};
-  ASSERT_TRUE(
-      engine->commit(engine->acquire().or_throw(), state.applied_sequence, std::vector<storage::Put>{put}, {}).ok());
+  forget_digests(*engine);
 
   MapperOptions options;
   options.closures = false;
@@ -145,7 +211,8 @@ TEST(Mapper, AStopWhileDigestsAreMadeLeavesTheRestToTheNextStart) {
   EXPECT_EQ(asked, 4u) << "the next start made the one that was left";
   EXPECT_EQ(storage::hash_map(*mapper->view()), hash);
   EXPECT_EQ(storage::digests_visited(*mapper->view()), storage::digests_of_frames(*mapper->view()));
-  state = storage::decode_state(engine->snapshot()->get(storage::keys::map_state()).value().value()).or_throw();
+  const auto state =
+      storage::decode_state(engine->snapshot()->get(storage::keys::map_state()).value().value()).or_throw();
   EXPECT_EQ(state.digests_commit, engine->snapshot()->commit_number());
 }
 

@@ -70,7 +70,7 @@ Result<Identity> Gatekeeper::identify(const Evidence& evidence) const {
     identity.version = version_;
   }
   if (evidence.way == Evidence::Way::kSocket || (evidence.way == Evidence::Way::kOpen && open_)) {
-    identity.name = evidence.way == Evidence::Way::kSocket ? "local" : kAnonymous;
+    identity.name = evidence.way == Evidence::Way::kSocket ? access::kLocalName : access::kAnonymousName;
     identity.role = Role::kOperator;
     return identity;
   }
@@ -92,7 +92,8 @@ Result<Identity> Gatekeeper::identify(const Evidence& evidence) const {
   if (evidence.certificate.empty()) return refused("neither a certificate nor a token was shown");
   const auto facts = facts_of(evidence.certificate);
   if (!facts.ok()) return refused("the certificate cannot be read");
-  if (!facts->principal) return refused("the certificate has no name of the form relmap:ROLE:NAME");
+  if (!facts->principal)
+    return refused("the certificate has no name of the form relmap:ROLE:NAME, or one that is not for credentials");
   const access::Grant* grant = list->find(access::Grant::Kind::kCertificate, facts->hash);
   if (grant && grant->revoked) return refused("the certificate of " + facts->principal->name + " was revoked");
   return as(*facts->principal, facts->expires_s);

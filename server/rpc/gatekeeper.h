@@ -30,9 +30,6 @@ struct Evidence {
   std::string_view token;        // of "authorization: Bearer TOKEN"; empty: none. It decides if both are there
 };
 
-// The name of a caller over TCP without TLS.
-inline constexpr char kAnonymous[] = "anonymous";
-
 struct Identity {
   std::string name;
   Role role = Role::kReader;

@@ -33,7 +33,7 @@ constexpr std::size_t kMaxTold = 256;       // lines in that time
 
 // Whose calls are counted together. Those who prove nothing are told apart by their address.
 std::string counted_as(const Identity& caller, std::string peer) {
-  if (caller.name != kAnonymous) return std::string(access::role_name(caller.role)) + " " + caller.name;
+  if (caller.name != access::kAnonymousName) return std::string(access::role_name(caller.role)) + " " + caller.name;
   return peer.substr(0, peer.rfind(':'));
 }
 

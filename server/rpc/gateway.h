@@ -141,7 +141,7 @@ class Call {
   const Deadline& deadline() const { return deadline_; }
   std::string peer() const { return context_->peer(); }
   // Where a caller who proves nothing comes from, without a port; empty for all others.
-  std::string unproved_from() const { return caller_.name == kAnonymous ? entered_as_ : std::string(); }
+  std::string unproved_from() const { return caller_.name == access::kAnonymousName ? entered_as_ : std::string(); }
   // What is asked, for the audit log, if the method is one that it has.
   void asks(const google::protobuf::Message& request);
   // A message was given to gRPC, or has left it. A call whose message does not leave in time is cancelled.

@@ -1,6 +1,7 @@
 #include "server/rpc/messages.h"
 
 #include "frontend/vision/encoded_picture.h"
+#include "proto/access/principal.h"
 #include "proto/wire/convert.h"
 #include "server/rpc/evidence_messages.h"
 #include "storage/graph/binding.h"
@@ -124,7 +125,7 @@ v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us) {
   return message;
 }
 
-std::string author_name(const std::string& author) { return author.empty() ? "relmapd" : author; }
+std::string author_name(const std::string& author) { return author.empty() ? access::kDaemonName : author; }
 
 v1::Session session_message(const storage::Session& session) {
   v1::Session message;

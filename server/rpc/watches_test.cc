@@ -312,7 +312,7 @@ TEST_F(Watches, TellWhoDeletedASession) {
   ASSERT_EQ(told.size(), 2u);
   EXPECT_TRUE(told[1].has_session_deleted());
   for (const v1::MapEvent& event : told) {
-    EXPECT_EQ(event.author(), kAnonymous);
+    EXPECT_EQ(event.author(), access::kAnonymousName);
     EXPECT_GE(event.time_us(), begun);
     EXPECT_LE(event.time_us(), gone);
   }
@@ -330,7 +330,7 @@ TEST_F(Watches, TellWhoEditedAndGoOnAfterAToken) {
     EXPECT_TRUE(watcher->read_until([&](const v1::MapEvent& event) {
       if (event.has_frames_added()) frames += static_cast<std::uint64_t>(event.frames_added().frames_size());
       if (!event.has_frame_labels()) return false;
-      EXPECT_EQ(event.author(), kAnonymous);
+      EXPECT_EQ(event.author(), access::kAnonymousName);
       EXPECT_GT(event.time_us(), 0);
       EXPECT_GT(event.journal_sequence(), 0u);
       token = event.resume_token();

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <opencv2/calib3d.hpp>
@@ -225,15 +224,17 @@ void run(const ByEyeOptions& options, Report& report) {
   const auto client = client::Client::connect(options.server).or_throw();
   std::filesystem::create_directories(options.out);
   Trial trial(options, *client);
-  std::ofstream key(options.key);
+  std::string key;
   for (std::uint32_t k = 1; k <= options.sheets; ++k) {
     const auto [sheet, wrong] = trial.sheet(k);
     const std::string name = options.out + "/sheet" + std::to_string(k);
     const std::string bytes = client::draw_pair_sheet(sheet, client::PictureFormat::kPng).or_throw();
     if (Status written = client::write_file(name + ".png", bytes); !written.ok())
       throw std::runtime_error(written.to_string());
-    key << "sheet " << k << ": pair " << wrong << '\n';
+    key += "sheet " + std::to_string(k) + ": pair " + std::to_string(wrong) + '\n';
   }
+  if (Status written = client::write_file(options.key, key); !written.ok())
+    throw std::runtime_error(written.to_string());
   report.add("sheets", options.sheets, "written; in each one pair is wrong");
   report.add("pairs", options.pairs, "on each sheet");
 }

@@ -19,7 +19,6 @@
 #include "proto/access/token.h"
 #include "proto/base/clock.h"
 #include "proto/base/hex.h"
-#include "proto/base/names.h"
 #include "tools/relmap-admin/commands.h"
 
 namespace relmap::admin {
@@ -164,7 +163,7 @@ struct NewOptions {
 };
 
 Answer make_credentials(const NewOptions& options, Context& context) {
-  if (Status name = check_name("name", options.name); !name.ok()) return {name, false, {}};
+  if (Status name = access::check_principal_name(options.name); !name.ok()) return {name, false, {}};
   if (options.out.empty() && (options.name.find('/') != std::string::npos || options.name.front() == '.'))
     return {Status(Reason::INVALID_ARGUMENT, "'" + options.name + "' is no name for a file; --out FILE gives one"),
             false,

@@ -23,7 +23,9 @@ Skeleton::Point divide(const Skeleton::Point& before, Skeleton::Point& point, st
       static_cast<double>(index - before.frame.index) / static_cast<double>(point.frame.index - before.frame.index);
   Skeleton::Point made = point;
   made.frame.index = index;
-  made.time_us = before.time_us + std::llround(share * static_cast<double>(point.time_us - before.time_us));
+  made.time_us = 0;
+  if (before.time_us != 0 && point.time_us != 0)
+    made.time_us = before.time_us + std::llround(share * static_cast<double>(point.time_us - before.time_us));
   made.T_before_this = SE3::exp(share * point.T_before_this.log());
   made.translation_variance = share * point.translation_variance;
   made.rotation_variance = share * point.rotation_variance;
@@ -162,6 +164,19 @@ std::vector<std::vector<double>> uncertainty_of(const MapShape& shape) {
   return sigmas;
 }
 
+std::vector<Weighted> keyframe_sigmas(const MapShape& shape) {
+  const std::vector<double> of_points = uncertainty_of(shape).at(0);
+  std::vector<Weighted> sigmas;
+  for (const Skeleton::Chain& chain : shape.skeleton.chains)
+    for (std::size_t i = 0; i < chain.points.size(); ++i) {
+      const auto at = shape.at.find(chain.points[i].frame);
+      if (at == shape.at.end() || at->second.part != 0 || !std::isfinite(of_points[at->second.place])) continue;
+      sigmas.push_back({of_points[at->second.place], i == 0 ? 1 : chain.points[i].frames});
+    }
+  std::sort(sigmas.begin(), sigmas.end(), [](const Weighted& a, const Weighted& b) { return a.value < b.value; });
+  return sigmas;
+}
+
 std::map<std::string, std::uint64_t> keyframes_by_day(const Skeleton& skeleton) {
   constexpr std::int64_t kDay = 86'400'000'000;
   std::map<std::int64_t, std::uint64_t> days;
@@ -170,8 +185,12 @@ std::map<std::string, std::uint64_t> keyframes_by_day(const Skeleton& skeleton) 
       const Skeleton::Point& point = chain.points[i];
       const std::int64_t day = point.time_us / kDay;
       const Skeleton::Point& before = chain.points[i > 0 ? i - 1 : 0];
-      if (i == 0 || before.time_us / kDay == day) {
-        days[day] += i == 0 ? 1 : point.frames;
+      if (i == 0 || before.time_us == 0 || point.time_us == 0) {
+        if (point.time_us != 0) ++days[day];
+        continue;
+      }
+      if (before.time_us / kDay == day) {
+        days[day] += point.frames;
         continue;
       }
       for (std::uint32_t k = 1; k <= point.frames; ++k)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/skeleton_relaxation.h"
+#include "proto/base/quantile.h"
 #include "tools/relmap/chosen_sessions.h"
 #include "tools/relmap/tear.h"
 
@@ -47,7 +48,8 @@ Result<MapShape> read_map_shape(const ShapeChoice& choice, client::Client& clien
 Status lay_out(MapShape& shape);
 
 // Makes `frames` points of the skeleton: a step that goes over one of them is divided in proportion to the frames
-// before and after it. Frames that the skeleton does not go over are left out.
+// before and after it. Frames that the skeleton does not go over are left out. The time of a new point is not known (0)
+// if that of a neighbour is not.
 void add_points(client::Skeleton& skeleton, std::vector<FrameId> frames);
 
 // "72,250 points stand for 1,000,000 keyframes"; empty if every keyframe is a point.
@@ -62,7 +64,12 @@ std::vector<Tear> strained_of(const MapShape& shape);
 // infinite where steps that nothing measured lie between.
 std::vector<std::vector<double>> uncertainty_of(const MapShape& shape);
 
-// The keyframes of each day (UTC, "2026-11-30"). Those between two points are taken for evenly spaced in time.
+// Those of the largest part, ascending, each with the number of keyframes that its point stands for; without infinite
+// ones.
+std::vector<Weighted> keyframe_sigmas(const MapShape& shape);
+
+// The keyframes of each day (UTC, "2026-11-30"). Those between two points are taken for evenly spaced in time. A point
+// whose time is not known has no day, nor have the keyframes between it and its neighbours.
 std::map<std::string, std::uint64_t> keyframes_by_day(const client::Skeleton& skeleton);
 
 }  // namespace relmap::cli

@@ -115,6 +115,22 @@ TEST(MapShape, TheUncertaintyGrowsWithTheWayFromTheRoot) {
   for (std::size_t i = 1; i < sigmas.size(); ++i) EXPECT_GT(sigmas[i], sigmas[i - 1]);
 }
 
+// A point in a straight stretch stands for many keyframes, one beside a junction for one.
+TEST(MapShape, TheUncertaintyOfKeyframesCountsWhatPointsStandFor) {
+  Skeleton skeleton = drive();
+  skeleton.chains[0].points[10].frames = 1000;
+  const MapShape shape = shape_of(skeleton);
+  const std::vector<double> of_points = uncertainty_of(shape)[0];
+  const std::vector<Weighted> sigmas = keyframe_sigmas(shape);
+  ASSERT_EQ(sigmas.size(), 11u);
+  EXPECT_EQ(sigmas[0].value, 0);
+  std::uint64_t keyframes = 0;
+  for (const Weighted& sigma : sigmas) keyframes += sigma.weight;
+  EXPECT_EQ(keyframes, 1u + 9 * 10 + 1000);
+  EXPECT_EQ(weighted_quantile(sigmas, 0.5), of_points[shape.at.at(point_at(100)).place]);
+  EXPECT_GT(weighted_quantile(sigmas, 0.5), quantile(of_points, 0.5));
+}
+
 TEST(MapShape, CountsKeyframesByDayAcrossMidnight) {
   Skeleton skeleton = drive();
   constexpr std::int64_t kDay = 86'400'000'000;
@@ -124,6 +140,31 @@ TEST(MapShape, CountsKeyframesByDayAcrossMidnight) {
     time += 10'000'000;
   }
   EXPECT_THAT(keyframes_by_day(skeleton), ElementsAre(Pair("2024-10-03", 45), Pair("2024-10-04", 56)));
+}
+
+TEST(MapShape, AFrameWhoseTimeIsNotKnownHasNoDay) {
+  constexpr std::int64_t kDay = 86'400'000'000;
+  Skeleton skeleton = drive();
+  for (Skeleton::Point& point : skeleton.chains[0].points) point.time_us += 20'000 * kDay;
+  skeleton.chains[0].points[3].time_us = 0;
+  // 101 keyframes without the point itself, and those between it and its neighbours.
+  EXPECT_THAT(keyframes_by_day(skeleton), ElementsAre(Pair("2024-10-04", 101 - 10 - 9)));
+  for (Skeleton::Point& point : skeleton.chains[0].points) point.time_us = 0;
+  EXPECT_THAT(keyframes_by_day(skeleton), IsEmpty());
+}
+
+TEST(MapShape, AFrameBesideAPointWhoseTimeIsNotKnownHasNone) {
+  Skeleton skeleton = drive();
+  skeleton.chains[0].points[3].time_us = 0;  // of frame 30
+  add_points(skeleton, {point_at(15), point_at(25), point_at(35)});
+  const std::vector<Skeleton::Point>& points = skeleton.chains[0].points;
+  ASSERT_EQ(points.size(), 14u);
+  EXPECT_EQ(points[2].frame, point_at(15));
+  EXPECT_EQ(points[2].time_us, 16'000'000);
+  EXPECT_EQ(points[4].frame, point_at(25));
+  EXPECT_EQ(points[4].time_us, 0);
+  EXPECT_EQ(points[6].frame, point_at(35));
+  EXPECT_EQ(points[6].time_us, 0);
 }
 
 TEST(MapShape, ThePictureCountsWhatItsPointsStandFor) {

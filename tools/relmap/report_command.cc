@@ -21,16 +21,12 @@ Status write_report(const ReportOptions& options, client::Client& client, termin
   const std::vector<std::string> findings = findings_of(*report);
   if (options.out == "-") return {};
   if (console.json) {
-    console.reply(Json()
-                      .add("out", options.out)
-                      .add("bytes", page.size())
-                      .add("findings", findings)
-                      .add("tears", report->tears.size())
-                      .add("suspicious", report->suspicious_count())
-                      .add("shown", report->shown())
-                      .add("parts", report->parts)
-                      .add("monoSessions", report->mono_sessions)
-                      .text());
+    Json json;
+    json.add("out", options.out).add("bytes", page.size()).add("findings", findings);
+    json.add("suspicious", report->suspicious_count()).add("shown", report->shown());
+    if (report->laid_out) json.add("tears", report->tears.size()).add("parts", report->parts);
+    json.add("monoSessions", report->mono_sessions);
+    console.reply(json.text());
     return {};
   }
   for (const std::string& finding : findings) console.out() << finding << '\n';

@@ -1,11 +1,11 @@
 #include "tools/relmap/report_data.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "client/pair_picture.h"
 #include "proto/base/clock.h"
 #include "proto/base/suspicion.h"
+#include "tools/relmap/frame_sample.h"
 #include "tools/relmap/map_drawing.h"
 #include "tools/relmap/pairs.h"
 
@@ -26,16 +26,14 @@ Status draw_map(bool drawn, MapReport& report, client::Client& client, terminal:
   if (!shape.ok()) return shape.status();
   report.keyframes_by_day = keyframes_by_day(shape->skeleton);
   report.mono_sessions = shape->chosen.mono_sessions;
-  if (!drawn) return {Reason::OUT_OF_REACH, "--no-map was given"};
+  if (!drawn) return {};
   if (Status laid_out = lay_out(*shape); !laid_out.ok()) return laid_out;
+  report.laid_out = true;
   report.parts = shape->layout.parts.size();
   report.map_text = shape_text(*shape);
   report.tears = tears_of(*shape);
   report.sigmas_root = shape->layout.parts[0].root;
-  const std::vector<std::vector<double>> sigmas = uncertainty_of(*shape);
-  for (const double sigma : sigmas[0])
-    if (std::isfinite(sigma)) report.sigmas_m.push_back(sigma);
-  std::sort(report.sigmas_m.begin(), report.sigmas_m.end());
+  report.sigmas = keyframe_sigmas(*shape);
   client::MapPicture picture = picture_of(*shape, *labels);
   mark_tears(report.tears, strained_of(*shape), picture);
   auto svg = client::draw_map_picture(picture, client::PictureFormat::kSvg);
@@ -82,23 +80,15 @@ Status find_suspicious(std::size_t shown, MapReport& report, client::Client& cli
 }
 
 void sample_errors(MapReport& report, client::Client& client) {
-  std::uint64_t frames = 0;
-  for (const client::Session& session : report.sessions) frames += session.frames;
-  for (const client::Session& session : report.sessions) {
-    if (session.frames == 0) continue;
-    // At least three of each session, so that a small one is not passed over.
-    const auto wanted = std::max<std::uint64_t>(3, kSampledFrames * session.frames / frames);
-    const std::uint32_t span = session.last - session.first;
-    MapReport::SessionErrors errors{session.number, {}};
-    for (std::uint64_t i = 0; i < wanted; ++i) {
-      const auto index = session.first + static_cast<std::uint32_t>(span * i / std::max<std::uint64_t>(1, wanted - 1));
-      const auto frame = client.frame({session.number, index});
+  for (const SampledSession& sampled : sample_frames(report.sessions, kSampledFrames)) {
+    MapReport::SessionErrors errors{sampled.session, {}};
+    for (const std::uint32_t index : sampled.indices) {
+      const auto frame = client.frame({sampled.session, index});
       if (frame.ok() && frame->mean_error) errors.pixels.push_back(*frame->mean_error);
     }
     if (errors.pixels.empty()) continue;
     std::sort(errors.pixels.begin(), errors.pixels.end());
     report.errors.push_back(std::move(errors));
-    if (report.errors.size() >= kSampledFrames) break;
   }
 }
 
@@ -135,6 +125,7 @@ Result<MapReport> gather_report(const ReportOptions& options, client::Client& cl
   auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   report.sessions = std::move(sessions).value();
+  report.map_asked = options.map;
   report.map_missing = draw_map(options.map, report, client, console);
   take(client.closure_matrix(), report.matrix, report.matrix_missing);
   report.suspicious_missing = find_suspicious(options.suspicious, report, client, console);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/relmap_client.h"
+#include "proto/base/quantile.h"
 #include "tools/relmap/tear.h"
 #include "tools/terminal/console.h"
 
@@ -19,9 +20,11 @@ struct MapReport {
   std::vector<client::Session> sessions;
   std::map<std::string, std::uint64_t> keyframes_by_day;  // "2026-11-30", UTC; of sessions that are drawn
 
-  // The map, drawn. Not ok: why it is not.
+  // The map, drawn, if that was asked for. Not ok: why it is not.
+  bool map_asked = true;
   std::string map_svg;
   Status map_missing;
+  bool laid_out = false;  // parts, tears and sigmas are known
   std::size_t parts = 0;
   std::vector<Tear> tears;        // the worst first
   std::string map_text;           // how much of the map the picture shows; empty: every keyframe
@@ -43,14 +46,14 @@ struct MapReport {
   std::size_t suspicious_count() const;
   std::size_t shown() const;  // with pictures
 
-  // Mean reprojection errors of some frames, chosen evenly, pixels, ascending.
+  // Mean reprojection errors of some frames (sample_frames()), pixels, ascending.
   struct SessionErrors {
     SessionNumber session = 0;
     std::vector<double> pixels;
   };
   std::vector<SessionErrors> errors;
-  // Standard deviations of positions relative to the root of the largest part, metres, ascending.
-  std::vector<double> sigmas_m;
+  // Standard deviations of positions relative to the root of the largest part, and for how many keyframes each is.
+  std::vector<Weighted> sigmas;  // metres, ascending
   FrameId sigmas_root;
 
   std::vector<client::RobotStatus> robots;

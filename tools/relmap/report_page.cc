@@ -142,6 +142,7 @@ std::string coverage(const MapReport& report) {
 }
 
 std::string map_part(const MapReport& report) {
+  if (!report.map_asked) return {};
   std::string html = heading_html("The map");
   if (!report.map_missing.ok()) return html + left_out(report.map_missing);
   if (report.parts > 1)
@@ -265,7 +266,7 @@ std::string loops(const MapReport& report) {
 }
 
 std::string errors(const MapReport& report) {
-  if (report.errors.empty() && report.sigmas_m.empty()) return {};
+  if (report.errors.empty() && report.sigmas.empty()) return {};
   std::string html = heading_html("Error");
   if (!report.errors.empty()) {
     std::size_t sampled = 0;
@@ -277,11 +278,11 @@ std::string errors(const MapReport& report) {
                  fixed(quantile(session.pixels, 0.5), 2), fixed(session.pixels.back(), 2)});
     html += table.html();
   }
-  if (!report.sigmas_m.empty())
-    html +=
-        paragraph_html("Position relative to " + report.sigmas_root.to_string() +
-                       ", along the most certain path: one sigma is at most " + number_text(report.sigmas_m.back()) +
-                       " m, of half of the keyframes at most " + number_text(quantile(report.sigmas_m, 0.5)) + " m.");
+  if (!report.sigmas.empty())
+    html += paragraph_html("Position relative to " + report.sigmas_root.to_string() +
+                           ", along the most certain path: one sigma is at most " +
+                           number_text(report.sigmas.back().value) + " m, of half of the keyframes at most " +
+                           number_text(weighted_quantile(report.sigmas, 0.5)) + " m.");
   return html;
 }
 

@@ -41,7 +41,7 @@ MapReport report_of(const std::string& name) {
   edge.suspicion = client::Suspicion{0.75, {{client::DoubtKind::kContradiction, 0.5, name}}, name};
   report.suspicious = {{edge, "<svg id=\"the-pair\"></svg>"}};
   report.errors = {{1, {0.1, 0.2, 0.9}}};
-  report.sigmas_m = {0, 0.25, 0.5};
+  report.sigmas = {{0, 1}, {0.125, 1}, {0.25, 64}, {0.5, 3}};
   report.sigmas_root = {1, 0};
   client::RobotStatus robot;
   robot.robot = robot.name = robot.uuid = name;
@@ -75,7 +75,8 @@ TEST(ReportPage, TellsWhatTheMapHoldsAndWhatToLookAt) {
   for (const char* text :
        {"1,234", "the-map", "the-pair", "2026-11-29", "TIME_BACKWARDS", "relmap-admin explain TIME_BACKWARDS",
         "40 in force, 3 candidates, 1 quarantined, 2 removed; largest suspicion 0.75", "class=\"sus\"", "17.2",
-        "0.20</td>", "0.25 m", "prefers-color-scheme:dark", "@media print"})
+        "0.20</td>", "at most 0.5 m", "of half of the keyframes at most 0.25 m", "prefers-color-scheme:dark",
+        "@media print"})
     EXPECT_THAT(page, HasSubstr(text));
   const auto findings = findings_of(report);
   EXPECT_THAT(findings, ::testing::Contains(HasSubstr("DISK_FULL")));
@@ -96,6 +97,13 @@ TEST(ReportPage, SaysWhyAPartIsMissing) {
   for (const char* why : {"EMPTY_MAP: there is nothing to draw", "NOT_ALLOWED: operators only",
                           "UNIMPLEMENTED: an older daemon", "DEADLINE: too slow", "NOT_ALLOWED: not for readers"})
     EXPECT_THAT(page, HasSubstr(why));
+}
+
+TEST(ReportPage, AMapThatIsNotAskedForIsLeftOut) {
+  MapReport report = report_of("cart");
+  EXPECT_THAT(report_page(report), HasSubstr("<h2>The map</h2>"));
+  report.map_asked = false;
+  EXPECT_THAT(report_page(report), Not(HasSubstr("<h2>The map</h2>")));
 }
 
 TEST(ReportPage, PicturesThatCannotBeShownHideNoOthers) {
