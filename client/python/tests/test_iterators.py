@@ -162,7 +162,10 @@ def test_what_is_given_out_at_its_end_begins_again() -> None:
             "FindRoute": 3, "GetSkeleton": 4, "Export": 2, "ListSessions": 1, "FindLabels": 1
         }  # fmt: skip
     always = range(1000)
-    methods = dict(FindRoute=_expiring(_steps(), *always), GetSkeleton=_expiring(_chains(), *always))
+    methods = dict(
+        FindRoute=_expiring(_steps(), *always), GetSkeleton=_expiring(_chains(), *always),
+        ListSessions=lambda r, c: map_pb2.ListSessionsReply(),
+    )  # fmt: skip
     with FakeDaemon(**methods) as daemon, relmap.connect(daemon.address) as client:
         for call in (lambda: client.find_route("1:0", "1:2"), client.skeleton, client.draw_map):
             with pytest.raises(relmap.ViewExpired):
