@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "client/springs.h"
-
 namespace relmap::client {
 namespace {
 
@@ -29,12 +27,13 @@ Result<RelaxedSkeleton> relax_skeleton(const Skeleton& skeleton, const SkeletonL
   if (points.empty()) return {Reason::EMPTY_MAP, "the skeleton has no points"};
   if (layout.root && !std::binary_search(points.begin(), points.end(), *layout.root))
     return {Reason::NO_SUCH_FRAME, "frame " + layout.root->to_string() + " is no point of the skeleton"};
+  RelaxedSkeleton out;
+  out.springs = springs_of(skeleton);
   std::vector<RelaxationEdge> edges;
-  for (const Spring& spring : springs_of(skeleton))
+  for (const Spring& spring : out.springs)
     if (spring.pulls) edges.push_back(spring.relaxed);
   const auto relaxed = relax(points, edges, layout.relaxation);
   if (!relaxed.ok()) return relaxed.status();
-  RelaxedSkeleton out;
   out.converged = relaxed->converged;
   out.parts.resize(static_cast<std::size_t>(relaxed->components));
   for (const RelaxedPose& pose : relaxed->poses) {

@@ -8,6 +8,7 @@
 
 #include "client/relaxation.h"
 #include "client/skeleton.h"
+#include "client/springs.h"
 
 namespace relmap::client {
 
@@ -24,7 +25,8 @@ struct RelaxedSkeleton {
     const SE3* find(FrameId frame) const;  // null: it is not in this part
   };
 
-  std::vector<Part> parts;  // the one with the chosen root first, then the largest first
+  std::vector<Part> parts;      // the one with the chosen root first, then the largest first
+  std::vector<Spring> springs;  // the edges that may have counted
   bool converged = true;
 };
 

@@ -41,7 +41,7 @@ Skeleton::Point divide(const Skeleton::Point& before, Skeleton::Point& point, st
 std::vector<Tear> strains_of(const MapShape& shape,
                              const std::function<bool(const client::Spring&, const Tear&)>& wanted) {
   std::vector<Tear> strains;
-  for (const client::Spring& spring : shape.springs) {
+  for (const client::Spring& spring : shape.layout.springs) {
     const SE3* const a = shape.find(spring.relaxed.a);
     const SE3* const b = shape.find(spring.relaxed.b);
     if (spring.doubtful || !a || !b) continue;
@@ -108,7 +108,6 @@ Status lay_out(MapShape& shape) {
   for (std::size_t part = 0; part < shape.layout.parts.size(); ++part)
     for (std::size_t place = 0; place < shape.layout.parts[part].places.size(); ++place)
       shape.at[shape.layout.parts[part].places[place].frame] = {part, place};
-  shape.springs = client::springs_of(shape.skeleton);
   return {};
 }
 
@@ -151,7 +150,7 @@ std::vector<Tear> strained_of(const MapShape& shape) {
 
 std::vector<std::vector<double>> uncertainty_of(const MapShape& shape) {
   std::vector<std::vector<client::RelaxationEdge>> edges(shape.layout.parts.size());
-  for (const client::Spring& spring : shape.springs)
+  for (const client::Spring& spring : shape.layout.springs)
     if (const auto at = shape.at.find(spring.relaxed.a); spring.pulls && at != shape.at.end())
       edges[at->second.part].push_back(spring.relaxed);
   std::vector<std::vector<double>> sigmas;

@@ -25,7 +25,6 @@ struct MapShape {
   ChosenSessions chosen;
   client::Skeleton skeleton;  // with closures that are not in force
   client::RelaxedSkeleton layout;
-  std::vector<client::Spring> springs;  // the edges that may count in the layout
 
   std::uint64_t closures_in_force() const;  // with those that are not told, but stand behind one that is
   std::uint64_t keyframes() const { return skeleton.frames; }
