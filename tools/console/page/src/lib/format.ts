@@ -1,0 +1,60 @@
+// Numbers, times and names as people read them.
+
+const counts = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
+
+export function count(value: number | bigint): string {
+  return counts.format(value);
+}
+
+// "3 closures", "1 closure"
+export function counted(value: number | bigint, one: string, many = one + 's'): string {
+  return `${count(value)} ${Number(value) === 1 ? one : many}`;
+}
+
+export function bytes(value: number | bigint): string {
+  let size = Number(value);
+  for (const unit of ['B', 'kB', 'MB', 'GB']) {
+    if (size < 1000) return `${size < 10 && unit !== 'B' ? size.toFixed(1) : size.toFixed(0)} ${unit}`;
+    size /= 1000;
+  }
+  return `${size.toFixed(1)} TB`;
+}
+
+export function metres(value: number): string {
+  if (!Number.isFinite(value)) return 'unknown';
+  if (Math.abs(value) < 0.995) return `${(value * 100).toFixed(value < 0.0995 ? 1 : 0)} cm`;
+  if (Math.abs(value) < 9950) return `${value.toFixed(Math.abs(value) < 9.95 ? 1 : 0)} m`;
+  return `${(value / 1000).toFixed(1)} km`;
+}
+
+export function seconds(value: number): string {
+  if (value < 0.0995) return `${(value * 1000).toFixed(value < 0.00995 ? 1 : 0)} ms`;
+  if (value < 9.95) return `${value.toFixed(1)} s`;
+  if (value < 99.5) return `${value.toFixed(0)} s`;
+  if (value < 5970) return `${(value / 60).toFixed(0)} min`;
+  if (value < 171_000) return `${(value / 3600).toFixed(1)} h`;
+  return `${(value / 86_400).toFixed(0)} days`;
+}
+
+// Of microseconds since 1970, UTC: "2026-11-30 21:04:05". Empty: not known.
+export function time(us: bigint | number): string {
+  if (!us) return '';
+  return new Date(Number(us) / 1000).toISOString().replace('T', ' ').slice(0, 19);
+}
+
+// How long ago: "3 min ago".
+export function ago(us: bigint | number, now = Date.now()): string {
+  if (!us) return '';
+  const passed = now / 1000 - Number(us) / 1e6;
+  return passed < 1 ? 'just now' : `${seconds(passed)} ago`;
+}
+
+// A text that somebody else chose, harmless: control characters and those that change the direction of writing are
+// shown as their codes, and a long text is cut.
+export function plain(text: string, most = 200): string {
+  const shown = text.slice(0, most).replace(
+    /[\u0000-\u001f\u007f-\u009f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]/g,
+    (letter) => `\\u${letter.codePointAt(0)!.toString(16).padStart(4, '0')}`,
+  );
+  return text.length > most ? shown + '…' : shown;
+}
