@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 #include <optional>
 #include <random>
 #include <unordered_map>
 
-#include "tests/support/running_daemon.h"
 #include "tests/support/stored_map.h"
 
 namespace relmap::testing {
@@ -229,9 +227,7 @@ void build_city(const SkeletonCity& city, storage::Map& map) {
 }
 
 void build_city_folder(const SkeletonCity& city, const std::string& folder) {
-  // The daemon makes the folder, and says of which vocabulary the map's words are.
-  if (!std::filesystem::exists(folder + "/FORMAT")) RunningDaemon({.data = folder, .lcm = "", .more = {}}).stop();
-  const auto map = open_stored_map(folder);
+  const auto map = make_stored_map(folder);
   build_city(city, *map);
 }
 

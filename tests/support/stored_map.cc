@@ -1,10 +1,12 @@
 #include "tests/support/stored_map.h"
 
+#include <filesystem>
 #include <set>
 
 #include "frontend/capture/keyframe_file.h"
 #include "proto/base/crc32c.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "tests/support/running_daemon.h"
 
 namespace relmap::testing {
 
@@ -13,6 +15,11 @@ std::unique_ptr<storage::Map> open_stored_map(const std::string& folder) {
   const std::uint64_t epoch = engine->acquire().or_throw();
   return storage::Map::open(std::move(engine), epoch, std::make_shared<storage::Budget>(std::size_t{1} << 30))
       .or_throw();
+}
+
+std::unique_ptr<storage::Map> make_stored_map(const std::string& folder) {
+  if (!std::filesystem::exists(folder + "/FORMAT")) RunningDaemon({.data = folder, .lcm = "", .more = {}}).stop();
+  return open_stored_map(folder);
 }
 
 std::vector<Keyframe> read_keyframes(const std::string& file) {

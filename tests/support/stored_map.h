@@ -12,6 +12,8 @@ namespace relmap::testing {
 
 // Throws StatusError.
 std::unique_ptr<storage::Map> open_stored_map(const std::string& folder);
+// The same; a daemon makes the folder if it is none, and says of which vocabulary the map's words are.
+std::unique_ptr<storage::Map> make_stored_map(const std::string& folder);
 
 // The keyframes of a file that relmap-sim or relmap-frontend wrote. Throws StatusError.
 std::vector<Keyframe> read_keyframes(const std::string& file);

@@ -15,6 +15,7 @@
 #include "server/map/suspicion.h"
 #include "storage/engine/memory_engine.h"
 #include "tests/support/simulated_drive.h"
+#include "tests/support/stored_map.h"
 #include "tools/bench/planted_closures.h"
 #include "tools/bench/ride_drive.h"
 #include "tools/bench/subcommand.h"
@@ -27,7 +28,7 @@ namespace {
 constexpr SessionNumber kSuspectSession = 1;
 
 struct SuspicionOptions {
-  std::string world = "points", graph;
+  std::string world = "points", graph, folder;
   std::uint64_t first_seed = 1;
   int seeds = 1;
   bool list = false;
@@ -43,20 +44,29 @@ class TrueDrive {
   virtual std::shared_ptr<const storage::Graph> graph() const = 0;
   virtual std::optional<SE3> truth(FrameId frame) const = 0;
   virtual double apart() const = 0;  // metres from which two places cannot be confused by drift
+  virtual void commit() = 0;         // makes what it is now durable, if it is kept in a folder
 };
 
 // A map that a builder makes.
 class BuiltDrive : public TrueDrive {
  public:
-  BuiltDrive() {
-    auto engine = std::shared_ptr<storage::Engine>(storage::make_memory_engine());
-    map_ = storage::Map::open(engine, engine->acquire().or_throw(),
-                              std::make_shared<storage::Budget>(std::size_t{2} << 30))
-               .or_throw();
+  // `folder`: the data folder of a daemon that is made of it; empty: it is in memory.
+  explicit BuiltDrive(const std::string& folder = "") {
+    if (folder.empty()) {
+      auto engine = std::shared_ptr<storage::Engine>(storage::make_memory_engine());
+      map_ = storage::Map::open(engine, engine->acquire().or_throw(),
+                                std::make_shared<storage::Budget>(std::size_t{2} << 30))
+                 .or_throw();
+    } else {
+      map_ = testing::make_stored_map(folder);
+    }
     builder_ = std::make_unique<map::MapBuilder>(*map_, storage::WordFunction{}, rba::RbaOptions{});
   }
   [[gnu::noinline]] void apply(const storage::JournalRecord& record) override { builder_->apply(++sequence_, record); }
   std::shared_ptr<const storage::Graph> graph() const override { return map_; }
+  void commit() override {
+    if (const Status status = map_->commit(); !status.ok()) throw StatusError(status);
+  }
 
  protected:
   void take_in(const Keyframe& keyframe, SessionNumber session = kSuspectSession) {
@@ -106,7 +116,8 @@ sim::PointsWorldOptions points_options(std::uint64_t seed) {
 // Three laps of simulated points by one robot.
 class PointsLaps final : public BuiltDrive {
  public:
-  explicit PointsLaps(std::uint64_t seed) : world_(points_options(seed)), random_(seed, 78, 0) {
+  PointsLaps(std::uint64_t seed, const std::string& folder)
+      : BuiltDrive(folder), world_(points_options(seed)), random_(seed, 78, 0) {
     const Keyframe first = world_.keyframe(0);
     apply(storage::SessionRecord{kSuspectSession, first.session.name, first.session});
   }
@@ -132,7 +143,7 @@ class PointsLaps final : public BuiltDrive {
 // Three robots that drive the same lap one after the other. Their own motion says nothing of closures between them.
 class PointsFleet final : public BuiltDrive {
  public:
-  explicit PointsFleet(std::uint64_t seed) : random_(seed, 79, 0) {
+  PointsFleet(std::uint64_t seed, const std::string& folder) : BuiltDrive(folder), random_(seed, 79, 0) {
     for (std::uint32_t robot = 0; robot < kRobots; ++robot) {
       sim::PointsWorldOptions options = points_options(seed);
       options.frames = options.frames_per_lap;
@@ -232,6 +243,7 @@ class PicturesDrive final : public TrueDrive {
     if (!done.ok()) throw StatusError(done);
   }
   void step(std::uint32_t i) override { take_in(drive_, i, *mapper_); }
+  void commit() override {}
 
  private:
   const RideDrive drive_;
@@ -239,8 +251,8 @@ class PicturesDrive final : public TrueDrive {
 };
 
 std::unique_ptr<TrueDrive> open_drive(const SuspicionOptions& options, std::uint64_t seed) {
-  if (options.world == "points") return std::make_unique<PointsLaps>(seed);
-  if (options.world == "fleet") return std::make_unique<PointsFleet>(seed);
+  if (options.world == "points") return std::make_unique<PointsLaps>(seed, options.folder);
+  if (options.world == "fleet") return std::make_unique<PointsFleet>(seed, options.folder);
   if (options.world == "graph") return std::make_unique<GraphDrive>(options.graph);
   sim::PictureWorldOptions world;
   if (options.world == "street") {
@@ -318,6 +330,8 @@ void plant_half(Planter& planter) {
 }
 
 void run(const SuspicionOptions& options, Report& report) {
+  if (!options.folder.empty() && (options.seeds != 1 || (options.world != "points" && options.world != "fleet")))
+    throw std::runtime_error("--folder keeps one drive, of --world points or fleet");
   std::vector<double> planted, true_ones, in_force, first_15, first_15_of_all, last_rank, wrong_too;
   for (int k = 0; k < options.seeds; ++k) {
     const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(k);
@@ -334,6 +348,9 @@ void run(const SuspicionOptions& options, Report& report) {
       if (i == drive->steps() * 2 / 3) plant_half(planter);
     }
     plant_half(planter);
+    drive->commit();
+    if (!options.folder.empty())
+      for (const EdgeId& edge : planter.planted()) std::fprintf(stderr, "planted %s\n", edge.to_string().c_str());
 
     const std::vector<Suspect> ranked = suspects(*drive, planter);
     if (options.list) list(ranked, seed);
@@ -393,6 +410,10 @@ Run declare_suspicion(CLI::App& app) {
   app.add_option("--graph", options->graph, "the g2o file of --world graph");
   app.add_option("--seeds", options->seeds, "number of drives")->check(CLI::Range(1, 1000))->capture_default_str();
   app.add_option("--first-seed", options->first_seed, "seed of the first drive")->capture_default_str();
+  app.add_option("--folder", options->folder,
+                 "with points and fleet: keep the map of the one drive in this new data folder, and print on standard "
+                 "error which closures were planted")
+      ->check(CLI::NonexistentPath);
   app.add_flag("--list", options->list, "list every closure with its facts and doubts on standard error");
   return [options](Report& report) { run(*options, report); };
 }
