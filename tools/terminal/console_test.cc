@@ -51,7 +51,7 @@ TEST(ProgressBar, PrintsALineForEachStepWithoutATerminal) {
   bar.show("", 0, 0, "");  // nothing is said of no step
   bar.end();
   const std::string text = err.str();
-  EXPECT_EQ(text, "copying: 0 of 200 frames\nchecking\n");
+  EXPECT_EQ(text, "copying: 0 of 200 frames\ncopying: 200 of 200 frames\nchecking\n");
 }
 
 TEST(ProgressBar, RedrawsItselfOnATerminalAndLeavesNothingBehind) {
@@ -59,6 +59,8 @@ TEST(ProgressBar, RedrawsItselfOnATerminalAndLeavesNothingBehind) {
   ProgressBar bar(err, true);
   bar.show("copying", 1000000, 4000000, "bytes");
   EXPECT_NE(err.str().find("1.0 MB of 4.0 MB"), std::string::npos) << err.str();
+  bar.show("copying", 4000000, 4000000, "bytes");
+  EXPECT_NE(err.str().find("4.0 MB of 4.0 MB"), std::string::npos) << "its end is shown, however soon it follows";
   bar.end();
   EXPECT_TRUE(err.str().ends_with("\r\x1b[K")) << err.str();
   EXPECT_EQ(err.str().find('\n'), std::string::npos);
