@@ -42,8 +42,10 @@ void print(const std::vector<client::Edge>& edges, terminal::Console& console) {
     rows.push_back({e.id.to_string(), e.a.to_string(), e.b.to_string(), name_of(e.kind), name_of(e.state),
                     std::string(reason_name(e.reason)), e.carries ? "edge" : "binds", fixed(e.T_ab.t.norm(), 2),
                     std::to_string(e.support) + (e.prior_active ? " +prior" : ""),
-                    loop ? std::to_string(e.inliers) : "", loop ? std::to_string(e.bound) : "",
-                    loop ? fixed(e.probability, 3) : ""});
+                    was_verified(e) ? std::to_string(e.inliers)
+                    : loop          ? name_of(e.verification)
+                                    : "",
+                    loop ? std::to_string(e.bound) : "", was_verified(e) ? fixed(e.probability, 3) : ""});
     if (!judged) continue;
     rows.back().push_back(e.suspicion ? fixed(e.suspicion->value, 2) : "");
     const auto doubts = e.suspicion ? doubts_of(*e.suspicion) : std::vector<client::Doubt>();

@@ -55,10 +55,10 @@ void print_edge(const client::Edge& edge, std::ostream& out) {
     out << "  carried   the robot was carried along it, according to" << ids_text(edge.carried_by, kMaxListed) << '\n';
 }
 
-void print_evidence(const client::Edge& edge, std::ostream& out) {
-  out << "  evidence  verified by " << name_of(edge.verification) << ": " << edge.inliers << " inliers over "
-      << fixed(100 * edge.spread, 0) << " % of the picture; place with probability " << fixed(edge.probability, 3)
-      << "; binds " << edge.bound << '\n';
+void print_evidence(const client::Edge& edge, const SessionsByNumber& sessions, std::ostream& out) {
+  out << "  evidence  " << verification_text(edge, session_words(sessions, edge.id.frame.session));
+  if (was_verified(edge)) out << "; place with probability " << fixed(edge.probability, 3);
+  out << "; binds " << edge.bound << '\n';
   if (edge.uniqueness) out << "  unique    " << uniqueness_text(*edge.uniqueness) << '\n';
 }
 
@@ -106,9 +106,9 @@ void print_history(const client::Edge& edge, std::ostream& out) {
   }
 }
 
-void print(const client::EdgeExplanation& explained, std::ostream& out) {
+void print(const client::EdgeExplanation& explained, const SessionsByNumber& sessions, std::ostream& out) {
   print_edge(explained.edge, out);
-  print_evidence(explained.edge, out);
+  print_evidence(explained.edge, sessions, out);
   print_suspicion(explained.edge, out);
   print_points(explained, out);
   out << "  motion    " << verdict_text(explained.motion) << '\n';
@@ -117,10 +117,11 @@ void print(const client::EdgeExplanation& explained, std::ostream& out) {
 }
 
 // Of a daemon that does not explain closures: what the list of edges says.
-void print_listed(const client::Edge& edge, client::Client& client, std::ostream& out) {
+void print_listed(const client::Edge& edge, const SessionsByNumber& sessions, client::Client& client,
+                  std::ostream& out) {
   print_edge(edge, out);
   if (edge.kind != client::EdgeKind::kLoop) return;
-  print_evidence(edge, out);
+  print_evidence(edge, sessions, out);
   std::map<std::string, std::vector<EdgeId>> agreeing;  // by state
   for (const EdgeId other : edge.consistent_with) {
     const auto found = find_edge(client, other);
@@ -151,16 +152,18 @@ Status explain_edge(const std::string& text, const std::string& out, client::Cli
   if (!out.empty())
     if (Status status = write_pair(*id, out, client, console); !status.ok()) return status;
   const auto explained = client.explain_edge(*id);
-  if (explained.ok()) {
-    if (!console.json) print(*explained, console.out());
-    return {};
-  }
   // Of the robot's own motion there is less to tell, and of closures if the daemon is an older one.
-  if (explained.reason() != Reason::ODOMETRY_EDGE && explained.reason() != Reason::UNIMPLEMENTED)
+  if (!explained.ok() && explained.reason() != Reason::ODOMETRY_EDGE && explained.reason() != Reason::UNIMPLEMENTED)
     return explained.status();
-  const auto edge = find_edge(client, *id);
+  const auto edge = explained.ok() ? Result<client::Edge>(explained->edge) : find_edge(client, *id);
   if (!edge.ok()) return edge.status();
-  if (!console.json) print_listed(*edge, client, console.out());
+  if (console.json) return {};
+  const auto sessions = read_sessions(client, console);
+  if (!sessions.ok()) return sessions.status();
+  if (explained.ok())
+    print(*explained, *sessions, console.out());
+  else
+    print_listed(*edge, *sessions, client, console.out());
   return {};
 }
 
