@@ -112,7 +112,15 @@ TEST(Cli, AWordInPlaceOfANumberIsReported) {
   EXPECT_EQ(word.code, kUsage);
   EXPECT_TRUE(word.err.starts_with("--shown: 'x' is not a number\n")) << word.err;
   const Ran outside = run_with({"--server", "/tmp", "ingest", "drive", "--patience", "-1"});
-  EXPECT_NE(outside.err.find("--patience: Value -1 not in range"), std::string::npos) << outside.err;
+  EXPECT_TRUE(outside.err.starts_with("--patience: Value -1 not in range 0 to 86400\n")) << outside.err;
+}
+
+TEST(Cli, ANumberWithoutAnUpperBoundIsNotRefusedWithHundredsOfDigits) {
+  const Ran none = run_with({"--server", "/tmp", "edges", "--limit", "0"});
+  EXPECT_EQ(none.code, kUsage);
+  EXPECT_EQ(none.err, "--limit: Value 0 must be greater than 0\nRun relmap edges --help for more information.\n");
+  const Ran negative = run_with({"--server", "/tmp", "route", "--from", "1:0", "--to", "dock", "--max-cost", "-0.5"});
+  EXPECT_TRUE(negative.err.starts_with("--max-cost: Value -0.5 must not be negative\n")) << negative.err;
 }
 
 TEST(Cli, SaysThatNoDaemonAnswers) {
@@ -193,6 +201,9 @@ TEST(PictureFile, WhatIsNoPictureIsNamed) {
   EXPECT_EQ(pixel_size(std::string("\xff\xd8\xff\xe0\0\0\0\0\0\0", 10)).reason(), Reason::PICTURE_DAMAGED);
   EXPECT_EQ(pixel_size("\x89PNG\r\n\x1a\n").reason(), Reason::PICTURE_DAMAGED);
   EXPECT_EQ(read_picture_file("/no/such.png").reason(), Reason::NO_SUCH_FILE);
+  const storage::TemporaryFolder folder;
+  EXPECT_EQ(read_picture_file(folder / "").status().to_string(),
+            "NOT_A_PICTURE: " + (folder / "") + " is a folder; give one of the pictures in it, a JPEG or PNG file");
 }
 
 }  // namespace
