@@ -109,11 +109,13 @@ struct Doubt {
 };
 
 // How doubtful a loop closure is, as the daemon judges it. It decides nothing: it orders closures for those who look at
-// them.
+// them. What it says of the robot's motion is as the daemon found it when it judged the closure; Explanation::motion
+// tells what holds now.
 struct Suspicion {
   double value = 0;           // 0: nothing speaks against it; 1: it is wrong as far as the map can tell
   std::vector<Doubt> doubts;  // the heaviest first; without those of kinds that only a newer daemon knows
-  // What else to know, in words: what the map does not know of the closure, or that an operator put it into force.
+  // What else to know, in words: what the map does not know of the closure, or that an operator put it into force
+  // and has neither withdrawn that nor removed it.
   std::string remark = {};
 };
 

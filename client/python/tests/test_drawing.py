@@ -92,15 +92,6 @@ def test_a_true_circle_stays() -> None:
     np.testing.assert_allclose(T, expected, atol=1e-4)
 
 
-def test_chains_without_pins_are_relaxed_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    import relmap.network
-
-    skeleton, _ = _circle(200, 0.01, 4)
-    pinned = np.concatenate(skeleton.relaxed_picture().chains)
-    monkeypatch.setattr(relmap.network, "_MAX_PINNED", 0)
-    np.testing.assert_allclose(np.concatenate(skeleton.relaxed_picture().chains), pinned, atol=2e-3)
-
-
 def _ahead(session: int, metres: list[float], unmeasured: int = -1, carried: int = -1, variance: float = 1e-6) -> SkeletonChain:
     """A drive straight ahead, with a step of so many metres to each point but the first; that with the number `unmeasured` or
     `carried` is doubtful, and has this variance."""
@@ -152,16 +143,16 @@ def test_guesses_beside_which_nothing_was_measured_have_their_own_variances() ->
     np.testing.assert_allclose(_z(ridden, three), [0, 1, 3.5, 4.5], atol=2e-2)
 
 
-@pytest.mark.parametrize("pins, pinned", [(600, 1500), (1, 1500), (1, 5)])
+@pytest.mark.parametrize("dense, exact", [(400, 8), (5, 8), (5, 1)])
 def test_chains_of_many_pieces_are_laid_out_by_what_was_measured(
-    pins: int, pinned: int, monkeypatch: pytest.MonkeyPatch
+    dense: int, exact: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each of two drives round one circle has guesses, metres and radians off, beside which the other measured; a third drive
     elsewhere is a part of its own."""
     import relmap.network
 
-    monkeypatch.setattr(relmap.network, "_MAX_PINS", pins)
-    monkeypatch.setattr(relmap.network, "_MAX_PINNED", pinned)
+    monkeypatch.setattr(relmap.network, "_MAX_DENSE", dense)
+    monkeypatch.setattr(relmap.network, "_MAX_EXACT_DEGREE", exact)
     rng = np.random.default_rng(5)
     skeleton, true = _circle(200, 1e-6)
     drive = skeleton.chains[0]
