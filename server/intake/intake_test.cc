@@ -1218,8 +1218,8 @@ TEST_F(IntakeTest, ARobotOfWhichEverythingIsRefusedIsListedByItsName) {
   other.session.uuid = SessionUuid::random();
   other.session.robot = "cart";
   const Bytes payload = encode_keyframe(other);
-  EXPECT_EQ(intake_->take_payload(other.session.uuid, 0, crc32c(payload), payload, now_, {"anna", false, {}}).reason(),
-            Reason::NOT_ALLOWED);
+  (void)intake_->take_payload(other.session.uuid, 0, crc32c(payload), payload, now_, {"anna"});
+  EXPECT_EQ(listed(other.session.uuid).refused, (std::map<Reason, std::uint64_t>{{Reason::NOT_ALLOWED, 1}}));
   EXPECT_EQ(listed(other.session.uuid).robot, "anna") << "who it has proved to be counts";
 
   Keyframe unnameable = keyframe(0);
