@@ -35,7 +35,7 @@ TEST(Console, ShowsForeignTextsWithoutObeyingThem) {
   console.facts({{"robot \a", "x\ny"}});
   console.report({Reason::BAD_NAME, "of 'a\x1b[1m'\nsecond line"});
   console.report({});
-  EXPECT_EQ(out.str(), "label   n\na\uFFFD[2J  1\nb\uFFFD      2\nrobot \uFFFD  x y\n");
+  EXPECT_EQ(out.str(), "label  n\na\uFFFD[2J  1\nb\uFFFD     2\nrobot \uFFFD  x y\n");
   EXPECT_EQ(err.str(), "BAD_NAME: of 'a\uFFFD[1m'\nsecond line\n");
 }
 
