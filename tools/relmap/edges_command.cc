@@ -14,6 +14,7 @@
 #include "tools/relmap/pairs.h"
 #include "tools/relmap/picture_output.h"
 #include "tools/relmap/time_option.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -173,16 +174,21 @@ void add_edges(CLI::App& app, Action& action) {
   list(command->add_option("--session", options->sessions,
                            "only edges with an end in this session; A,B: only those between these two"))
       ->type_name("SESSION");
-  list(command->add_option("--frame", options->frame, "only edges with this frame as an end"))->type_name("FRAME");
+  list(command->add_option("--frame", options->frame, "only edges with this frame as an end"))
+      ->type_name("FRAME")
+      ->check(parsed_by(parse_frame));
   auto* const near =
       list(command->add_option("--near", options->near, "only edges with an end near this frame: within 30 edges"))
-          ->type_name("FRAME");
+          ->type_name("FRAME")
+          ->check(parsed_by(parse_frame));
   list(command->add_option("--within", options->within, "with --near: within so many metres along edges instead"))
       ->check(CLI::PositiveNumber)
       ->needs(near);
+  const auto is_time = parsed_by([](const std::string& text) { return parse_time(text, now_us()); });
   list(command->add_option("--since", options->since, "only edges whose newer end was taken at this time or later"))
-      ->type_name("TIME");
-  list(command->add_option("--until", options->until, "... and before this time"))->type_name("TIME");
+      ->type_name("TIME")
+      ->check(is_time);
+  list(command->add_option("--until", options->until, "... and before this time"))->type_name("TIME")->check(is_time);
   auto* const suspicion =
       list(command->add_flag("--suspicion", options->suspicion, "loop closures, the most suspicious first"));
   list(
@@ -200,7 +206,8 @@ void add_edges(CLI::App& app, Action& action) {
       command
           ->add_option("--explain", options->explain,
                        "show what speaks for and against one edge (session:index/ordinal), and its history")
-          ->type_name("EDGE");
+          ->type_name("EDGE")
+          ->check(parsed_by(edge_id));
   for (CLI::Option* const option : lists) explain->excludes(option);
   command
       ->add_option(

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/pair_picture.h"
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/degrees.h"
 #include "tools/relmap/edge_words.h"
@@ -29,10 +30,10 @@ Result<client::Edge> find_edge(client::Client& client, EdgeId id) {
 void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::ostream& out) {
   out << "record " << event.journal_sequence;
   if (event.time_us != 0) out << ", " << time_text(event.time_us);
-  if (!event.author.empty()) out << ", by " << event.author;
+  if (!event.author.empty()) out << ", by " << visible_text(event.author);
   out << ": " << name_of(event.state) << ", " << reason_name(event.reason) << " (" << explanation(event.reason) << ')';
   if (event.cause != edge.id) out << ", by " << event.cause.to_string();
-  if (!event.note.empty()) out << ": " << event.note;
+  if (!event.note.empty()) out << ": " << visible_text(event.note);
   out << '\n';
 }
 
@@ -68,7 +69,7 @@ void print_suspicion(const client::Edge& edge, std::ostream& out) {
   out << "  suspicion " << fixed(edge.suspicion->value, 2) << " of 1"
       << (doubts.empty() ? ": nothing speaks against it" : "") << '\n';
   for (const client::Doubt& doubt : doubts) out << "    " << doubt_text(doubt) << '\n';
-  if (!edge.suspicion->remark.empty()) out << "    " << edge.suspicion->remark << '\n';
+  if (!edge.suspicion->remark.empty()) out << "    " << visible_text(edge.suspicion->remark) << '\n';
 }
 
 void print_points(const client::EdgeExplanation& explained, std::ostream& out) {

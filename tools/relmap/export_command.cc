@@ -10,6 +10,7 @@
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
 #include "tools/relmap/output_files.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -352,7 +353,8 @@ void add_export(CLI::App& app, Action& action) {
   auto* root = command
                    ->add_option("--root", options->root,
                                 "a frame, as 3:120: its part comes first, in the coordinates of this frame")
-                   ->type_name("FRAME");
+                   ->type_name("FRAME")
+                   ->check(parsed_by(parse_frame));
   auto* chain =
       command->add_flag("--chain", options->chain,
                         "for tum and kitti: write each session's odometry edges, as the map has refined them, chained "

@@ -28,6 +28,17 @@ TEST(Console, PrintsRepliesOnlyAsJsonAndOnlyThoseThatAreTheAnswer) {
   EXPECT_EQ(out.str(), "{3}\n");
 }
 
+TEST(Console, ShowsForeignTextsWithoutObeyingThem) {
+  std::ostringstream out, err;
+  Console console(out, err);
+  console.table({"label", ">n"}, {{"a\x1b[2J", "1"}, {"b\u202E", "2"}});
+  console.facts({{"robot \a", "x\ny"}});
+  console.report({Reason::BAD_NAME, "of 'a\x1b[1m'\nsecond line"});
+  console.report({});
+  EXPECT_EQ(out.str(), "label  n\na\uFFFD[2J  1\nb\uFFFD     2\nrobot \uFFFD  x y\n");
+  EXPECT_EQ(err.str(), "BAD_NAME: of 'a\uFFFD[1m'\nsecond line\n");
+}
+
 TEST(Units, AreHumanReadable) {
   EXPECT_EQ(bytes_text(1234), "1.2 kB");
   EXPECT_EQ(bytes_text(1500000000), "1.5 GB");

@@ -271,6 +271,37 @@ def test_programs_that_end_early_lose_nothing(own_daemon: Daemon) -> None:
     assert found == {"forgotten": (3, "OPEN"), "interrupted": (3, "OPEN")}
 
 
+LEFT_OPEN = """
+import atexit, sys, threading
+
+def tell():  # registered first, runs last
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and thread.name != "relmap silence":
+            thread.join(20)
+            print(thread.name, "is at work" if thread.is_alive() else "is done", flush=True)
+
+atexit.register(tell)
+import points_world, relmap
+client = relmap.connect(sys.argv[1], timeout=600)
+session = client.session("cart", points_world.CAMERA, name="left open")
+session.open()
+for step in points_world.drive(3):
+    session.add(step.time, step.T_odom_frame, step.step_cov, tracks=step.tracks, features=step.features)
+events = client.watch()
+next(events)
+"""
+
+
+def test_no_call_outlasts_the_program(own_daemon: Daemon) -> None:
+    """While the interpreter ends, nothing could end a call any more, and grpcio would wait for that."""
+    path = os.pathsep.join([str(PYTHON), str(PYTHON / "notebooks")])
+    done = subprocess.run(
+        [sys.executable, "-c", LEFT_OPEN, own_daemon.server],
+        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, timeout=PATIENCE_S,
+    )  # fmt: skip
+    assert done.returncode == 0 and "is at work" not in done.stdout, done.stdout + done.stderr
+
+
 def test_a_program_that_loses_keyframes_says_so(own_daemon: Daemon) -> None:
     """The daemon is gone when the program ends."""
     code = PROGRAM.replace("client = relmap.connect(server, timeout=600)", "client = relmap.connect(server)").replace(
