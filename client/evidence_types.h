@@ -10,7 +10,7 @@
 
 namespace relmap::client {
 
-// What the way between a closure's ends without it says: the odometry and other closures in force.
+// What the way between a closure's ends without it says now: the odometry and other closures in force.
 struct MotionVerdict {
   // OK: it agrees. CONTRADICTS_MOTION: it does not. CARRIED: it does not, since the robot was carried. NOT_CONNECTED:
   // there is no other way. OUT_OF_REACH: the way is too long, or passes motion that nothing measured, to say anything.

@@ -9,6 +9,7 @@
 #include "client/linear_start.h"
 #include "proto/linear/block_cholesky.h"
 #include "proto/linear/block_conjugate_gradient.h"
+#include "proto/linear/huber.h"
 
 namespace relmap::client {
 namespace {
@@ -29,15 +30,6 @@ Eigen::VectorXd solve(const BlockCholesky& system, const Eigen::VectorXd& right_
 }
 Eigen::VectorXd solve(BlockConjugateGradient& system, const Eigen::VectorXd& right_side) {
   return system.solve(right_side, kForcing, kMaxInnerIterations);
-}
-
-struct Robust {
-  double cost, weight;
-};
-Robust huber(double squared, bool robust, double width) {
-  if (!robust || width <= 0 || squared <= width * width) return {squared, 1};
-  const double sigmas = std::sqrt(squared);
-  return {2 * width * sigmas - width * width, width / sigmas};
 }
 
 // Frame 0 is fixed.
@@ -108,11 +100,17 @@ class Relaxer {
         .log();
   }
 
+  // The norm of a residual in standard deviations. Rounding may make the square of a tiny one negative.
+  double sigmas(std::size_t k, const Vector6& r) const {
+    return std::sqrt(std::max(r.dot(measured_[k].information * r), 0.0));
+  }
+  double corner(const Link& link) const { return huber_corner(link, options_.loop_huber); }
+
   double cost_of(const std::vector<SE3>& poses) const {
     double sum = 0;
     for (std::size_t k = 0; k < measured_.size(); ++k) {
       const Vector6 r = residual(k, poses);
-      sum += huber(r.dot(measured_[k].information * r), graph_.links[k].robust, options_.loop_huber).cost;
+      sum += huber_loss(sigmas(k, r), corner(graph_.links[k]));
     }
     return sum;
   }
@@ -126,7 +124,7 @@ class Relaxer {
       const Link& link = graph_.links[k];
       const Vector6 r = residual(k, poses_);
       const Matrix6& information = measured_[k].information;
-      const Matrix6 weight = huber(r.dot(information * r), link.robust, options_.loop_huber).weight * information;
+      const Matrix6 weight = huber_weight(sigmas(k, r), corner(link)) * information;
       const Matrix6 J_b = right_jacobian_inverse(r);
       const Matrix6 J_a =
           -J_b *

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "proto/linear/huber.h"
+
 namespace relmap::client {
 namespace {
 
@@ -52,8 +54,7 @@ class Network {
 };
 
 double weight_of(const Link& link, double variance, double off, double huber) {
-  const double sigmas = off / std::sqrt(variance);
-  return (link.robust && huber > 0 && sigmas > huber ? huber / sigmas : 1) / variance;
+  return huber_weight(off / std::sqrt(variance), huber_corner(link, huber)) / variance;
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "client/map_legend.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "client/colour_scale.h"
@@ -12,7 +14,8 @@ namespace relmap::client {
 
 namespace {
 
-constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18, kEntryGap = 9;
+constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18, kEntryGap = 9, kTerseGap = 2;
+constexpr double kScaleHeight = 150;      // at least, of the bar of colours
 constexpr std::size_t kMaxSessions = 40;  // further sessions are only counted
 constexpr std::size_t kTerseFrom = 8;     // from this number of sessions on, each has one line
 
@@ -51,32 +54,50 @@ MapLegend::MapLegend(const MapContents& contents, const Drawing& measure, double
     add(counted_text(count, "mono session"), "not drawn: photographs have no scale", no_sample);
 }
 
-void MapLegend::add(const std::string& text, const std::string& detail, Sample sample) {
-  Entry entry{{}, {}, std::move(sample)};
+MapLegend::Entry& MapLegend::add(const std::string& text, const std::string& detail, Sample sample) {
+  Entry entry;
+  entry.sample = std::move(sample);
   if (!text.empty() || detail.empty()) entry.text = wrap(measure_, text, kPlain, width_ - kTextLeft);
   if (!detail.empty()) entry.detail = wrap(measure_, detail, kSmall, width_ - kTextLeft);
-  height_ += kLine * static_cast<double>(entry.text.size()) + kDetailLine * static_cast<double>(entry.detail.size()) +
-             kEntryGap;
+  entry.height = kLine * static_cast<double>(entry.text.size()) +
+                 kDetailLine * static_cast<double>(entry.detail.size()) + kEntryGap;
   entries_.push_back(std::move(entry));
+  return entries_.back();
 }
 
 void MapLegend::add_scale() {
   const auto& scale = contents_.picture().scale;
   if (!scale) return;
-  add(scale->name, "", no_sample);
-  // Colour by colour, from the top down.
-  constexpr int kSteps = 5;
-  for (int k = 0; k < kSteps; ++k) {
-    const double from = static_cast<double>(k) / kSteps, to = static_cast<double>(k + 1) / kSteps;
-    const std::string& text = k == 0 ? scale->low : k + 1 == kSteps ? scale->high : std::string();
-    add(text, "", [from, to](Drawing& out, const Vector2& a, const Vector2& b) {
-      constexpr int kStrips = 8;
-      const double tall = (kLine + kEntryGap) / kStrips;
-      for (int strip = 0; strip < kStrips; ++strip)
-        out.rectangle({a.x(), a.y() - 15 + strip * tall}, {b.x() - a.x(), tall + 0.5},
-                      paper_scale(from + (to - from) * (strip + 0.5) / kStrips), 1);
-    });
+  Entry& name = add(scale->name, "", no_sample);
+  if (!scale->low.empty() || !scale->high.empty()) {
+    name.heading = true;
+    // One bar from the top down, what its ends stand for beside them.
+    const std::vector<std::string> low = wrap(measure_, scale->low, kPlain, width_ - kTextLeft),
+                                   high = wrap(measure_, scale->high, kPlain, width_ - kTextLeft);
+    const double tall = std::max(kScaleHeight, kLine * static_cast<double>(low.size() + high.size() + 1));
+    const auto draw_scale = [low, high, tall](Drawing& out, const Vector2& a, const Vector2& b) {
+      constexpr int kStrips = 50;
+      const double top = a.y() - 4, strip = tall / kStrips;
+      for (int k = 0; k < kStrips; ++k)  // each reaches below the next one, so that no seam shows
+        out.rectangle({a.x(), top + k * strip}, {b.x() - a.x(), tall - k * strip}, paper_scale((k + 0.5) / kStrips), 1);
+      const double left = a.x() + kTextLeft;
+      for (std::size_t i = 0; i < low.size(); ++i)
+        out.text({left, top + 12 + kLine * static_cast<double>(i)}, low[i], kPlain);
+      for (std::size_t i = 0; i < high.size(); ++i)
+        out.text({left, top + tall - 1 - kLine * static_cast<double>(high.size() - 1 - i)}, high[i], kPlain);
+    };
+    Entry bar;
+    bar.sample = draw_scale;
+    bar.height = tall + 2 * kEntryGap;
+    entries_.push_back(std::move(bar));
   }
+  const auto unknown = [](const MapPicture::Frame& frame) { return !std::isfinite(frame.value); };
+  const auto& parts = contents_.picture().parts;
+  if (std::ranges::any_of(parts,
+                          [&](const MapPicture::Part& part) { return std::ranges::any_of(part.frames, unknown); }))
+    add("not known", "", [](Drawing& out, const Vector2& a, const Vector2& b) {
+      out.line(a, b, motion_stroke(MapPicture::EdgeKind::kMotion, kNotInForceColour));
+    });
 }
 
 void MapLegend::add_tears() {
@@ -86,36 +107,14 @@ void MapLegend::add_tears() {
         "here the measured edges contradict each other: by how many standard deviations the picture stretches one",
         [](Drawing& out, const Vector2& a, const Vector2& b) { draw_tear(out, a, b); });
   if (picture.strained.empty()) return;
-  add("closures that the picture stretches most", "", no_sample);
+  add("closures that the picture stretches most", "", no_sample).heading = true;
   for (const std::string& line : picture.strained) add("", line, no_sample);
 }
 
 void MapLegend::add_sessions() {
   const auto& sessions = contents_.sessions();
-  const bool single = sessions.size() == 1;
-  if (sessions.size() >= kTerseFrom) add("session (keyframes)", "", no_sample);
-  std::size_t shown = 0;
-  for (const auto& [session, frames] : sessions) {
-    if (++shown > kMaxSessions) {
-      add("and " + counted_text(sessions.size() - kMaxSessions, "more session"), "", no_sample);
-      break;
-    }
-    const Colour full = contents_.colour(session), first = contents_.shade(frames.front());
-    const bool scaled = contents_.picture().scale.has_value();
-    const auto line = [full, first, scaled](Drawing& out, const Vector2& a, const Vector2& b) {
-      if (scaled) return;
-      for (int k = 0; k < 10; ++k)
-        out.line(a + (b - a) * (k / 10.0), a + (b - a) * ((k + 1) / 10.0),
-                 motion_stroke(MapPicture::EdgeKind::kMotion, mix(first, full, k / 9.0)));
-    };
-    if (sessions.size() >= kTerseFrom)
-      add(contents_.name(session) + " (" + count_text(contents_.keyframes(session)) + ")", "", line);
-    else
-      add(contents_.name(session),
-          counted_text(contents_.keyframes(session), "keyframe") +
-              (single && !scaled && frames.size() > 1 ? ", light to dark in time" : ""),
-          line);
-  }
+  // On a scale, no colour is that of a session.
+  if (!contents_.picture().scale) add_names();
   bool marked = false;
   for (std::size_t part = 0; part < contents_.picture().parts.size(); ++part)
     marked = marked || contents_.marks_sessions(part);
@@ -125,6 +124,33 @@ void MapLegend::add_sessions() {
     draw_start(out, a + Vector2(5, 0), first);
     draw_end(out, b - Vector2(5, 0), first);
   });
+}
+
+void MapLegend::add_names() {
+  const auto& sessions = contents_.sessions();
+  const bool single = sessions.size() == 1, terse = sessions.size() >= kTerseFrom;
+  if (terse) add("session (keyframes)", "", no_sample).heading = true;
+  std::size_t shown = 0;
+  for (const auto& [session, frames] : sessions) {
+    if (++shown > kMaxSessions) {
+      add("and " + counted_text(sessions.size() - kMaxSessions, "more session"), "", no_sample);
+      return;
+    }
+    const Colour full = contents_.colour(session), first = contents_.shade(frames.front());
+    const auto line = [full, first](Drawing& out, const Vector2& a, const Vector2& b) {
+      for (int k = 0; k < 10; ++k)
+        out.line(a + (b - a) * (k / 10.0), a + (b - a) * ((k + 1) / 10.0),
+                 motion_stroke(MapPicture::EdgeKind::kMotion, mix(first, full, k / 9.0)));
+    };
+    if (terse)
+      add(contents_.name(session) + " (" + count_text(contents_.keyframes(session)) + ")", "", line).height +=
+          kTerseGap - kEntryGap;
+    else
+      add(contents_.name(session),
+          counted_text(contents_.keyframes(session), "keyframe") +
+              (single && frames.size() > 1 ? ", light to dark in time" : ""),
+          line);
+  }
 }
 
 void MapLegend::add_motion() {
@@ -165,19 +191,58 @@ void MapLegend::add_closures() {
   }
 }
 
-void MapLegend::draw(Drawing& out, const Vector2& corner) const {
-  double y = corner.y() + 8;
-  for (const Entry& entry : entries_) {
-    entry.sample(out, {corner.x(), y + 4}, {corner.x() + kSampleWidth, y + 4});
+std::vector<std::size_t> MapLegend::breaks(double height) const {
+  std::vector<std::size_t> found;
+  double filled = 0;
+  for (std::size_t i = 0; i < entries_.size();) {
+    std::size_t end = i + 1;  // of what stays together
+    while (end < entries_.size() && entries_[end - 1].heading) ++end;
+    double block = 0;
+    for (std::size_t k = i; k < end; ++k) block += entries_[k].height;
+    if (filled > 0 && filled + block > height + 1e-6) {
+      found.push_back(i);
+      filled = 0;
+    }
+    filled += block;
+    i = end;
+  }
+  return found;
+}
+
+double MapLegend::height(std::size_t columns) const {
+  double all = 0;
+  for (const Entry& entry : entries_) all += entry.height;
+  // The columns end where entries do, so that the least height has to be looked for.
+  double height = all / static_cast<double>(std::max<std::size_t>(columns, 1));
+  while (height < all && breaks(height).size() + 1 > columns) height += kTerseGap;
+  // A block of a heading and its entry may be higher than an even share.
+  double highest = 0, filled = 0;
+  const std::vector<std::size_t> begins = breaks(height);
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (std::ranges::find(begins, i) != begins.end()) filled = 0;
+    filled += entries_[i].height;
+    highest = std::max(highest, filled);
+  }
+  return highest;
+}
+
+void MapLegend::draw(Drawing& out, const Vector2& corner, std::size_t columns, double apart) const {
+  const std::vector<std::size_t> begins = breaks(height(columns));
+  Vector2 at = corner + Vector2(0, 8);
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (std::ranges::find(begins, i) != begins.end()) at = {at.x() + apart, corner.y() + 8};
+    const Entry& entry = entries_[i];
+    entry.sample(out, {at.x(), at.y() + 4}, {at.x() + kSampleWidth, at.y() + 4});
+    double y = at.y();
     for (const std::string& line : entry.text) {
-      out.text({corner.x() + kTextLeft, y + 9}, line, kPlain);
+      out.text({at.x() + kTextLeft, y + 9}, line, kPlain);
       y += kLine;
     }
     for (const std::string& line : entry.detail) {
-      out.text({corner.x() + kTextLeft, y + 6}, line, kSmall);
+      out.text({at.x() + kTextLeft, y + 6}, line, kSmall);
       y += kDetailLine;
     }
-    y += kEntryGap;
+    at.y() += entry.height;
   }
 }
 

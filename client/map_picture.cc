@@ -17,6 +17,7 @@ namespace {
 constexpr Colour kPaper{252, 252, 250};
 constexpr double kMargin = 36, kLegendWidth = 236, kGap = 28, kPanelGap = 22, kCaptionLine = 19;
 constexpr double kMaxHeightAlone = 640, kMaxHeightFirst = 420, kMinHeight = 110;  // of plans
+constexpr double kLegendShare = 1.25;  // of the height of the plans: a longer legend does not stand beside them
 constexpr std::size_t kMaxPanels = 24;
 
 const TextStyle kTitle{.size = 26, .colour = kInkColour, .bold = true}, kSubtitle{.size = 16, .colour = kFaintColour},
@@ -45,7 +46,19 @@ class Composer {
         column_(picture.width - 2 * kMargin - kLegendWidth - kGap),
         legend_(contents_, measure, kLegendWidth) {
     lay_out_header();
-    lay_out_panels();
+    lay_out_panels(/*legend_beside=*/true);
+    const double beside = legend_.height(1);
+    if (beside <= kLegendShare * (panels_bottom_ - top_)) {
+      legend_at_ = {kMargin + column_ + kGap, top_};
+      height_ = std::max(panels_bottom_, top_ + beside) + kMargin - 4;
+      return;
+    }
+    // Beside the map, the legend would leave most of the page empty: it goes below, and the map gets its room.
+    column_ = picture.width - 2 * kMargin;
+    lay_out_panels(/*legend_beside=*/false);
+    columns_ = static_cast<std::size_t>((column_ + kGap) / (kLegendWidth + kGap));
+    legend_at_ = {kMargin, panels_bottom_ + kPanelGap};
+    height_ = legend_at_.y() + legend_.height(columns_) + kMargin - 4;
   }
 
   double height() const { return height_; }
@@ -56,7 +69,7 @@ class Composer {
       for (const Line& line : panel.caption) out.text(line.at, line.text, line.style);
       panel.map.draw(out, panel.area);
     }
-    legend_.draw(out, {kMargin + column_ + kGap, top_});
+    legend_.draw(out, legend_at_, columns_, kLegendWidth + kGap);
   }
 
  private:
@@ -113,7 +126,15 @@ class Composer {
     return lines;
   }
 
-  void lay_out_panels() {
+  // A plan that stands alone may be as high as the legend beside it.
+  static double alone_height(double legend) {
+    return std::clamp(legend - 40, kMaxHeightAlone, kLegendShare * kMaxHeightAlone - 40);
+  }
+
+  // Puts the panels below the header, `column_` wide.
+  void lay_out_panels(bool legend_beside) {
+    panels_.clear();
+    width_of_others_ = 0;
     const std::size_t shown = std::min(picture_.parts.size(), kMaxPanels);
     double y = top_;
     std::size_t part = 0;
@@ -123,8 +144,8 @@ class Composer {
       if (!first && width_of_others_ == 0)
         width_of_others_ = (column_ - kPanelGap * static_cast<double>(columns - 1)) / static_cast<double>(columns);
       const double width = first || shown == 2 ? column_ : width_of_others_;
-      // A plan that stands alone may be as high as the legend beside it.
-      const double max_height = shown == 1            ? std::max(kMaxHeightAlone, legend_.height() - 40)
+      const double beside = legend_beside ? legend_.height(1) : 0;
+      const double max_height = shown == 1            ? alone_height(beside)
                                 : first || shown == 2 ? kMaxHeightFirst
                                                       : 0.75 * width;
       std::vector<Panel> row;
@@ -139,7 +160,7 @@ class Composer {
         plans = std::max(plans, row.back().map.plan_height());
         captions_end = std::max(captions_end, below);
       }
-      if (shown == 1) plans = std::max(plans, legend_.height());
+      if (shown == 1 && beside <= kLegendShare * plans) plans = std::max(plans, beside);
       for (Panel& panel : row) {
         panel.area.low.y() = captions_end;
         panel.area.high.y() = captions_end + plans;
@@ -147,17 +168,19 @@ class Composer {
       }
       y = captions_end + plans + MapPanel::kScaleHeight + kPanelGap;
     }
-    height_ = std::max(y - kPanelGap, top_ + legend_.height()) + kMargin - 4;
+    panels_bottom_ = y - kPanelGap;
   }
 
   const MapPicture& picture_;
   const Drawing& measure_;
   const MapContents contents_;
-  const double column_;
+  double column_ = 0;  // the width of the panels
   const MapLegend legend_;
   std::vector<Line> header_;
   std::vector<Panel> panels_;
-  double top_ = 0, height_ = 0, width_of_others_ = 0;
+  double top_ = 0, panels_bottom_ = 0, height_ = 0, width_of_others_ = 0;
+  Vector2 legend_at_ = Vector2::Zero();
+  std::size_t columns_ = 1;  // of the legend
 };
 
 Status check(const MapPicture& picture) {

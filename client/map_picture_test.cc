@@ -334,6 +334,104 @@ TEST_F(MapPictureFile, AScaleColoursFramesByTheirValuesAndIsExplained) {
   expect_nothing_cut_off(svg);
 }
 
+// Where the rectangles of the colour bar lie: all polygons with four corners and two different x.
+std::vector<Box> rectangles_of(const std::string& svg) {
+  constexpr char kBegin[] = "<polygon points=\"";
+  std::vector<Box> boxes;
+  for (std::size_t at = svg.find(kBegin); at != std::string::npos; at = svg.find(kBegin, at + 1)) {
+    Vector2 a, b, c;
+    if (std::sscanf(svg.c_str() + at + sizeof kBegin - 1, "%lf,%lf %lf,%lf %lf,%lf", &a.x(), &a.y(), &b.x(), &b.y(),
+                    &c.x(), &c.y()) == 6 &&
+        a.y() == b.y() && b.x() == c.x())
+      boxes.push_back({a, c});
+  }
+  return boxes;
+}
+
+TEST_F(MapPictureFile, AScaleIsOneBarWithWholeStampsAndWithoutSessions) {
+  MapPicture picture = circle(40);
+  picture.session_names[1] = "a drive in the morning";
+  for (std::size_t k = 0; k < 40; ++k) picture.parts[0].frames[k].value = static_cast<double>(k) / 39;
+  picture.scale = MapPicture::Scale{"colour: when it was driven", "2026-11-30 22:10:05 UTC", "2026-12-01 06:00:00 UTC"};
+  for (const double width : {600.0, 1200.0}) {
+    picture.width = width;
+    const std::string svg = draw_map_picture(picture, PictureFormat::kSvg).or_throw();
+    EXPECT_THAT(said_in(svg), ::testing::Not(::testing::HasSubstr("a drive in the morning")));
+    EXPECT_THAT(said_in(svg), ::testing::Not(::testing::HasSubstr("not known")));
+    double first = 0, last = 0;
+    for (const SvgText& text : texts_of(svg)) {
+      if (text.text.ends_with("22:10:05 UTC")) first = text.y;
+      if (text.text.ends_with("06:00:00 UTC")) last = text.y;
+    }
+    // A break within a number would be a space there.
+    for (const std::string& whole : {picture.scale->low, picture.scale->high})
+      EXPECT_THAT(said_in(svg), ::testing::HasSubstr(whole));
+    std::vector<Box> bar;
+    for (const Box& box : rectangles_of(svg))
+      if (box.size().x() < 31 && box.size().x() > 29) bar.push_back(box);
+    ASSERT_GT(bar.size(), 20u);
+    for (std::size_t k = 1; k < bar.size(); ++k) {
+      EXPECT_EQ(bar[k].high.y(), bar[0].high.y()) << "in one piece";
+      EXPECT_LT(bar[k].low.y(), bar[k - 1].high.y());
+    }
+    EXPECT_LT(bar[0].low.y(), first);
+    EXPECT_LT(first, last);
+    EXPECT_GE(bar[0].high.y(), last);
+  }
+  picture.parts[0].frames[7].value = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(said_in(draw_map_picture(picture, PictureFormat::kSvg).or_throw()), ::testing::HasSubstr("not known"));
+  picture.scale = MapPicture::Scale{"colour: when it was driven", "", ""};
+  for (const Box& box : rectangles_of(draw_map_picture(picture, PictureFormat::kSvg).or_throw()))
+    EXPECT_GT(box.size().x(), 31) << "without values there is no bar";
+}
+
+// Beside the map, it would be as long as the page, most of which would be empty.
+TEST_F(MapPictureFile, ALongLegendStandsBelowTheMapInColumns) {
+  MapPicture picture;
+  add_part(picture, 1, 60);
+  for (SessionNumber session = 2; session <= 70; ++session) {
+    MapPicture one;
+    add_part(one, session, 60);
+    for (MapPicture::Frame& frame : one.parts[0].frames) {
+      frame.T_root_frame.t.x() = 0.2 * session;
+      picture.parts[0].frames.push_back(frame);
+    }
+    picture.edges.insert(picture.edges.end(), one.edges.begin(), one.edges.end());
+    picture.session_names[session] = "robot-" + std::to_string(session);
+  }
+  for (const double width : {600.0, 1200.0}) {
+    picture.width = width;
+    const std::string svg = draw_map_picture(picture, PictureFormat::kSvg).or_throw();
+    expect_nothing_cut_off(svg);
+    EXPECT_THAT(said_in(svg), ::testing::HasSubstr("and 30 more sessions"));
+    Box panel{{0, 0}, {0, 0}};
+    for (const Box& box : rectangles_of(svg))
+      if (box.size().x() > panel.size().x() && box.low.x() > 0) panel = box;
+    EXPECT_GT(panel.size().x(), 0.85 * width) << "the map has the width of the page";
+    std::set<double> columns;
+    std::vector<SvgText> names;
+    for (const SvgText& text : texts_of(svg))
+      if (text.text.find("robot-") != std::string::npos) {
+        EXPECT_GT(text.y, panel.high.y());
+        columns.insert(text.left);
+        names.push_back(text);
+      }
+    EXPECT_GE(columns.size(), width > 1000 ? 4u : 2u);
+    for (std::size_t i = 0; i < names.size(); ++i)
+      for (std::size_t k = 0; k < i; ++k) EXPECT_FALSE(names[i].box().overlaps(names[k].box()));
+    if (width > 1000) {
+      EXPECT_GT(panel.size().y(), 0.35 * page_of(svg).second) << "the map is the main thing";
+    }
+  }
+}
+
+TEST_F(MapPictureFile, AShortLegendStaysBesideTheMap) {
+  const std::string svg = draw_map_picture(circle(), PictureFormat::kSvg).or_throw();
+  int beside = 0;
+  for (const SvgText& text : texts_of(svg)) beside += text.text.starts_with("60 keyframes") && text.left > 900;
+  EXPECT_EQ(beside, 1);
+}
+
 TEST_F(MapPictureFile, BadPicturesAreRefusedWithTheirReason) {
   EXPECT_EQ(write_map_picture(circle(), path("map.jpg")).reason(), Reason::INVALID_ARGUMENT);
   EXPECT_EQ(write_map_picture({}, path("map.svg")).reason(), Reason::EMPTY_MAP);

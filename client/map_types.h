@@ -109,11 +109,13 @@ struct Doubt {
 };
 
 // How doubtful a loop closure is, as the daemon judges it. It decides nothing: it orders closures for those who look at
-// them.
+// them. What it says of the robot's motion is as the daemon found it when it judged the closure; Explanation::motion
+// tells what holds now.
 struct Suspicion {
   double value = 0;           // 0: nothing speaks against it; 1: it is wrong as far as the map can tell
   std::vector<Doubt> doubts;  // the heaviest first; without those of kinds that only a newer daemon knows
-  // What else to know, in words: what the map does not know of the closure, or that an operator put it into force.
+  // What else to know, in words: what the map does not know of the closure, or that an operator put it into force
+  // and has neither withdrawn that nor removed it.
   std::string remark = {};
 };
 
@@ -452,8 +454,10 @@ using ReasonCounts = std::map<Reason, std::uint64_t>;
 // A session that is being received. Counts are since the daemon first heard of it. status.proto describes the fields.
 struct RobotStatus {
   std::string uuid;
-  SessionNumber session = 0;                    // 0: not begun
-  std::string robot, name;                      // empty: no whole keyframe was received yet
+  SessionNumber session = 0;  // 0: not begun
+  // Of a robot of which everything was refused: the one of its credentials, or else what its keyframes say. Empty: no
+  // whole keyframe was received yet, and nobody proved to be it.
+  std::string robot, name;
   double keyframes_per_s = 0, bytes_per_s = 0;  // over the last ten seconds
   double silent_s = 0;                          // since the last message from it
   std::optional<double> lag_s;      // from the time stamp of its newest durable keyframe until it was durable

@@ -36,7 +36,8 @@ struct ClientOptions {
   std::string request_id;
   // The trace that the calls belong to (traceparent of W3C Trace Context), for the daemon's logs; empty: none.
   std::string traceparent;
-  // Called with the canonical proto3 JSON of each message received, in order, by the calling thread.
+  // Called with the canonical proto3 JSON of each message received, in order, by the calling thread; of events of the
+  // map with what they carry of a session or closure only.
   std::function<void(const std::string& json)> on_reply;
 };
 

@@ -33,10 +33,18 @@ constexpr std::array<StretchStyle, 3> kStretches{
      {RouteStrip::StretchKind::kUnmeasured, "nothing measured this: a guess", kInkColour, 7},
      {RouteStrip::StretchKind::kLongLoop, "a loop closure longer than 5 m, passable by assumption", kLoopColour, 0}}};
 
-// "41 m", "1.2 km"
-std::string distance_text(double metres) {
-  if (metres == 0) return "0";
-  return metres < 1000 ? fixed(metres, metres < 10 ? 1 : 0) + " m" : fixed(metres / 1000, 1) + " km";
+// A unit of lengths, and the decimals that tell multiples of a step apart in it.
+struct AxisUnit {
+  double metres = 1;
+  const char* name = "m";
+  int decimals = 0;
+
+  // "0.15 m"; "0" has no unit.
+  std::string text(double length) const { return length == 0 ? "0" : fixed(length / metres, decimals) + " " + name; }
+};
+// The least decimals by which multiples of 1, 2 or 5 times a power of ten metres differ, and of other steps roughly.
+AxisUnit unit_for(double step, double metres, const char* name) {
+  return {metres, name, std::max(0, static_cast<int>(std::ceil(-std::log10(step / metres) - 1e-9)))};
 }
 // "0:07", "18:40", "2:05:00"
 std::string time_of(double seconds) {
@@ -54,11 +62,14 @@ double tick_of(double range, int ticks) {
   return 10 * power;
 }
 
-std::string sigma_text(double metres) {
-  return metres == 0       ? "0"
-         : metres < 0.0995 ? number_text(1000 * metres) + " mm"
-         : metres < 1      ? number_text(100 * metres) + " cm"
-                           : number_text(metres) + " m";
+// Of distances along the route, the longest of which is `longest`.
+AxisUnit distance_unit(double step, double longest) {
+  return longest < 1000 ? unit_for(step, 1, "m") : unit_for(step, 1000, "km");
+}
+AxisUnit sigma_unit(double step, double highest) {
+  return highest < 0.0995 ? unit_for(step, 0.001, "mm")
+         : highest < 1    ? unit_for(step, 0.01, "cm")
+                          : unit_for(step, 1, "m");
 }
 
 class StripComposer {
@@ -72,6 +83,11 @@ class StripComposer {
     length_ = std::max(length_, strip.stops.back().distance_m);
     if (!(length_ > 0)) length_ = 1;
     if (!(highest_ > 0)) highest_ = 0.01;
+    distance_step_ = tick_of(length_, 8);
+    ticks_ = distance_unit(distance_step_, length_);
+    // Views lie between ticks, and neighbours must not seem to be at one distance.
+    const double apart = length_ / static_cast<double>(std::max<std::size_t>(strip.stops.size(), 2) - 1);
+    stop_distances_ = distance_unit(std::min(apart / 3, length_ < 10 ? 0.1 : 1000), length_);
     lay_out();
   }
 
@@ -145,7 +161,7 @@ class StripComposer {
       }
       number(out, at + Vector2(13, 13), i);
       out.text(at + Vector2(0, tall_ + 15),
-               cut(distance_text(stop.distance_m) + ", " + time_of(stop.time_s), kStopTitle), kStopTitle);
+               cut(stop_distances_.text(stop.distance_m) + ", " + time_of(stop.time_s), kStopTitle), kStopTitle);
       out.text(at + Vector2(0, tall_ + 30),
                cut(stop.frame.to_string() + (stop.label.empty() ? "" : " " + stop.label), kStopDetail), kStopDetail);
       // On the axis: where the picture was taken.
@@ -167,14 +183,14 @@ class StripComposer {
 
   void draw_profile(Drawing& out) const {
     const double step = tick_of(highest_, 4);
+    const AxisUnit sigmas = sigma_unit(step, highest_);
     for (double sigma = 0; sigma <= highest_ * 1.0001; sigma += step) {
       out.line({low_.x(), y_of(sigma)}, {kStripWidth - kStripMargin, y_of(sigma)}, {kStripRule, 1, 1, 0});
-      out.text({low_.x() - 8, y_of(sigma) + 4}, sigma_text(sigma),
+      out.text({low_.x() - 8, y_of(sigma) + 4}, sigmas.text(sigma),
                {.size = 12, .colour = kFaintColour, .anchor = Anchor::kRight});
     }
-    const double metres = tick_of(length_, 8);
-    for (double at = 0; at <= length_ * 1.0001; at += metres)
-      out.text({x_of(at), low_.y() + 17}, distance_text(at),
+    for (double at = 0; at <= length_ * 1.0001; at += distance_step_)
+      out.text({x_of(at), low_.y() + 17}, ticks_.text(at),
                {.size = 12, .colour = kFaintColour, .anchor = Anchor::kMiddle});
     for (std::size_t w = strip_.ways.size(); w-- > 0;) {
       std::vector<Vector2> line;
@@ -240,7 +256,8 @@ class StripComposer {
   const RouteStrip& strip_;
   const Drawing& measure_;
   std::vector<std::pair<std::string, TextStyle>> heading_;
-  double length_ = 0, highest_ = 0;
+  double length_ = 0, highest_ = 0, distance_step_ = 0;
+  AxisUnit ticks_, stop_distances_;
   std::vector<Vector2> sizes_;  // of the pictures on the page; zero: there is none
   std::size_t columns_ = 1, legend_lines_ = 0;
   double stops_top_ = 0, cell_ = 0, tall_ = 0, row_height_ = 0, profile_top_ = 0, bars_top_ = 0, legend_top_ = 0,

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "client/testing/svg.h"
@@ -62,6 +63,31 @@ TEST(StretchesOf, JoinsNeighbouringSteps) {
   EXPECT_EQ(stretches[1].from_m, 4);
   EXPECT_EQ(stretches[1].to_m, 5);
   EXPECT_EQ(stretches[2].kind, RouteStrip::StretchKind::kUnmeasured);
+}
+
+TEST(RouteStrip, NoTwoTicksAndNoTwoStopsOfAShortRouteReadAlike) {
+  for (const double length : {0.013, 0.21, 0.4, 0.9, 1.77, 7.0, 41.0, 1'300.0, 4'000.0, 90'000.0}) {
+    RouteStrip strip;
+    RouteStrip::Way way{"a way", {}};
+    for (int i = 0; i < 5; ++i) {
+      strip.stops.push_back({{1, static_cast<std::uint32_t>(i)}, length * i / 4, 1.0 * i, "", ""});
+      way.points.push_back({length * i / 4, 0.0004 * length * i});
+    }
+    strip.ways = {way};
+    std::vector<std::string> ticks, stops;
+    const std::string svg = draw_route_strip(strip, PictureFormat::kSvg).or_throw();
+    for (const SvgText& text : texts_of(svg)) {
+      const bool length_text = text.text.ends_with("m") && text.text.find(' ') != std::string::npos;
+      if (length_text && text.size == 12) ticks.push_back(text.text);
+      if (text.text.find(", 0:0") != std::string::npos) stops.push_back(text.text.substr(0, text.text.find(',')));
+    }
+    EXPECT_GE(ticks.size(), 5u) << svg;
+    EXPECT_EQ(stops.size(), 5u);
+    for (std::vector<std::string>* const all : {&ticks, &stops}) {
+      std::sort(all->begin(), all->end());
+      EXPECT_EQ(std::adjacent_find(all->begin(), all->end()), all->end()) << length << ::testing::PrintToString(*all);
+    }
+  }
 }
 
 TEST(RouteStrip, ShowsEveryStopAndExplainsItsStretches) {

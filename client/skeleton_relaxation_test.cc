@@ -36,7 +36,7 @@ Skeleton::Closure closure(FrameId b, FrameId a, const SE3& T_ab = {}) {
   return closure;
 }
 
-const SE3 kAhead{Matrix3::Identity(), {0, 0, 1}};
+const SE3 kMetreAhead{Matrix3::Identity(), {0, 0, 1}};
 
 TEST(SkeletonRelaxation, AClosureClosesACircleThatDrifted) {
   constexpr std::uint32_t kPoints = 40;
@@ -59,7 +59,7 @@ TEST(SkeletonRelaxation, AClosureClosesACircleThatDrifted) {
 
 TEST(SkeletonRelaxation, TheChosenRootComesFirstThenTheLargestPart) {
   Skeleton skeleton;
-  skeleton.chains = {chain(1, 5, kAhead), chain(2, 9, kAhead), chain(3, 3, kAhead)};
+  skeleton.chains = {chain(1, 5, kMetreAhead), chain(2, 9, kMetreAhead), chain(3, 3, kMetreAhead)};
   auto relaxed = relax_skeleton(skeleton).or_throw();
   ASSERT_EQ(relaxed.parts.size(), 3u);
   EXPECT_EQ(relaxed.parts[0].root, (FrameId{2, 0}));
@@ -75,7 +75,7 @@ TEST(SkeletonRelaxation, TheChosenRootComesFirstThenTheLargestPart) {
 
 TEST(SkeletonRelaxation, AGuessCountsOnlyWhereNothingMeasuredIsBeside) {
   Skeleton skeleton;
-  skeleton.chains = {chain(1, 5, kAhead), chain(2, 5, kAhead)};
+  skeleton.chains = {chain(1, 5, kMetreAhead), chain(2, 5, kMetreAhead)};
   skeleton.chains[0].points[2].unmeasured = true;
   skeleton.chains[0].points[2].T_before_this.t.z() = 9;
   skeleton.chains[0].points[2].translation_variance = 1e-8;
@@ -86,7 +86,7 @@ TEST(SkeletonRelaxation, AGuessCountsOnlyWhereNothingMeasuredIsBeside) {
 
 TEST(SkeletonRelaxation, WhereTheRobotWasCarriedTheClosuresSay) {
   Skeleton skeleton;
-  skeleton.chains = {chain(1, 5, kAhead), chain(2, 5, kAhead)};
+  skeleton.chains = {chain(1, 5, kMetreAhead), chain(2, 5, kMetreAhead)};
   skeleton.chains[1].points[2].carried = true;
   skeleton.closures = {closure({2, 10}, {1, 10}), closure({2, 20}, {1, 40}), closure({2, 30}, {1, 30})};
   skeleton.closures.pop_back();
@@ -115,7 +115,7 @@ TEST(SkeletonRelaxation, ManyPointsAreRelaxedAsWellAsFew) {
 
 TEST(SkeletonPicture, ShowsEveryPointStepAndClosureByItsKind) {
   Skeleton skeleton;
-  skeleton.chains = {chain(1, 5, kAhead), chain(2, 5, kAhead)};
+  skeleton.chains = {chain(1, 5, kMetreAhead), chain(2, 5, kMetreAhead)};
   skeleton.chains[0].points[2].unmeasured = true;
   skeleton.chains[1].points[3].carried = true;
   skeleton.closures = {closure({2, 10}, {1, 10}), closure({2, 20}, {1, 20})};
@@ -139,7 +139,7 @@ TEST(SkeletonPicture, ShowsEveryPointStepAndClosureByItsKind) {
 // A skeleton that is still being read may have closures whose ends are not there yet.
 TEST(SkeletonRelaxation, AClosureWithoutItsEndsIsLeftOut) {
   Skeleton skeleton;
-  skeleton.chains = {chain(1, 5, kAhead)};
+  skeleton.chains = {chain(1, 5, kMetreAhead)};
   skeleton.closures = {closure({1, 40}, {9, 0}), closure({1, 41}, {1, 0})};
   EXPECT_EQ(relax_skeleton(skeleton).or_throw().parts.size(), 1u);
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/client_impl.h"
+#include "client/event_json.h"
 #include "client/replies.h"
 
 namespace relmap::client {
@@ -147,7 +148,7 @@ class Watch {
     if (end_) return *end_;
     const auto event = read_event(message);
     if (!event.ok()) return event.status();
-    impl.tell(message);
+    if (impl.options.on_reply) impl.options.on_reply(event_json(message));
     if (*event) tell(std::move(**event));
     if (!message.resume_token().empty()) request_.set_resume_token(message.resume_token());
     return end_.value_or(Status());

@@ -80,7 +80,8 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
   for (const std::string& part :
        {first + ": loop 1:0 -> 1:" + std::to_string(kLap) +
             ", accepted, CONSISTENT (closures of neighbouring frames agree with it)",
-        std::string("verified by imported"), std::string("closures of other frames\n    accepted "),
+        std::string("evidence  imported with session 1, circle.g2o, of robot imported; not verified here; binds 0"),
+        std::string("closures of other frames\n    accepted "),
         std::string(": candidate, LONE (no other closure agrees with it yet)"), std::string(": accepted, CONSISTENT")})
     EXPECT_NE(why.standard_output.find(part), std::string::npos) << part << '\n' << why.standard_output;
   const Finished why_not = import({"edges", "--explain", wrong});

@@ -142,7 +142,10 @@ TEST_F(Operator, IsAskedBeforeAgreeingClosuresAreRemoved) {
        std::vector<std::vector<std::string>>{{"edge", "remove", ids[0]}, {"--json", "edge", "remove", ids[0]}}) {
     const Finished refused = relmap(how);
     EXPECT_EQ(refused.exit_code, 1) << "nobody can be asked";
-    EXPECT_EQ(refused.standard_output, "");
+    if (how.front() == "--json")
+      EXPECT_THAT(refused.standard_output, ::testing::StartsWith(R"({"error":{"reason":"NOT_CONFIRMED","message":")"));
+    else
+      EXPECT_EQ(refused.standard_output, "");
     EXPECT_THAT(refused.standard_error, ::testing::StartsWith("NOT_CONFIRMED: 2 closures that agree with " + ids[0] +
                                                               " would go with it: " + ids[1] + " " + ids[2]));
   }

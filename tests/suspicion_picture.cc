@@ -8,6 +8,7 @@
 #include "client/map_colours.h"
 #include "proto/base/number_text.h"
 #include "server/map/suspicion.h"
+#include "server/map/testing/ordinary_closure.h"
 
 namespace relmap::testing {
 namespace {
@@ -23,17 +24,11 @@ constexpr double kTitle = 20, kAxis = 46, kLeft = 34;  // room above, below and 
 constexpr int kColumns = 3;
 constexpr Colour kPaper{252, 252, 250}, kGrid{228, 228, 222};
 
-// A closure against which nothing speaks, and which three others confirm. The robot's motion says nothing.
+// An ordinary closure, which three others confirm. The robot's motion says nothing.
 ClosureDigest sound() {
-  ClosureDigest closure;
-  closure.state = storage::EdgeState::kAccepted;
-  closure.reason = Reason::CONSISTENT;
-  closure.verification = storage::Verification::kStereo;
-  closure.inliers = 100;
-  closure.spread = 0.4F;
-  closure.probability = 1;
+  ClosureDigest closure = map::ordinary_closure();
   closure.agreeing = 3;
-  closure.uniqueness.known = true;
+  closure.tests = {};
   return closure;
 }
 

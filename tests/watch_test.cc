@@ -333,6 +333,10 @@ TEST_F(WatchTest, TheCommandTellsPeopleAndProgramsAndGoesOnWhereItWas) {
     EXPECT_TRUE(event.contains("resumeToken")) << line;
     for (const char* kind : {"sessionChanged", "edgeChanged", "frameLabels", "caughtUp", "framesAdded", "framesMoved"})
       if (event.contains(kind)) kinds.insert(kind);
+    if (!event.contains("sessionChanged")) continue;
+    std::set<std::string> carried;
+    for (const auto& [key, value] : event["sessionChanged"].items()) carried.insert(key);
+    EXPECT_EQ(carried, (std::set<std::string>{"number", "uuid", "robot", "name", "state"})) << line;
   }
   EXPECT_EQ(kinds, (std::set<std::string>{"sessionChanged", "edgeChanged", "frameLabels", "caughtUp"}));
 

@@ -1,43 +1,30 @@
 #include "proto/base/markup.h"
 
-#include "proto/base/utf8.h"
+#include "proto/base/visible_text.h"
 
 namespace relmap {
 
-namespace {
-
-// XML does not allow it, or it would let a name turn around what stands beside it (UAX #9).
-bool is_forbidden(char32_t code) {
-  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x61C || code == 0x200E || code == 0x200F ||
-         (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069) || (code & 0xFFFE) == 0xFFFE;
-}
-
-}  // namespace
-
 std::string markup_text(std::string_view utf8) {
-  constexpr const char* kReplacement = "\xEF\xBF\xBD";  // U+FFFD
   std::string out;
-  while (!utf8.empty()) {
-    const std::string_view before = utf8;
-    const auto code = take_code_point(utf8);
-    if (!code) utf8.remove_prefix(1);
-    if (code == U'\t' || code == U'\n')
-      out += ' ';
-    else if (!code || is_forbidden(*code))
-      out += kReplacement;
-    else if (*code == U'&')
-      out += "&amp;";
-    else if (*code == U'<')
-      out += "&lt;";
-    else if (*code == U'>')
-      out += "&gt;";
-    else if (*code == U'"')
-      out += "&quot;";
-    else if (*code == U'\'')
-      out += "&#39;";
-    else
-      out += before.substr(0, before.size() - utf8.size());
-  }
+  for (const char c : visible_text(utf8)) switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      case '\'':
+        out += "&#39;";
+        break;
+      default:
+        out += c;
+    }
   return out;
 }
 

@@ -42,7 +42,9 @@ struct IngestStats {
 struct RobotStats {
   SessionUuid uuid;
   SessionNumber session = 0;  // 0: not begun
-  std::string robot, name;    // empty: no complete keyframe came yet
+  // Of one of which everything was refused, the robot is the one that it has proved to be, or else what its keyframes
+  // say. Empty: neither is known.
+  std::string robot, name;
   double keyframes_per_s = 0, bytes_per_s = 0;
   std::int64_t silent_us = 0;  // since it was last heard
   std::int64_t lag_us = -1;    // from the time stamp of its newest durable keyframe until it was durable; -1: unknown

@@ -735,6 +735,10 @@ RobotStats Intake::stats_of(const SessionUuid& session, Entry& entry, SteadyTime
   robot.session = entry.intake.number();
   robot.robot = entry.intake.header().robot;
   robot.name = entry.intake.header().name;
+  if (robot.robot.empty()) {  // no keyframe of it was sound
+    robot.robot = entry.sender && !entry.sender->robot.empty() ? entry.sender->robot : entry.intake.claimed_robot();
+    robot.name = entry.intake.claimed_name();
+  }
   robot.keyframes_per_s = entry.keyframes.per_second(now);
   robot.bytes_per_s = entry.bytes.per_second(now);
   robot.silent_us = std::chrono::duration_cast<std::chrono::microseconds>(now - entry.schedule.last_heard()).count();

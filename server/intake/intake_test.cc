@@ -1198,6 +1198,38 @@ TEST_F(IntakeTest, TimesFarAheadOfTheServerAreRefusedByName) {
   EXPECT_EQ(ack.refused[0].reason, Reason::TIME_AHEAD);
 }
 
+// Whoever looks for a robot that is refused from its start looks for its name.
+TEST_F(IntakeTest, ARobotOfWhichEverythingIsRefusedIsListedByItsName) {
+  Keyframe far = keyframe(0);
+  far.time_us = now_us() + 25 * 3600 * 1'000'000LL;
+  send(far);
+  settle();
+  const auto listed = [&](const SessionUuid& uuid) {
+    for (const RobotStats& robot : intake_->robots(now_))
+      if (robot.uuid == uuid) return robot;
+    return RobotStats();
+  };
+  EXPECT_EQ(listed(uuid_).session, 0u);
+  EXPECT_EQ(listed(uuid_).refused, (std::map<Reason, std::uint64_t>{{Reason::TIME_AHEAD, 1}}));
+  EXPECT_EQ(listed(uuid_).robot, far.session.robot) << "as its keyframe says";
+  EXPECT_EQ(listed(uuid_).name, far.session.name);
+
+  Keyframe other = keyframe(0);
+  other.session.uuid = SessionUuid::random();
+  other.session.robot = "cart";
+  const Bytes payload = encode_keyframe(other);
+  (void)intake_->take_payload(other.session.uuid, 0, crc32c(payload), payload, now_, {"anna"});
+  EXPECT_EQ(listed(other.session.uuid).refused, (std::map<Reason, std::uint64_t>{{Reason::NOT_ALLOWED, 1}}));
+  EXPECT_EQ(listed(other.session.uuid).robot, "anna") << "who it has proved to be counts";
+
+  Keyframe unnameable = keyframe(0);
+  unnameable.session.uuid = SessionUuid::random();
+  unnameable.session.robot = "a\x1b[2J";
+  const Bytes bytes = encode_keyframe(unnameable);
+  (void)intake_->take_payload(unnameable.session.uuid, 0, crc32c(bytes), bytes, now_);
+  EXPECT_EQ(listed(unnameable.session.uuid).robot, "") << "what may be no name is shown nowhere";
+}
+
 // What anyone has sent of a session is no hindrance to the robot itself, nor can it speak for the robot.
 TEST_F(IntakeTest, NobodySpeaksForARobotThatProvesWhoItIs) {
   const std::string robot = keyframe(0).session.robot;

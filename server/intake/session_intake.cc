@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/names.h"
 #include "proto/keyframe/keyframe.h"
 
 namespace relmap::intake {
@@ -123,9 +124,17 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload, 
     held.payload = std::move(payload.bytes);
     held.charge = std::move(payload.charge);
   }
+  if (!verdict.ok() && keyframe.ok()) note_claim(keyframe->session);
   waiting_bytes_ += held.payload.size();
   held_.emplace(sequence, std::move(held));
   return verdict;
+}
+
+// So that whoever looks for a robot of which everything is refused finds it by its name.
+void SessionIntake::note_claim(const SessionHeader& header) {
+  if (number_ || !header_.uuid.is_nil()) return;
+  if (check_name("robot", header.robot).ok()) claimed_robot_ = header.robot;
+  if (check_name("session", header.name).ok()) claimed_name_ = header.name;
 }
 
 void SessionIntake::give_up(std::uint32_t from, std::uint32_t to, Reason reason) {

@@ -92,6 +92,10 @@ class SessionIntake {
   SessionNumber number() const { return number_.value_or(0); }
   // Until the session begins, the header of its newest sound keyframe; nil uuid if none came.
   const SessionHeader& header() const { return header_; }
+  // What the newest keyframe that was refused calls its robot and session, while no sound one came; empty: nothing that
+  // could be shown.
+  const std::string& claimed_robot() const { return claimed_robot_; }
+  const std::string& claimed_name() const { return claimed_name_; }
   std::uint64_t seen_end() const { return std::max(seen_, turn_); }
   std::optional<std::int64_t> durable_time_us() const { return durable_time_us_; }
   // Keyframes refused for good since this object was made.
@@ -133,6 +137,7 @@ class SessionIntake {
 
   bool submit_in_turn();
   Judged judged(std::uint32_t sequence);
+  void note_claim(const SessionHeader& header);
   Status judge_in_turn(const Held& held) const;
   Status judge_session() const;
   std::optional<storage::Session> session() const;
@@ -157,6 +162,7 @@ class SessionIntake {
   std::shared_ptr<const void> record_;      // keeps the session's record in memory
   std::optional<SessionHeader> beginning_;  // what begin_() was called with, until begun()
   SessionHeader header_;
+  std::string claimed_robot_, claimed_name_;
   mutable std::optional<storage::Session> last_read_;  // of session()
   std::deque<BeforeBegin> before_begin_;               // journalled first once there is a number
 

@@ -149,6 +149,11 @@ constexpr std::array<Rule, 9> kRules = {{
     {DoubtKind::kUnseen, unseen, say_unseen},
 }};
 
+// Whether the closure is in force now because an operator put it there. What he removed or withdrew since is not.
+bool is_by_operator(const ClosureDigest& c) {
+  return c.state == storage::EdgeState::kAccepted && c.reason == Reason::ACCEPTED_BY_OPERATOR;
+}
+
 std::string remark_on(const ClosureDigest& c) {
   std::string text;
   const auto add = [&](const char* more) { text += (text.empty() ? "" : "; ") + std::string(more); };
@@ -158,7 +163,7 @@ std::string remark_on(const ClosureDigest& c) {
     add("it replaces a way through a deleted session: nothing tests it");
   else if (!c.uniqueness.known)
     add("whether another place looks the same was not measured");
-  if (c.decided) add("an operator put it into force");
+  if (is_by_operator(c)) add("an operator put it into force");
   return text;
 }
 

@@ -32,7 +32,9 @@ struct Doubt {
 struct Suspicion {
   double value = 0;           // 0: nothing speaks against it; 1: it is wrong as far as the map can tell
   std::vector<Doubt> doubts;  // the heaviest first; those that weigh nothing are left out
-  std::string remark;  // what else to know: what is not known of the closure, or that an operator put it into force
+  // What else to know: what is not known of the closure, or that an operator put it into force and has neither
+  // withdrawn that nor removed it.
+  std::string remark;
 };
 
 // Combines the doubts as independent reasons to be wrong: value = 1 - product of (1 - weight). How each weight follows

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "server/map/testing/ordinary_closure.h"
+
 namespace relmap::map {
 namespace {
 
@@ -12,24 +14,8 @@ using storage::ClosureDigest;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// A closure as most true ones are.
-ClosureDigest ordinary() {
-  ClosureDigest closure;
-  closure.state = storage::EdgeState::kAccepted;
-  closure.reason = Reason::CONSISTENT;
-  closure.verification = storage::Verification::kStereo;
-  closure.inliers = 90;
-  closure.spread = 0.3F;
-  closure.probability = 0.97F;
-  closure.agreeing = 5;
-  closure.uniqueness = {.known = true, .runner_up = {2, 3}, .runner_up_inliers = 12, .runner_up_probability = 0};
-  closure.uniqueness.differs = 0.1F;
-  closure.tests = {0, storage::MotionSays::kAgrees, 0.5F};
-  return closure;
-}
-
 ClosureDigest ordinary_but(void (*change)(ClosureDigest&)) {
-  ClosureDigest closure = ordinary();
+  ClosureDigest closure = ordinary_closure();
   change(closure);
   return closure;
 }
@@ -46,7 +32,7 @@ std::string words_of(const ClosureDigest& closure, DoubtKind kind) {
   return {};
 }
 
-TEST(Suspicion, OfAnOrdinaryClosureIsSmall) { EXPECT_LT(suspicion_value(ordinary()), 0.05); }
+TEST(Suspicion, OfAnOrdinaryClosureIsSmall) { EXPECT_LT(suspicion_value(ordinary_closure()), 0.05); }
 
 TEST(Suspicion, CombinesItsDoubtsAsIndependentOnesAndListsTheHeaviestFirst) {
   const Suspicion found = suspicion_of(ordinary_but([](ClosureDigest& c) {
@@ -89,15 +75,15 @@ TEST(Suspicion, EachFactThatSpeaksAgainstAClosureRaisesIt) {
   };
   for (const auto& fact : facts) {
     const ClosureDigest worse = ordinary_but(fact.worse);
-    EXPECT_GT(weight_of(worse, fact.kind), weight_of(ordinary(), fact.kind)) << fact.says;
-    EXPECT_GT(suspicion_value(worse), suspicion_value(ordinary())) << fact.says;
+    EXPECT_GT(weight_of(worse, fact.kind), weight_of(ordinary_closure(), fact.kind)) << fact.says;
+    EXPECT_GT(suspicion_value(worse), suspicion_value(ordinary_closure())) << fact.says;
     EXPECT_THAT(words_of(worse, fact.kind), HasSubstr(fact.says));
   }
 }
 
 TEST(Suspicion, WeighsWhatPicturesShowLessIfOthersConfirmIt) {
   const auto poor = [](std::uint16_t agreeing) {
-    ClosureDigest closure = ordinary();
+    ClosureDigest closure = ordinary_closure();
     closure.inliers = 25;
     closure.tests = {};
     closure.agreeing = agreeing;
@@ -113,18 +99,19 @@ TEST(Suspicion, FindsWhatLooksGoodButFitsNothing) {
   const ClosureDigest planted = ordinary_but([](ClosureDigest& c) {
     c.agreeing = 0;
     c.tests = {3, storage::MotionSays::kContradicts, 0.5F};
-    c.decided = true;
+    c.reason = Reason::ACCEPTED_BY_OPERATOR;
   });
   EXPECT_GT(suspicion_value(planted), 0.8);
   EXPECT_THAT(suspicion_of(planted).remark, HasSubstr("operator"));
   ClosureDigest undecided = planted;
-  undecided.decided = false;
+  undecided.reason = Reason::CONSISTENT;
   EXPECT_EQ(suspicion_value(undecided), suspicion_value(planted)) << "who put it into force is no fact about it";
+  EXPECT_EQ(suspicion_of(undecided).remark, "");
 }
 
 TEST(Suspicion, OfManyAgainstOneIsTheOnes) {
   const auto opposed = [](std::uint16_t opposing, std::uint16_t agreeing) {
-    ClosureDigest closure = ordinary();
+    ClosureDigest closure = ordinary_closure();
     closure.agreeing = agreeing;
     closure.tests.opposing = opposing;
     return suspicion_value(closure);
@@ -133,7 +120,7 @@ TEST(Suspicion, OfManyAgainstOneIsTheOnes) {
 }
 
 TEST(Suspicion, SaysWhatIsNotKnown) {
-  ClosureDigest imported = ordinary();
+  ClosureDigest imported = ordinary_closure();
   imported.verification = storage::Verification::kImported;
   imported.inliers = 0;
   imported.probability = imported.spread = 0;
@@ -149,7 +136,7 @@ TEST(Suspicion, SaysWhatIsNotKnown) {
   EXPECT_EQ(suspicion_value(bridge), 0);
   EXPECT_THAT(suspicion_of(bridge).remark, HasSubstr("deleted session"));
 
-  ClosureDigest proposed = ordinary();
+  ClosureDigest proposed = ordinary_closure();
   proposed.uniqueness = {};
   EXPECT_THAT(suspicion_of(proposed).remark, HasSubstr("not measured"));
 }

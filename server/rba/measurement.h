@@ -70,13 +70,9 @@ inline Matrix6 edge_to_theta(bool forward, const SE3& T_jx, const SE3& T_jy) {
   return forward ? Matrix6(-T_jy.adjoint()) : T_jx.adjoint();
 }
 
-// Huber's loss of a whitened residual's norm e with the corner at k: rho(e) = e^2 below the corner, 2 k e - k^2 above
-// it. The weight is rho'(e) / (2 e).
-inline double huber_loss(double e, double k) { return e <= k ? e * e : 2 * k * e - k * k; }
-inline double huber_weight(double e, double k) { return e <= k ? 1 : k / e; }
-// The factor between the covariance and the inverse of the weighted normal equations, which overstates it, if
-// residuals are Gaussian in three coordinates: E[psi^2] E[w] / E[psi']^2 per coordinate, with psi = w r (Huber, Robust
-// Statistics, 1981, 7.6).
+// With Huber's loss with the corner at k (proto/linear/huber.h): the factor between the covariance and the inverse of
+// the weighted normal equations, which overstates it, if residuals are Gaussian in three coordinates: E[psi^2] E[w] /
+// E[psi']^2 per coordinate, with psi = w r (Huber, Robust Statistics, 1981, 7.6).
 inline double huber_covariance_factor(double k) {
   const double below = std::erf(k / std::numbers::sqrt2), c = std::sqrt(2 / std::numbers::pi) * std::exp(-k * k / 2);
   const double weight = below;             // P(e < k) + k E[1/e; e > k]

@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "proto/linear/huber.h"
 #include "server/rba/measurement.h"
 
 namespace relmap::rba {

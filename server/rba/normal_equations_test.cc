@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 
+#include "proto/linear/huber.h"
 #include "server/rba/measurement.h"
 #include "server/rba/problem_samples.h"
 

@@ -14,6 +14,7 @@ namespace relmap::rpc {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 map::MapperOptions without_recognition() {
   map::MapperOptions options;
@@ -155,6 +156,27 @@ TEST_F(EvidenceHandlers, AWrongClosureIsContradicted) {
   EXPECT_THAT(reply.edge().suspicion().remark(), HasSubstr("operator"));
   EXPECT_NE(reply.correspondences_reason(), v1::REASON_OK) << "the pictures show two places";
   EXPECT_NE(reply.correspondences_message(), "");
+
+  set(planted.id(), v1::EDGE_STATE_CANDIDATE);
+  const v1::Edge withdrawn = explain(planted.id()).or_throw().edge();
+  EXPECT_NE(withdrawn.state(), v1::EDGE_STATE_ACCEPTED);
+  EXPECT_THAT(withdrawn.suspicion().remark(), Not(HasSubstr("operator"))) << "he has withdrawn it";
+  EXPECT_TRUE(has(withdrawn.suspicion(), v1::DOUBT_KIND_CONTRADICTION));
+}
+
+TEST_F(EvidenceHandlers, TheVerdictOfTheMotionIsOfNowAndTheDoubtsAreOfWhenTheClosureWasJudged) {
+  const v1::Edge judged = propose(kBefore, kAgain);
+  ASSERT_EQ(explain(judged.id())->motion().verdict(), v1::REASON_OK);
+  // Two metres off, and put into force all the same: the way between the ends goes through it from now on.
+  SE3 off = truth({1, 6}, {1, 43});
+  off.t.x() += 2;
+  const v1::Edge planted = record({1, 6}, {1, 43}, off, storage::Verification::kStereo);
+  ASSERT_EQ(set(planted.id(), v1::EDGE_STATE_ACCEPTED, /*decided=*/true).state(), v1::EDGE_STATE_ACCEPTED);
+  const auto now = explain(judged.id()).or_throw();
+  EXPECT_EQ(now.motion().verdict(), v1::REASON_CONTRADICTS_MOTION) << now.motion().message();
+  EXPECT_GT(now.motion().metres_apart(), 1);
+  for (const v1::Doubt& doubt : now.edge().suspicion().doubts())
+    EXPECT_THAT(doubt.message(), Not(HasSubstr("own motion contradicts it"))) << "it did not then";
 }
 
 TEST_F(EvidenceHandlers, SaysWhyThereAreNoCorrespondences) {

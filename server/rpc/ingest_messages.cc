@@ -1,5 +1,6 @@
 #include "server/rpc/ingest_messages.h"
 
+#include "proto/keyframe/refusal_text.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 
@@ -35,6 +36,7 @@ v1::Acknowledgement acknowledgement_message(const Acknowledgement& ack) {
     added.set_sequence(refused.sequence);
     added.set_crc32c(refused.payload_crc);
     added.set_reason(to_wire(refused.reason));
+    added.set_message(std::string(refusal_text(refused.reason)));
   }
   message.set_credits(ack.credits);
   message.set_session(ack.number);

@@ -135,6 +135,9 @@ std::uint8_t flags_of(Bits... bits) {
   return byte;
 }
 
+// Of a closure. Maps of earlier builds have it set where an operator ever accepted the closure; it is passed over.
+constexpr bool kUnusedFlag = false;
+
 void put_uniqueness(ByteWriter& w, const Uniqueness& u, FrameId near) {
   varint::put(w, u.runner_up, near);
   put_unsigned(w, u.runner_up_inliers);
@@ -171,7 +174,7 @@ void get_tests(ByteReader& r, ClosureTests& tests) {
 void put_closure(ByteWriter& w, FrameId id, const ClosureDigest& c) {
   const bool tested = c.tests != ClosureTests();
   w.put(static_cast<std::uint8_t>(
-      flags_of(c.carries, c.was_contradicted, c.decided, c.carried, c.uniqueness.known, tested) |
+      flags_of(c.carries, c.was_contradicted, kUnusedFlag, c.carried, c.uniqueness.known, tested) |
       static_cast<std::uint8_t>(c.kind) << 6));
   w.put(static_cast<std::uint8_t>(static_cast<std::uint8_t>(c.state) | (c.looks_alike ? 8 : 0) |
                                   static_cast<std::uint8_t>(c.verification) << 4));
@@ -197,7 +200,6 @@ bool get_closure(ByteReader& r, FrameId id, ClosureDigest& c) {
   const auto flags = r.get<std::uint8_t>(), states = r.get<std::uint8_t>();
   c.carries = flags & 1;
   c.was_contradicted = flags & 2;
-  c.decided = flags & 4;
   c.carried = flags & 8;
   c.kind = static_cast<EdgeKind>(flags >> 6);
   c.state = static_cast<EdgeState>(states & 7);
@@ -293,8 +295,8 @@ bool agree(const ClosureDigest& a, const ClosureDigest& b) {
          a.support == b.support && near(a.probability, b.probability, kEvidence) &&
          near(a.spread, b.spread, kEvidence) && a.agreeing == b.agreeing && a.unseen == b.unseen &&
          (near(a.tension, b.tension, kTension) || std::max(a.tension, b.tension) < kNoTension) &&
-         a.was_contradicted == b.was_contradicted && a.looks_alike == b.looks_alike && a.decided == b.decided &&
-         a.carried == b.carried && agree(a.uniqueness, b.uniqueness) && a.tests.opposing == b.tests.opposing &&
+         a.was_contradicted == b.was_contradicted && a.looks_alike == b.looks_alike && a.carried == b.carried &&
+         agree(a.uniqueness, b.uniqueness) && a.tests.opposing == b.tests.opposing &&
          a.tests.motion == b.tests.motion && near(a.tests.motion_sigma, b.tests.motion_sigma, kEvidence);
 }
 

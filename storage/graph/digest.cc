@@ -43,7 +43,6 @@ float tension_of(const Edge& closure) {
 
 ClosureDigest digest_of(const Edge& closure) {
   const auto contradicted = [](const EdgeEvent& event) { return is_contradiction(event.reason); };
-  const auto by_operator = [](const EdgeEvent& event) { return event.reason == Reason::ACCEPTED_BY_OPERATOR; };
   return {
       .id = closure.id,
       .a = closure.a,
@@ -65,7 +64,6 @@ ClosureDigest digest_of(const Edge& closure) {
       .tension = tension_of(closure),
       .was_contradicted = std::any_of(closure.history.begin(), closure.history.end(), contradicted),
       .looks_alike = last_verdict(closure) == Reason::LOOKS_ALIKE,
-      .decided = std::any_of(closure.history.begin(), closure.history.end(), by_operator),
       .carried = closure.carried.session != 0,
       .uniqueness = closure.uniqueness,
       .tests = closure.tests,

@@ -32,7 +32,6 @@ struct ClosureDigest {
   float tension = 0;              // standard deviations between what was measured and the estimate; see tension_of()
   bool was_contradicted = false;  // it was outvoted, or contradicted the robot's motion, at some time
   bool looks_alike = false;       // the daemon refused it last because two places look alike (LOOKS_ALIKE)
-  bool decided = false;           // an operator accepted it
   bool carried = false;           // it says that the robot was carried
   Uniqueness uniqueness = {};
   ClosureTests tests = {};

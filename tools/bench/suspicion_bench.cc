@@ -302,16 +302,15 @@ void list(const std::vector<Suspect>& ranked, std::uint64_t seed) {
                            : "true",
                  s.edge.id.to_string().c_str(), std::string(reason_name(s.edge.reason)).c_str());
     const storage::ClosureDigest d = storage::digest_of(s.edge);
-    std::fprintf(
-        stderr,
-        " state=%d agreeing=%u opposing=%u motion=%d sigma=%.2f carried=%d once=%d decided=%d tension=%.2f unseen=%u "
-        "inliers=%u spread=%.2f p=%.3f known=%d rival=%u differs=%.2f changed=%u/%u verified=%d;",
-        static_cast<int>(d.state), d.agreeing, d.tests.opposing, static_cast<int>(d.tests.motion),
-        static_cast<double>(d.tests.motion_sigma), d.carried, d.was_contradicted, d.decided,
-        static_cast<double>(d.tension), d.unseen, d.inliers, static_cast<double>(d.spread),
-        static_cast<double>(d.probability), d.uniqueness.known, d.uniqueness.runner_up_inliers,
-        static_cast<double>(d.uniqueness.differs), d.uniqueness.changed, d.uniqueness.compared,
-        static_cast<int>(d.verification));
+    std::fprintf(stderr,
+                 " state=%d agreeing=%u opposing=%u motion=%d sigma=%.2f carried=%d once=%d tension=%.2f unseen=%u "
+                 "inliers=%u spread=%.2f p=%.3f known=%d rival=%u differs=%.2f changed=%u/%u verified=%d;",
+                 static_cast<int>(d.state), d.agreeing, d.tests.opposing, static_cast<int>(d.tests.motion),
+                 static_cast<double>(d.tests.motion_sigma), d.carried, d.was_contradicted,
+                 static_cast<double>(d.tension), d.unseen, d.inliers, static_cast<double>(d.spread),
+                 static_cast<double>(d.probability), d.uniqueness.known, d.uniqueness.runner_up_inliers,
+                 static_cast<double>(d.uniqueness.differs), d.uniqueness.changed, d.uniqueness.compared,
+                 static_cast<int>(d.verification));
     for (const map::Doubt& doubt : told.doubts) std::fprintf(stderr, " [%.2f %s]", doubt.weight, doubt.message.c_str());
     std::fprintf(stderr, "\n");
   }

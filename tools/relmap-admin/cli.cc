@@ -118,7 +118,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err,
   answer.json.add("reason", reason_name(answer.status.reason())).add("message", answer.status.message());
   console.reply(answer.json.text());
   out.flush();
-  if (!answer.status.ok()) err << answer.status.to_string() << '\n';
+  console.report(answer.status);
   if (const std::string advice = terminal::advice_on({answer.status.reason()}); !advice.empty() && !console.json)
     err << advice << '\n';
   return exit_code(answer);

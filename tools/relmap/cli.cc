@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "client/server_address.h"
+#include "proto/base/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/terminal/advice.h"
 #include "tools/terminal/command_line.h"
@@ -19,7 +20,8 @@ constexpr char kFooter[] = R"(
 /run/relmap where relmapd runs as a service.
 --credentials names the file that proves who asks; its default is $RELMAP_CREDENTIALS, and a folder needs none.
 A frame is written session:index, as 3:120; an edge session:index/ordinal, as 3:120/1.
-Data goes to stdout, everything else to stderr.
+Data goes to stdout, everything else to stderr. With --json a command that fails also prints, as its last document,
+{"error": {"reason": "NEW_PLACE", "message": "..."}}; of recordings that fail, ingest says it in its report.
 
 Exit codes:
   0  done
@@ -61,6 +63,13 @@ struct GlobalOptions {
   double deadline_s = 60;
   bool json = false;
 };
+
+// That something is refused is an answer, too.
+std::string error_json(const Status& status) {
+  return Json()
+      .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
+      .text();
+}
 
 void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.footer(kFooter);
@@ -124,11 +133,12 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   const auto client = stopped ? Status(Reason::UNREACHABLE, "relmapd does not run (systemctl status relmapd)")
                               : client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();
-  if (!status.ok()) err << status.to_string() << '\n';
+  if (!status.ok() && !console.outcome_told) console.reply(error_json(status));
+  console.report(status);
   if (!console.json && app.got_subcommand("status"))
     if (const std::string advice = terminal::advice_on({status.reason()}); !advice.empty()) err << advice << '\n';
   if (!out.flush()) {
-    err << Status(Reason::IO_ERROR, "the answer cannot be written (is the disk full?)").to_string() << '\n';
+    console.report({Reason::IO_ERROR, "the answer cannot be written (is the disk full?)"});
     if (status.ok()) return kNegativeAnswer;
   }
   if (!client.ok() && status.reason() == Reason::INVALID_ARGUMENT) return kUsage;

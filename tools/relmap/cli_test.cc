@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <initializer_list>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 #include "storage/testing/temporary_folder.h"
@@ -107,12 +109,70 @@ TEST(Cli, WrongUsageIsToldApart) {
   }
 }
 
+// Whoever mistypes an id is told so at once: no daemon is needed, and none is asked.
+TEST(Cli, AMalformedIdIsWrongUsage) {
+  using Words = std::vector<const char*>;
+  const std::vector<std::pair<Words, const char*>> cases{
+      {{"frame", "abc"}, "ID: 'abc' is no frame; a frame is written session:index, as 3:120\n"},
+      {{"transform", "1:2", "3"}, "B: '3' is no frame"},
+      {{"localise", "p.png", "--near", "1:"}, "--near: '1:' is no frame"},
+      {{"match", "p.png", "--near", "x"}, "--near: 'x' is no frame"},
+      {{"edges", "--explain", "6:x"}, "--explain: '6:x' is no edge; an edge is written session:index/ordinal"},
+      {{"edges", "--frame", "6"}, "--frame: '6' is no frame"},
+      {{"edges", "--near", "6"}, "--near: '6' is no frame"},
+      {{"edges", "--since", "yesterday"}, "--since: 'yesterday' is no time"},
+      {{"edges", "--until", "12"}, "--until: '12' is no time"},
+      {{"edge", "remove", "3:4"}, "ID: '3:4' is no edge"},
+      {{"edge", "restore", "3:4"}, "ID: '3:4' is no edge"},
+      {{"edge", "accept", "3:4"}, "ID: '3:4' is no edge"},
+      {{"edge", "withdraw", "3:4"}, "ID: '3:4' is no edge"},
+      {{"edge", "propose", "3:4", "here"}, "B: 'here' is no frame"},
+      {{"export", "--root", "1"}, "--root: '1' is no frame"},
+      {{"route", "--from", "1:0", "--to", "dock", "--weigh", "metre=1,mile=2"}, "--weigh: 'mile=2' is no weight"},
+  };
+  for (const auto& [words, said] : cases) {
+    std::vector<const char*> argv = {"relmap", "--server", RELMAP_SOURCE_DIR};
+    argv.insert(argv.end(), words.begin(), words.end());
+    std::ostringstream out, err;
+    EXPECT_EQ(run(static_cast<int>(argv.size()), argv.data(), out, err), kUsage) << said;
+    EXPECT_TRUE(err.str().starts_with(said)) << err.str();
+    EXPECT_EQ(out.str(), "");
+  }
+  EXPECT_EQ(run_with({"--server", RELMAP_SOURCE_DIR, "frame", "3:120"}).code, kUnreachable);
+  EXPECT_EQ(run_with({"--server", RELMAP_SOURCE_DIR, "edges", "--explain", "6:1/2"}).code, kUnreachable);
+  EXPECT_EQ(run_with({"--server", RELMAP_SOURCE_DIR, "edges", "--since", "2h"}).code, kUnreachable);
+}
+
+TEST(Cli, WithJsonEveryCommandTellsItsFailureAsADocument) {
+  for (const char* command : {"status", "sessions", "labels", "edges", "wait", "watch"}) {
+    const Ran ran = run_with({"--server", RELMAP_SOURCE_DIR, "--json", command});
+    EXPECT_EQ(ran.code, kUnreachable) << command;
+    EXPECT_TRUE(ran.out.starts_with(R"({"error":{"reason":"UNREACHABLE","message":")")) << command << ran.out;
+    EXPECT_EQ(std::count(ran.out.begin(), ran.out.end(), '\n'), 1) << ran.out;
+    EXPECT_TRUE(ran.err.starts_with("UNREACHABLE: ")) << ran.err;
+  }
+}
+
+TEST(Cli, WatchSaysWhatTheLogHasNot) {
+  const Ran ran = run_with({"watch", "--help"});
+  EXPECT_NE(ran.out.find("Robots and the disk are not in this log"), std::string::npos) << ran.out;
+  EXPECT_NE(ran.out.find("--from oldest, --resume and --state bring back none of them"), std::string::npos) << ran.out;
+}
+
 TEST(Cli, AWordInPlaceOfANumberIsReported) {
   const Ran word = run_with({"--server", "/tmp", "edge", "remove", "1:2/3", "--shown", "x"});
   EXPECT_EQ(word.code, kUsage);
   EXPECT_TRUE(word.err.starts_with("--shown: 'x' is not a number\n")) << word.err;
   const Ran outside = run_with({"--server", "/tmp", "ingest", "drive", "--patience", "-1"});
-  EXPECT_NE(outside.err.find("--patience: Value -1 not in range"), std::string::npos) << outside.err;
+  EXPECT_TRUE(outside.err.starts_with("--patience: Value -1 not in range 0 to 86400\n")) << outside.err;
+}
+
+TEST(Cli, ANumberWithoutAnUpperBoundIsNotRefusedWithHundredsOfDigits) {
+  const Ran none = run_with({"--server", "/tmp", "edges", "--limit", "0"});
+  EXPECT_EQ(none.code, kUsage);
+  EXPECT_EQ(none.err, "--limit: Value 0 must be greater than 0\nRun relmap edges --help for more information.\n");
+  const Ran negative = run_with({"--server", "/tmp", "route", "--from", "1:0", "--to", "dock", "--max-cost", "-0.5"});
+  EXPECT_TRUE(negative.err.starts_with("--max-cost: Value -0.5 must not be negative\n")) << negative.err;
 }
 
 TEST(Cli, SaysThatNoDaemonAnswers) {
@@ -193,6 +253,9 @@ TEST(PictureFile, WhatIsNoPictureIsNamed) {
   EXPECT_EQ(pixel_size(std::string("\xff\xd8\xff\xe0\0\0\0\0\0\0", 10)).reason(), Reason::PICTURE_DAMAGED);
   EXPECT_EQ(pixel_size("\x89PNG\r\n\x1a\n").reason(), Reason::PICTURE_DAMAGED);
   EXPECT_EQ(read_picture_file("/no/such.png").reason(), Reason::NO_SUCH_FILE);
+  const storage::TemporaryFolder folder;
+  EXPECT_EQ(read_picture_file(folder / "").status().to_string(),
+            "NOT_A_PICTURE: " + (folder / "") + " is a folder; give one of the pictures in it, a JPEG or PNG file");
 }
 
 }  // namespace

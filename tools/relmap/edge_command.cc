@@ -7,6 +7,7 @@
 
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 #include "tools/terminal/console.h"
 
@@ -161,7 +162,7 @@ Status remove(const EditOptions& options, client::Client& client, terminal::Cons
 void add_remove(CLI::App& edge, Action& action) {
   auto* command = edge.add_subcommand("remove", "take a closure out of the map, with the closures that agree with it");
   auto options = std::make_shared<EditOptions>();
-  command->add_option("ID", options->id, "session:index/ordinal")->required();
+  command->add_option("ID", options->id, "session:index/ordinal")->required()->check(parsed_by(edge_id));
   auto* const only_this = command->add_flag("--only-this", options->only_this,
                                             "remove this one alone: those that agree with it stay in force");
   auto* const yes = command->add_flag("--yes", options->yes, "do not ask: remove whatever agrees with it by now")
@@ -204,7 +205,7 @@ std::string undo_of(const Verb& verb, const client::EdgeEdit& edit) {
 void add_verb(CLI::App& edge, const Verb& verb, Action& action) {
   auto* command = edge.add_subcommand(verb.name, verb.help);
   auto options = std::make_shared<EditOptions>();
-  command->add_option("ID", options->id, "session:index/ordinal")->required();
+  command->add_option("ID", options->id, "session:index/ordinal")->required()->check(parsed_by(edge_id));
   add_how(*command, options->how);
   command->footer(std::string("Examples:\n  relmap edge ") + verb.name + " 3:120/1 --dry-run\n  relmap edge " +
                   verb.name + " 3:120/1 --note 'I was there'");
@@ -224,8 +225,8 @@ void add_propose(CLI::App& edge, Action& action) {
   auto* command =
       edge.add_subcommand("propose", "try to match two frames by geometry, and enter the closure that is found");
   auto options = std::make_shared<EditOptions>();
-  command->add_option("A", options->a, "frame, session:index")->required();
-  command->add_option("B", options->b, "another frame, at the same place")->required();
+  command->add_option("A", options->a, "frame, session:index")->required()->check(parsed_by(parse_frame));
+  command->add_option("B", options->b, "another frame, at the same place")->required()->check(parsed_by(parse_frame));
   command->add_flag("--accept", options->accept, "put the closure into force at once");
   add_how(*command, options->how);
   command->footer(

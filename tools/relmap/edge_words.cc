@@ -155,6 +155,26 @@ std::string no_points_text(const Status& missing) {
          (missing.message().empty() ? "" : ", " + missing.message());
 }
 
+bool was_verified(const client::Edge& edge) {
+  using Kind = client::Verification;
+  return edge.verification != Kind::kNone && edge.verification != Kind::kImported &&
+         edge.verification != Kind::kCompounded;
+}
+
+std::string verification_text(const client::Edge& edge, const std::string& session) {
+  switch (edge.verification) {
+    case client::Verification::kNone:
+      return "not verified";
+    case client::Verification::kImported:
+      return "imported with " + session + "; not verified here";
+    case client::Verification::kCompounded:
+      return "made of the edges through a session that was deleted; not verified itself";
+    default:
+      return "verified by " + std::string(name_of(edge.verification)) + ": " + counted_text(edge.inliers, "inlier") +
+             " over " + fixed(100 * edge.spread, 0) + " % of the picture";
+  }
+}
+
 std::string uniqueness_text(const client::Uniqueness& found) {
   std::string text = !found.runner_up ? "geometry confirms no other place"
                                       : "the best of the other places is " + found.runner_up->to_string() + ": " +

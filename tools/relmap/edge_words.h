@@ -39,6 +39,13 @@ std::string agreements_text(const client::EdgeExplanation& explained);
 // Why there are no points that both pictures show.
 std::string no_points_text(const Status& missing);
 
+// Whether geometry confirmed a closure here: "verified by pnp: 60 inliers over 40 % of the picture", or why nothing
+// says so: "imported with session 3, kitti_00.g2o; not verified here". `session`: that of the closure, as
+// session_words() names it.
+std::string verification_text(const client::Edge& edge, const std::string& session);
+// Whether pictures of the ends were compared, so that the closure has inliers and a probability.
+bool was_verified(const client::Edge& edge);
+
 // How clearly the recognised place stands out from other places.
 std::string uniqueness_text(const client::Uniqueness& uniqueness);
 

@@ -14,6 +14,7 @@
 #include "tools/relmap/pairs.h"
 #include "tools/relmap/picture_output.h"
 #include "tools/relmap/time_option.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -42,8 +43,10 @@ void print(const std::vector<client::Edge>& edges, terminal::Console& console) {
     rows.push_back({e.id.to_string(), e.a.to_string(), e.b.to_string(), name_of(e.kind), name_of(e.state),
                     std::string(reason_name(e.reason)), e.carries ? "edge" : "binds", fixed(e.T_ab.t.norm(), 2),
                     std::to_string(e.support) + (e.prior_active ? " +prior" : ""),
-                    loop ? std::to_string(e.inliers) : "", loop ? std::to_string(e.bound) : "",
-                    loop ? fixed(e.probability, 3) : ""});
+                    was_verified(e) ? std::to_string(e.inliers)
+                    : loop          ? name_of(e.verification)
+                                    : "",
+                    loop ? std::to_string(e.bound) : "", was_verified(e) ? fixed(e.probability, 3) : ""});
     if (!judged) continue;
     rows.back().push_back(e.suspicion ? fixed(e.suspicion->value, 2) : "");
     const auto doubts = e.suspicion ? doubts_of(*e.suspicion) : std::vector<client::Doubt>();
@@ -171,16 +174,21 @@ void add_edges(CLI::App& app, Action& action) {
   list(command->add_option("--session", options->sessions,
                            "only edges with an end in this session; A,B: only those between these two"))
       ->type_name("SESSION");
-  list(command->add_option("--frame", options->frame, "only edges with this frame as an end"))->type_name("FRAME");
+  list(command->add_option("--frame", options->frame, "only edges with this frame as an end"))
+      ->type_name("FRAME")
+      ->check(parsed_by(parse_frame));
   auto* const near =
       list(command->add_option("--near", options->near, "only edges with an end near this frame: within 30 edges"))
-          ->type_name("FRAME");
+          ->type_name("FRAME")
+          ->check(parsed_by(parse_frame));
   list(command->add_option("--within", options->within, "with --near: within so many metres along edges instead"))
       ->check(CLI::PositiveNumber)
       ->needs(near);
+  const auto is_time = parsed_by([](const std::string& text) { return parse_time(text, now_us()); });
   list(command->add_option("--since", options->since, "only edges whose newer end was taken at this time or later"))
-      ->type_name("TIME");
-  list(command->add_option("--until", options->until, "... and before this time"))->type_name("TIME");
+      ->type_name("TIME")
+      ->check(is_time);
+  list(command->add_option("--until", options->until, "... and before this time"))->type_name("TIME")->check(is_time);
   auto* const suspicion =
       list(command->add_flag("--suspicion", options->suspicion, "loop closures, the most suspicious first"));
   list(
@@ -198,7 +206,8 @@ void add_edges(CLI::App& app, Action& action) {
       command
           ->add_option("--explain", options->explain,
                        "show what speaks for and against one edge (session:index/ordinal), and its history")
-          ->type_name("EDGE");
+          ->type_name("EDGE")
+          ->check(parsed_by(edge_id));
   for (CLI::Option* const option : lists) explain->excludes(option);
   command
       ->add_option(

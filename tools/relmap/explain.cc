@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/pair_picture.h"
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/degrees.h"
 #include "tools/relmap/edge_words.h"
@@ -29,10 +30,10 @@ Result<client::Edge> find_edge(client::Client& client, EdgeId id) {
 void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::ostream& out) {
   out << "record " << event.journal_sequence;
   if (event.time_us != 0) out << ", " << time_text(event.time_us);
-  if (!event.author.empty()) out << ", by " << event.author;
+  if (!event.author.empty()) out << ", by " << visible_text(event.author);
   out << ": " << name_of(event.state) << ", " << reason_name(event.reason) << " (" << explanation(event.reason) << ')';
   if (event.cause != edge.id) out << ", by " << event.cause.to_string();
-  if (!event.note.empty()) out << ": " << event.note;
+  if (!event.note.empty()) out << ": " << visible_text(event.note);
   out << '\n';
 }
 
@@ -55,10 +56,10 @@ void print_edge(const client::Edge& edge, std::ostream& out) {
     out << "  carried   the robot was carried along it, according to" << ids_text(edge.carried_by, kMaxListed) << '\n';
 }
 
-void print_evidence(const client::Edge& edge, std::ostream& out) {
-  out << "  evidence  verified by " << name_of(edge.verification) << ": " << edge.inliers << " inliers over "
-      << fixed(100 * edge.spread, 0) << " % of the picture; place with probability " << fixed(edge.probability, 3)
-      << "; binds " << edge.bound << '\n';
+void print_evidence(const client::Edge& edge, const SessionsByNumber& sessions, std::ostream& out) {
+  out << "  evidence  " << verification_text(edge, session_words(sessions, edge.id.frame.session));
+  if (was_verified(edge)) out << "; place with probability " << fixed(edge.probability, 3);
+  out << "; binds " << edge.bound << '\n';
   if (edge.uniqueness) out << "  unique    " << uniqueness_text(*edge.uniqueness) << '\n';
 }
 
@@ -68,7 +69,7 @@ void print_suspicion(const client::Edge& edge, std::ostream& out) {
   out << "  suspicion " << fixed(edge.suspicion->value, 2) << " of 1"
       << (doubts.empty() ? ": nothing speaks against it" : "") << '\n';
   for (const client::Doubt& doubt : doubts) out << "    " << doubt_text(doubt) << '\n';
-  if (!edge.suspicion->remark.empty()) out << "    " << edge.suspicion->remark << '\n';
+  if (!edge.suspicion->remark.empty()) out << "    " << visible_text(edge.suspicion->remark) << '\n';
 }
 
 void print_points(const client::EdgeExplanation& explained, std::ostream& out) {
@@ -106,9 +107,9 @@ void print_history(const client::Edge& edge, std::ostream& out) {
   }
 }
 
-void print(const client::EdgeExplanation& explained, std::ostream& out) {
+void print(const client::EdgeExplanation& explained, const SessionsByNumber& sessions, std::ostream& out) {
   print_edge(explained.edge, out);
-  print_evidence(explained.edge, out);
+  print_evidence(explained.edge, sessions, out);
   print_suspicion(explained.edge, out);
   print_points(explained, out);
   out << "  motion    " << verdict_text(explained.motion) << '\n';
@@ -117,10 +118,11 @@ void print(const client::EdgeExplanation& explained, std::ostream& out) {
 }
 
 // Of a daemon that does not explain closures: what the list of edges says.
-void print_listed(const client::Edge& edge, client::Client& client, std::ostream& out) {
+void print_listed(const client::Edge& edge, const SessionsByNumber& sessions, client::Client& client,
+                  std::ostream& out) {
   print_edge(edge, out);
   if (edge.kind != client::EdgeKind::kLoop) return;
-  print_evidence(edge, out);
+  print_evidence(edge, sessions, out);
   std::map<std::string, std::vector<EdgeId>> agreeing;  // by state
   for (const EdgeId other : edge.consistent_with) {
     const auto found = find_edge(client, other);
@@ -151,16 +153,18 @@ Status explain_edge(const std::string& text, const std::string& out, client::Cli
   if (!out.empty())
     if (Status status = write_pair(*id, out, client, console); !status.ok()) return status;
   const auto explained = client.explain_edge(*id);
-  if (explained.ok()) {
-    if (!console.json) print(*explained, console.out());
-    return {};
-  }
   // Of the robot's own motion there is less to tell, and of closures if the daemon is an older one.
-  if (explained.reason() != Reason::ODOMETRY_EDGE && explained.reason() != Reason::UNIMPLEMENTED)
+  if (!explained.ok() && explained.reason() != Reason::ODOMETRY_EDGE && explained.reason() != Reason::UNIMPLEMENTED)
     return explained.status();
-  const auto edge = find_edge(client, *id);
+  const auto edge = explained.ok() ? Result<client::Edge>(explained->edge) : find_edge(client, *id);
   if (!edge.ok()) return edge.status();
-  if (!console.json) print_listed(*edge, client, console.out());
+  if (console.json) return {};
+  const auto sessions = read_sessions(client, console);
+  if (!sessions.ok()) return sessions.status();
+  if (explained.ok())
+    print(*explained, *sessions, console.out());
+  else
+    print_listed(*edge, *sessions, client, console.out());
   return {};
 }
 

@@ -10,6 +10,7 @@
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
 #include "tools/relmap/output_files.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -153,7 +154,7 @@ Result<Landmarks> place_landmarks(const RelaxedMap& map, std::size_t parts, cons
     const auto part = part_of.find(frame.id);  // absent: the frame came after the graph was read
     if (part == part_of.end() || frame.landmarks.empty()) return {};
     const SE3& T_root_frame = *map.parts[part->second].find(frame.id);
-    const StereoCamera& camera = map.graph.cameras.at(frame.id.session);
+    const StereoCamera& camera = map.graph.chosen.sessions.at(frame.id.session).camera;
     const double farthest = camera.f * camera.baseline / kMinDisparity;
     std::string lines;
     for (const client::ExportedFrame::Landmark& landmark : frame.landmarks) {
@@ -163,14 +164,14 @@ Result<Landmarks> place_landmarks(const RelaxedMap& map, std::size_t parts, cons
     }
     return landmarks.lines[part->second].append(lines);
   };
-  if (Status status = client.export_frames(map.graph.sessions(), true, take); !status.ok()) return status;
+  if (Status status = client.export_frames(map.graph.chosen.numbers(), true, take); !status.ok()) return status;
   return landmarks;
 }
 
 Result<FrameTimes> read_times(const RelaxedMap& map, client::Client& client) {
   FrameTimes times;
   const Status status =
-      client.export_frames(map.graph.sessions(), false, [&](const client::ExportedFrame& frame) -> Status {
+      client.export_frames(map.graph.chosen.numbers(), false, [&](const client::ExportedFrame& frame) -> Status {
         times.emplace(frame.id, frame.time_us);
         return {};
       });
@@ -191,7 +192,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
   if (!begun.ok()) return begun.status();
   auto graph = read_map_graph(options.sessions, client, console);
   if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return nothing_to_place(graph->mono_sessions, "export", "exported");
+  if (graph->frames.empty()) return nothing_to_place(graph->chosen.mono_sessions, "export", "exported");
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
   const auto map = relax_map(std::move(graph).value(), *labels, root);
@@ -254,7 +255,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
     }
     report.add(told);
   }
-  if (map->graph.mono_sessions > 0) report.advise(not_placed_text(map->graph.mono_sessions, "exported"));
+  if (map->graph.chosen.mono_sessions > 0) report.advise(not_placed_text(map->graph.chosen.mono_sessions, "exported"));
   if (map->parts.size() > 1) {
     report.advise("The parts are not connected: how they lie to each other is not known.");
     if (written == 1) report.advise("--out FILE writes each part to a file of its own; --root FRAME chooses one.");
@@ -352,7 +353,8 @@ void add_export(CLI::App& app, Action& action) {
   auto* root = command
                    ->add_option("--root", options->root,
                                 "a frame, as 3:120: its part comes first, in the coordinates of this frame")
-                   ->type_name("FRAME");
+                   ->type_name("FRAME")
+                   ->check(parsed_by(parse_frame));
   auto* chain =
       command->add_flag("--chain", options->chain,
                         "for tum and kitti: write each session's odometry edges, as the map has refined them, chained "

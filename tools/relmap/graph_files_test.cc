@@ -35,7 +35,8 @@ client::Edge edge(FrameId a, FrameId b, const Vector3& t, double turn, client::E
 // wrong.
 MapGraph square(double off) {
   MapGraph graph;
-  graph.names = {{1, "round \"the\" square"}, {4, "alone"}};
+  graph.chosen.sessions[1].name = "round \"the\" square";
+  graph.chosen.sessions[4].name = "alone";
   for (std::uint32_t i = 0; i < 5; ++i) graph.frames.insert({1, i});
   graph.frames.insert({4, 7});
   for (std::uint32_t i = 0; i < 4; ++i)
@@ -186,7 +187,7 @@ TEST(GraphFiles, TearsAndGuessesAreListedInEachFormatWithComments) {
 
 TEST(GraphFiles, ASessionsNameCannotBreakALine) {
   MapGraph graph = square(0);
-  graph.names[1] = "two\nlines\r";
+  graph.chosen.sessions[1].name = "two\nlines\r";
   const RelaxedMap map = relax_map(std::move(graph), {}).or_throw();
   EXPECT_THAT(tum(map, 0), HasSubstr("# root 1:0 (two lines )"));
   EXPECT_THAT(geojson(map, 0), HasSubstr("two\\nlines"));

@@ -250,12 +250,11 @@ Status ingest(const IngestOptions& options, client::Client& client, terminal::Co
     batch::BatchProgress progress(console.err(), terminal::is_terminal());
     work.run(terminal::interrupted, [&](const auto& tasks) { progress.show(tasks); });
   }
-  if (!work.not_kept().ok()) console.err() << work.not_kept().to_string() << '\n';
+  console.report(work.not_kept());
   const MapNow map = map_at_rest(client, patience_with_daemon(work.tasks(), how), console);
   const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
   auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops, map.doubts);
-  if (const Status kept = batch::keep_doubts({how.summaries, how.map}, map.boot, rows); !kept.ok())
-    console.err() << kept.to_string() << '\n';
+  console.report(batch::keep_doubts({how.summaries, how.map}, map.boot, rows));
   print(rows, wall_s, console);
   if (again)
     for (const batch::Task& task : work.tasks())
@@ -263,7 +262,10 @@ Status ingest(const IngestOptions& options, client::Client& client, terminal::Co
           reason == Reason::SEQUENCE_CONFLICT || reason == Reason::SESSION_DELETED)
         if (Status status = again->forget(task.sequence); !status.ok()) return status;
   if (terminal::interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
-  if (Status failure = failure_of(work.tasks(), how.recordings.again); !failure.ok()) return failure;
+  if (Status failure = failure_of(work.tasks(), how.recordings.again); !failure.ok()) {
+    console.outcome_told = true;
+    return failure;
+  }
   if (again) again->done();
   console.incomplete = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.lost() > 0; });
   console.untrusted = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.untrusted(); });
@@ -331,7 +333,7 @@ void add_ingest(CLI::App& app, Action& action) {
       "  relmap ingest keyframes.bin                    # robot and session as recorded in the file\n"
       "  relmap ingest --mono photos/ --robot phone     # a session for each camera; subfolders are passed over\n"
       "  relmap ingest --deterministic drive-1 drive-2  # the same map every time; needs relmapd --deterministic\n"
-      "  relmap --json ingest drive/ | jq '.sequences[] | select(.error)'\n"
+      "  relmap --json ingest drive/ | jq '.sequences[]? | select(.error)'\n"
       "\n"
       "Exit codes:\n"
       "  0  all recordings are in the map\n"

@@ -4,6 +4,7 @@
 
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -39,7 +40,7 @@ void print(const client::Frame& f, terminal::Console& console) {
 void add_frame(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("frame", "show one frame: its edges, labels and counts");
   auto id = std::make_shared<std::string>();
-  command->add_option("ID", *id, "session:index")->required();
+  command->add_option("ID", *id, "session:index")->required()->check(parsed_by(parse_frame));
   command->footer(
       "Example:\n  relmap frame 3:120\n"
       "\"robot's odometry\" is the pose that the robot sent, in its own odometry frame. The map never changes it; "
@@ -60,8 +61,8 @@ void add_frame(CLI::App& app, Action& action) {
 void add_transform(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("transform", "compute the pose of frame B in frame A");
   auto ids = std::make_shared<std::pair<std::string, std::string>>();
-  command->add_option("A", ids->first, "session:index")->required();
-  command->add_option("B", ids->second, "session:index")->required();
+  command->add_option("A", ids->first, "session:index")->required()->check(parsed_by(parse_frame));
+  command->add_option("B", ids->second, "session:index")->required()->check(parsed_by(parse_frame));
   command->footer("Example:\n  relmap transform 1:20 3:120");
   command->callback([&action, ids] {
     action = [ids](client::Client& client, terminal::Console& console) -> Status {

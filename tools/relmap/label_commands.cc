@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
 
@@ -68,7 +69,7 @@ Status label(const LabelOptions& options, client::Client& client, terminal::Cons
   if (!labels.ok()) return labels.status();
   if (console.json) return {};
   console.out() << frame->to_string() << ':';
-  for (const std::string& text : *labels) console.out() << ' ' << text;
+  for (const std::string& text : *labels) console.out() << ' ' << visible_text(text);
   console.out() << '\n';
   return {};
 }

@@ -1,5 +1,4 @@
 // relmap map: draws the shape of the map, each connected part by itself.
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <ostream>
@@ -47,15 +46,6 @@ Result<MapPicture::Query> find_query(const MapOptions& options, client::Client& 
   const auto found = client.localise(*view);
   if (!found.ok()) return found.status();
   return MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
-}
-
-void tell_tears(const std::vector<Tear>& tears, const std::vector<Tear>& strained, std::ostream& err) {
-  if (tears.empty())
-    err << "no tear: the picture stretches no edge by more than " << fixed(kTearSigmas, 0) << " sigmas\n";
-  for (std::size_t i = 0; i < std::min(tears.size(), kMaxListed); ++i) err << "tear: " << tears[i].words() << '\n';
-  if (tears.size() > kMaxListed) err << count_text(tears.size()) << " tears in all\n";
-  for (std::size_t i = 0; i < std::min(strained.size(), kMaxListed); ++i)
-    err << "stretched closure: " << strained[i].words() << '\n';
 }
 
 void tell(const MapOptions& options, const MapShape& shape, const MapPicture& picture, terminal::Console& console) {
@@ -125,7 +115,8 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
   if (!bytes.ok()) return bytes.status();
   if (Status written = write_output(options.out, *bytes, console); !written.ok()) return written;
   tell(options, *shape, picture, console);
-  if (options.tears) tell_tears(tears, strained, console.err());
+  if (options.tears)
+    for (const std::string& line : tear_lines(tears, strained, kMaxListed)) console.err() << line << '\n';
   return {};
 }
 

@@ -36,6 +36,12 @@ void count_keyframes(const MapShape& shape, MapPicture& picture) {
   }
 }
 
+// "2026-11-30 22:10:05 UTC": a stamp with fractions of a second is too wide for the legend.
+std::string stamp_text(std::int64_t time_us) {
+  const std::string text = time_text(time_us);
+  return text.substr(0, 10) + " " + text.substr(11, 8) + " UTC";
+}
+
 // Between the chains of a session lies motion of which nothing is known, so that the skeleton does not have it.
 void add_unknown_motion(const Skeleton& skeleton, MapPicture& picture) {
   for (std::size_t i = 1; i < skeleton.chains.size(); ++i) {
@@ -81,7 +87,7 @@ void colour_by_time(const MapShape& shape, MapPicture& picture) {
       last = std::max(last, point.time_us);
     }
   const bool any = last > 0;
-  picture.scale = {"colour: when it was driven", any ? time_text(first) : "", any ? time_text(last) : ""};
+  picture.scale = {"colour: when it was driven", any ? stamp_text(first) : "", any ? stamp_text(last) : ""};
   for (const Skeleton::Chain& chain : shape.skeleton.chains)
     for (const Skeleton::Point& point : chain.points) {
       if (point.time_us == 0) continue;

@@ -1,24 +1,20 @@
 // The graph of the map, or of some of its sessions, read from the daemon.
 #pragma once
 
-#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "client/relmap_client.h"
+#include "tools/relmap/chosen_sessions.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
 struct MapGraph {
-  std::map<SessionNumber, std::string> names;
-  std::map<SessionNumber, StereoCamera> cameras;
+  ChosenSessions chosen;
   std::set<FrameId> frames;
   std::vector<client::Edge> edges;  // between those frames, of every state
-  std::size_t mono_sessions = 0;    // left out: nothing connects their frames, which have no scale
-
-  std::vector<SessionNumber> sessions() const;
 };
 
 inline bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }

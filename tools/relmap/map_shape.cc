@@ -85,9 +85,10 @@ Result<MapShape> read_map_shape(const ShapeChoice& choice, client::Client& clien
   options.candidates = true;
   if (!shape.chosen.all) options.sessions = shape.chosen.numbers();
   terminal::ProgressBar bar(console.err(), terminal::is_terminal());
+  bool begun = false;  // a map that comes in one piece is there at once
   auto skeleton = client.skeleton(options, [&](const Skeleton& so_far) {
-    if (so_far.frames_done < so_far.frames)
-      bar.show("reading the map's shape", so_far.frames_done, so_far.frames, "keyframes");
+    begun = begun || so_far.frames_done < so_far.frames;
+    if (begun) bar.show("reading the map's shape", so_far.frames_done, so_far.frames, "keyframes");
     return Status();
   });
   if (!skeleton.ok()) return skeleton.status();

@@ -108,6 +108,45 @@ TEST(MapShape, ContradictionsAreTearsOfTheClosure) {
     EXPECT_THAT(tear.words(), HasSubstr(tear.edge.valid() ? "1:100/1 from 1:" : "motion from 1:"));
 }
 
+TEST(MapShape, ATornClosureIsListedOnce) {
+  const auto strain = [](std::uint32_t index, double sigmas) {
+    Tear tear;
+    tear.edge = {point_at(index), 1};
+    tear.a = point_at(0);
+    tear.b = point_at(index);
+    tear.sigmas = sigmas;
+    return tear;
+  };
+  Tear motion = strain(5, 8);
+  motion.edge = {};
+  const std::vector<Tear> tears{strain(1, 20), strain(2, 9), motion},
+      closures{strain(1, 20), strain(2, 9), strain(3, 2)};
+  EXPECT_THAT(tear_lines(tears, closures, 8),
+              ElementsAre(HasSubstr("tear: 1:1/1 from "), HasSubstr("tear: 1:2/1 from "),
+                          HasSubstr("tear: motion from "), HasSubstr("stretched closure: 1:3/1 from ")));
+  EXPECT_THAT(tear_lines(tears, closures, 1),
+              ElementsAre(HasSubstr("tear: 1:1/1 from "), "3 tears in all", HasSubstr("stretched closure: 1:2/1 from "),
+                          HasSubstr("stretched closure: 1:3/1 from ")))
+      << "what the list of tears leaves out is not lost";
+  EXPECT_THAT(tear_lines({}, {strain(3, 2)}, 8),
+              ElementsAre("no tear: the picture stretches no edge by more than 6 sigmas",
+                          HasSubstr("stretched closure: 1:3/1 from ")));
+}
+
+// Stamps are as short as a narrow legend needs them: a break within a number could be read as two.
+TEST(MapShape, TimesInTheLegendHaveNoFractionsOfASecond) {
+  MapShape shape = shape_of(drive());
+  client::MapPicture picture = picture_of(shape, {});
+  colour_by_time(shape, picture);
+  ASSERT_TRUE(picture.scale);
+  EXPECT_EQ(picture.scale->low, "1970-01-01 00:00:01 UTC");
+  EXPECT_EQ(picture.scale->high, "1970-01-01 00:01:41 UTC");
+  for (Skeleton::Point& point : shape.skeleton.chains[0].points) point.time_us = 0;
+  picture = picture_of(shape, {});
+  colour_by_time(shape, picture);
+  EXPECT_EQ(picture.scale->low + picture.scale->high, "") << "no time is known";
+}
+
 TEST(MapShape, TheUncertaintyGrowsWithTheWayFromTheRoot) {
   const std::vector<double> sigmas = uncertainty_of(shape_of(drive()))[0];
   ASSERT_EQ(sigmas.size(), 11u);

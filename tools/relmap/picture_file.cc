@@ -34,6 +34,8 @@ Result<PixelSize> checked(std::uint32_t width, std::uint32_t height) {
 
 Result<std::string> read_picture_file(const std::string& path) {
   std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    return {Reason::NOT_A_PICTURE, path + " is a folder; give one of the pictures in it, a JPEG or PNG file"};
   const auto size = std::filesystem::file_size(path, error);
   std::ifstream in(path, std::ios::binary);
   if (error || !in) return {Reason::NO_SUCH_FILE, path + " cannot be read"};

@@ -10,7 +10,8 @@
 
 namespace relmap::cli {
 
-// The bytes of the file. NO_SUCH_FILE; PICTURE_TOO_LARGE if it has more than the 16 MB that a daemon takes.
+// The bytes of the file. NO_SUCH_FILE; NOT_A_PICTURE: it is a folder; PICTURE_TOO_LARGE if it has more than the 16 MB
+// that a daemon takes.
 Result<std::string> read_picture_file(const std::string& path);
 
 // Writes a thumbnail for each place, FOLDER/3-120.jpg for frame 3:120, and creates the folder. IO_ERROR.

@@ -6,11 +6,12 @@
 #include <ostream>
 
 #include "client/pair_picture.h"
-#include "proto/base/json.h"
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/pairs.h"
 #include "tools/relmap/picture_file.h"
 #include "tools/relmap/picture_output.h"
+#include "tools/relmap/typed_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -63,7 +64,7 @@ void print(const client::PlaceMatches& matches, terminal::Console& console) {
   rows.push_back({"a new place", fixed(matches.new_place, 4), "", "", ""});
   console.table({"place", ">probability", "verified by", ">inliers", "not verified"}, rows);
   if (!matches.nothing_verified.ok())
-    console.err() << "geometry confirms none of them: " << matches.nothing_verified.to_string() << '\n';
+    console.err() << "geometry confirms none of them: " << visible_text(matches.nothing_verified.to_string()) << '\n';
 }
 
 Status localise(const Seen& seen, client::Client& client, terminal::Console& console) {
@@ -75,13 +76,6 @@ Status localise(const Seen& seen, client::Client& client, terminal::Console& con
   if (!found.ok()) return found.status();
   if (!console.json) print(*found, console);
   return {};
-}
-
-// A refusal as JSON: that a picture shows no place of the map is an answer, too.
-std::string refusal_json(const Status& status) {
-  return Json()
-      .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
-      .text();
 }
 
 // The view at the left of each pair.
@@ -136,7 +130,8 @@ void add_localise(CLI::App& app, Action& action) {
   command
       ->add_option("--near", seen->near,
                    "search around this frame first, and in the whole map only if nothing is found there")
-      ->type_name("FRAME");
+      ->type_name("FRAME")
+      ->check(parsed_by(parse_frame));
   add_view_options(*command, seen->camera);
   command->footer(
       "Prints the frame of the map that the picture shows, and the camera's pose in that frame.\n"
@@ -151,19 +146,12 @@ void add_localise(CLI::App& app, Action& action) {
       "name\n"
       "(right, door_right), else the name of the calibration says that it is the right eye's. The answer is then the\n"
       "pose of the right eye.\n"
-      "With --json a refusal is printed as {\"error\": {\"reason\": \"NEW_PLACE\", \"message\": \"...\"}}; the exit "
-      "code\n"
-      "is the same as without --json.\n"
       "Examples:\n"
       "  relmap localise left.png right.png --calibration calib.txt\n"
       "  relmap localise photo.jpg --near 1:120\n"
       "  relmap localise 3:120   # where else was the place of this frame seen?");
   command->callback([&action, seen] {
-    action = [seen](client::Client& client, terminal::Console& console) {
-      Status status = localise(*seen, client, console);
-      if (!status.ok()) console.reply(refusal_json(status));
-      return status;
-    };
+    action = [seen](client::Client& client, terminal::Console& console) { return localise(*seen, client, console); };
   });
 }
 
@@ -196,7 +184,8 @@ void add_match(CLI::App& app, Action& action) {
   command
       ->add_option("--near", seen->near,
                    "a frame near which the picture was taken: places around it become more probable")
-      ->type_name("FRAME");
+      ->type_name("FRAME")
+      ->check(parsed_by(parse_frame));
   command
       ->add_option("--thumbnails", seen->thumbnails,
                    "write a small picture of each place to this folder, as SESSION-INDEX.jpg")

@@ -74,7 +74,7 @@ struct RelaxedMap {
 
   bool converged = true;  // false: the relaxation ended before
 
-  const std::string& name(SessionNumber session) const { return graph.names.at(session); }
+  const std::string& name(SessionNumber session) const { return graph.chosen.sessions.at(session).name; }
 };
 
 // Relaxes the graph. `root` becomes the root of its part; every other part has its first frame as root. NO_SUCH_FRAME

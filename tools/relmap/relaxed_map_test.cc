@@ -46,7 +46,7 @@ MapGraph graph_of(std::vector<client::Edge> edges) {
   for (const client::Edge& edge : edges)
     for (const FrameId end : {edge.a, edge.b}) {
       graph.frames.insert(end);
-      graph.names[end.session] = "drive " + std::to_string(end.session);
+      graph.chosen.sessions[end.session].name = "drive " + std::to_string(end.session);
     }
   graph.edges = std::move(edges);
   return graph;

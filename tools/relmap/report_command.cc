@@ -3,6 +3,7 @@
 #include <ostream>
 
 #include "proto/base/json.h"
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/picture_output.h"
 #include "tools/relmap/report_page.h"
@@ -29,7 +30,7 @@ Status write_report(const ReportOptions& options, client::Client& client, termin
     console.reply(json.text());
     return {};
   }
-  for (const std::string& finding : findings) console.out() << finding << '\n';
+  for (const std::string& finding : findings) console.out() << visible_text(finding) << '\n';
   console.err() << options.out << ": " << terminal::bytes_text(page.size()) << '\n';
   return {};
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "proto/keyframe/refusal_text.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::cli {
@@ -21,6 +22,12 @@ std::set<SessionNumber> frozen_ones(const std::vector<client::Session>& sessions
   return frozen;
 }
 
+std::string robot_name(const client::RobotStatus& robot) { return robot.robot.empty() ? "(no name)" : robot.robot; }
+
+std::string robot_words(const client::RobotStatus& robot) {
+  return "robot " + (robot.robot.empty() ? "of session " + robot.uuid.substr(0, 8) : robot.robot);
+}
+
 RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<SessionNumber>& frozen) {
   if (robot.blocked != Reason::OK) return urgent(robot.blocked, "its keyframes cannot be written to the journal");
   if (robot.not_taken.contains(Reason::SEQUENCE_CONFLICT))
@@ -35,8 +42,7 @@ RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<Session
   if (robot.refused.contains(Reason::SESSION_FROZEN) && frozen.contains(robot.session))
     return urgent(Reason::SESSION_FROZEN, "it sends keyframes of a session that is frozen");
   if (!robot.refused.empty() && robot.session == 0)
-    return {"not begun", "all that it sent was refused: " + std::string(reason_name(robot.refused.begin()->first)),
-            true};
+    return {"not begun", "all that it sent was refused: " + refused_text(robot.refused.begin()->first), true};
   if (robot.dropped_messages > 0)
     return {std::to_string(robot.dropped_messages) + " dropped", "it sends messages faster than they can be read",
             true};
@@ -46,6 +52,11 @@ RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<Session
     return {"silent", "not heard of for " + terminal::duration_text(robot.silent_s) + ", and its session has not ended",
             false};
   return {};
+}
+
+std::string refused_text(Reason reason) {
+  const std::string_view why = refusal_text(reason);
+  return std::string(reason_name(reason)) + (why.empty() ? "" : ", ") + std::string(why);
 }
 
 std::string counts_text(const client::ReasonCounts& counts, const std::string& none) {

@@ -7,6 +7,7 @@
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/route_options.h"
 #include "tools/relmap/route_views.h"
+#include "tools/relmap/typed_text.h"
 
 namespace relmap::cli {
 
@@ -87,6 +88,26 @@ void print_alternatives(const client::Route& route, terminal::Console& console) 
   console.table({"alternative", ">metres", ">time", ">dearer by", ">shared", ">frames", "labels"}, rows);
 }
 
+Result<client::RouteWeights> parse_weights(const std::vector<std::string>& texts) {
+  client::RouteWeights weights;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    const std::string name = text.substr(0, equals);
+    double* weight = name == "metre"      ? &weights.metre
+                     : name == "second"   ? &weights.driven_second
+                     : name == "standing" ? &weights.standing_second
+                     : name == "variance" ? &weights.square_metre_of_variance
+                                          : nullptr;
+    char* end = nullptr;
+    const double value = equals == std::string::npos ? -1 : std::strtod(text.c_str() + equals + 1, &end);
+    if (!weight || !end || *end != 0 || end == text.c_str() + equals + 1 || !(value >= 0))
+      return {Reason::INVALID_ARGUMENT,
+              "'" + text + "' is no weight; a weight is metre=N, second=N, standing=N or variance=N, with N >= 0"};
+    *weight = value;
+  }
+  return weights;
+}
+
 }  // namespace
 
 void add_route_options(CLI::App& command, RouteOptions& options, bool required) {
@@ -116,6 +137,7 @@ void add_route_options(CLI::App& command, RouteOptions& options, bool required) 
           "minimise a weighted sum instead: metre=1, second=0.5 (of driving), standing=0.1 (a second of standing), "
           "variance=30 (a square metre)")
       ->type_name("UNIT=WEIGHT")
+      ->check(parsed_by([](const std::string& text) { return parse_weights({text}); }))
       ->allow_extra_args(false)
       ->delimiter(',')
       ->excludes(by)
@@ -152,26 +174,6 @@ Result<std::vector<client::RouteEnd>> make_ends(client::Client& client, terminal
     ends.push_back(std::move(end).value());
   }
   return ends;
-}
-
-Result<client::RouteWeights> parse_weights(const std::vector<std::string>& texts) {
-  client::RouteWeights weights;
-  for (const std::string& text : texts) {
-    const std::size_t equals = text.find('=');
-    const std::string name = text.substr(0, equals);
-    double* weight = name == "metre"      ? &weights.metre
-                     : name == "second"   ? &weights.driven_second
-                     : name == "standing" ? &weights.standing_second
-                     : name == "variance" ? &weights.square_metre_of_variance
-                                          : nullptr;
-    char* end = nullptr;
-    const double value = equals == std::string::npos ? -1 : std::strtod(text.c_str() + equals + 1, &end);
-    if (!weight || !end || *end != 0 || end == text.c_str() + equals + 1 || !(value >= 0))
-      return {Reason::INVALID_ARGUMENT,
-              "'" + text + "' is no weight; a weight is metre=N, second=N, standing=N or variance=N, with N >= 0"};
-    *weight = value;
-  }
-  return weights;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <memory>
 #include <ostream>
 
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
 #include "tools/terminal/console.h"
@@ -96,7 +97,7 @@ Status delete_session(const DeleteOptions& options, client::Client& client, term
     return {status.reason(), "the daemon goes on deleting session " + std::to_string(session.number) +
                                  "; the same command shows how far it is"};
   if (status.ok() && !console.json)
-    console.out() << "session " << session.number << " '" << session.name << "' is deleted\n";
+    console.out() << "session " << session.number << " '" << visible_text(session.name) << "' is deleted\n";
   return status;
 }
 

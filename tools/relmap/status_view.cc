@@ -44,8 +44,7 @@ void add_robots(const StatusMoment& now, bool urgent, Facts& facts) {
   for (const client::RobotStatus& robot : now.robots) {
     const RobotTrouble trouble = trouble_of(robot, now.frozen);
     if (trouble.name.empty() || trouble.urgent != urgent || ++troubled > kMaxRobots) continue;
-    const std::string name = robot.robot.empty() ? robot.uuid.substr(0, 8) : robot.robot;
-    facts.emplace_back("robot " + name, trouble.name + ": " + trouble.what);
+    facts.emplace_back(robot_words(robot), trouble.name + ": " + trouble.what);
   }
   if (troubled > kMaxRobots)
     facts.emplace_back("robots", std::to_string(troubled - kMaxRobots) + " more " + (urgent ? "in trouble" : "silent") +

@@ -111,6 +111,16 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   EXPECT_THAT(text, HasSubstr("2 heard of in the last minute, 1 silent since"));
 }
 
+TEST(StatusView, ARobotWithoutANameIsNamedByItsSession) {
+  StatusMoment now = moment();
+  client::RobotStatus robot;
+  robot.uuid = "0f1e2d3c-4b5a-4677-8899-aabbccddeeff";
+  robot.refused[Reason::CORRUPT] = 2;
+  now.robots = {robot};
+  EXPECT_THAT(shown(now), HasSubstr("robot of session 0f1e2d3c  not begun: all that it sent was refused: CORRUPT, its "
+                                    "bytes are damaged, or are no keyframe"));
+}
+
 TEST(StatusView, OfManyRobotsInTroubleSomeAreNamed) {
   StatusMoment now = moment();
   for (int i = 0; i < 50; ++i) {

@@ -27,4 +27,19 @@ void sort_worst_first(std::vector<Tear>& tears) {
   std::stable_sort(tears.begin(), tears.end(), [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; });
 }
 
+std::vector<std::string> tear_lines(const std::vector<Tear>& tears, const std::vector<Tear>& stretched,
+                                    std::size_t max_lines) {
+  std::vector<std::string> lines;
+  if (tears.empty())
+    lines.push_back("no tear: the picture stretches no edge by more than " + fixed(kTearSigmas, 0) + " sigmas");
+  const std::size_t named = std::min(tears.size(), max_lines);
+  for (std::size_t i = 0; i < named; ++i) lines.push_back("tear: " + tears[i].words());
+  if (named < tears.size()) lines.push_back(count_text(tears.size()) + " tears in all");
+  for (const Tear& closure : stretched)
+    if (std::none_of(tears.begin(), tears.begin() + static_cast<std::ptrdiff_t>(named),
+                     [&](const Tear& tear) { return tear.edge == closure.edge; }))
+      lines.push_back("stretched closure: " + closure.words());
+  return lines;
+}
+
 }  // namespace relmap::cli

@@ -28,5 +28,9 @@ inline constexpr char kNotConverged[] =
 // By how much poses in one frame contradict a spring.
 Tear strain_of(const client::Spring& spring, const SE3& T_root_a, const SE3& T_root_b);
 void sort_worst_first(std::vector<Tear>& tears);
+// A line for each of the first `max_lines` tears, and their number if there are more; then one for each stretched
+// closure that these do not name. Without tears the first line says so.
+std::vector<std::string> tear_lines(const std::vector<Tear>& tears, const std::vector<Tear>& stretched,
+                                    std::size_t max_lines);
 
 }  // namespace relmap::cli

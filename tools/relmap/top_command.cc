@@ -55,7 +55,7 @@ Status run(const TopOptions& options, client::Client& client, terminal::Console&
     auto now = look(client);
     if (!now.ok() && options.count > 0) return now.status();
     if (!now.ok()) {  // it may be back in a moment
-      console.err() << now.status().to_string() << '\n';
+      console.report(now.status());
       before.reset();
       next = Clock::now() + kPause;
       sleep_until(next);

@@ -64,8 +64,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
   Rows rows;
   for (const client::RobotStatus& r : robots) {
     if (rows.size() == max_rows) break;
-    rows.push_back({r.robot.empty() ? "?" : r.robot,
-                    r.session ? std::to_string(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
+    rows.push_back({robot_name(r), r.session ? std::to_string(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
                     fixed(r.keyframes_per_s, 1), terminal::bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
                     r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), count_text(r.next_sequence),
                     count_text(r.missing + r.incomplete), count_text(r.pending + r.queued_messages),

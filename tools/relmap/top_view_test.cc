@@ -80,7 +80,7 @@ TEST(Top, RobotsInTroubleStandFirstAndSayWhy) {
   EXPECT_THAT(text, HasSubstr("DISK_FULL"));
   EXPECT_THAT(text, HasSubstr("0.04 s"));
   EXPECT_THAT(text, HasSubstr("812"));
-  EXPECT_THAT(text, HasSubstr("99999999"));
+  EXPECT_THAT(text, HasSubstr("(no name)  99999999"));
   EXPECT_THAT(shown(now, {}, {.robots = 1}), HasSubstr("... and 2 more"));
 }
 

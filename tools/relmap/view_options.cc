@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "proto/base/number_text.h"
+#include "proto/base/visible_text.h"
 #include "proto/calibration/calibration.h"
 #include "proto/geometry/camera.h"
 #include "tools/relmap/eye_names.h"
@@ -133,8 +134,9 @@ Status guess_camera(client::Client& client, terminal::Console& console, const st
     if (same) {
       view.camera = first.number;
       view.supposed = true;
-      console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "")
-                    << ", since its pictures have this size; --session " << first.name << " if you know that it is\n";
+      const std::string name = visible_text(first.name);
+      console.err() << "camera: that of session " << name << (first.raw ? ", unrectified" : "")
+                    << ", since its pictures have this size; --session " << name << " if you know that it is\n";
       view.either_eye = !pair && first.raw && eye_of_picture(picture) == Eye::kNotSaid;
       if (view.either_eye)
         console.err() << "camera: its left eye, but the covariance of the rotation allows for the right eye; a name "

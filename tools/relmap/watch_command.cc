@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "proto/base/clock.h"
+#include "proto/base/visible_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/output_files.h"
 #include "tools/relmap/view_options.h"
@@ -58,7 +59,8 @@ class Watcher {
 
   Status take(const client::WatchEvent& event) {
     if (const auto* gone = std::get_if<client::WatchDisconnected>(&event.what)) {
-      console_.err() << local_time_text(now_us()) << "  no connection, trying again: " << gone->why.to_string() << '\n';
+      console_.err() << local_time_text(now_us())
+                     << "  no connection, trying again: " << visible_text(gone->why.to_string()) << '\n';
       lost_ = true;
     } else if (std::holds_alternative<client::WatchConnected>(event.what)) {
       if (std::exchange(lost_, false)) console_.err() << local_time_text(now_us()) << "  connected again\n";
@@ -146,7 +148,7 @@ Status run(const WatchCommand& command, client::Client& client, terminal::Consol
 void add_watch(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("watch", "show what happens to the map, as it happens (Ctrl-C ends it)");
   auto options = std::make_shared<WatchCommand>();
-  command->add_option("--from", options->from, "begin with what happens now, or with the oldest that the daemon keeps")
+  command->add_option("--from", options->from, "begin with what happens now, or with the oldest event of the log")
       ->check(CLI::IsMember({"now", "oldest"}))
       ->capture_default_str();
   command->add_option("--resume", options->resume, "go on after the event that had this token, whatever --from says")
@@ -166,10 +168,15 @@ void add_watch(CLI::App& app, Action& action) {
       "If the daemon goes, the command waits for it, says so on stderr, and goes on after the last event; whoever was\n"
       "away for longer than the daemon keeps events (an hour, or events.max_mb) is told with VIEW_EXPIRED, and should\n"
       "list again. With --state an event may be told twice after a kill, but none is left out.\n"
+      "Robots and the disk are not in this log: robot lines (a robot appears, falls silent, or is blocked) and "
+      "storage\n"
+      "lines tell only what happens while the command runs; --from oldest, --resume and --state bring back none of "
+      "them.\n"
+      "relmap top shows how robots fare now.\n"
       "With --json each line is a MapEvent (docs/protocol.md) with its resumeToken.\n"
       "Examples:\n"
       "  relmap watch\n"
-      "  relmap watch --from oldest --no-frames          # of the last hour: closures, labels, sessions, robots\n"
+      "  relmap watch --from oldest --no-frames          # of the last hour: closures, labels, sessions\n"
       "  relmap watch --session morning --for 60\n"
       "  relmap --json watch --state watch.token | jq -c 'select(.edgeChanged).edgeChanged | [.id, .state]'");
   command->callback([&action, options] {

@@ -7,6 +7,7 @@
 
 #include "proto/base/clock.h"
 #include "proto/base/overloaded.h"
+#include "proto/base/visible_text.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/robot_trouble.h"
 #include "tools/terminal/console.h"
@@ -15,10 +16,12 @@ namespace relmap::cli {
 
 namespace {
 
-// Only people are named: most of what happens, nobody asked for.
+// Most of what happens, nobody asked for: the daemon did it, or a robot's own stream.
+bool nobody_asked(const client::WatchEvent& event) { return event.author.empty() || event.author == "relmapd"; }
+
+// Only people are named.
 std::string by_text(const client::WatchEvent& event) {
-  const bool nobody = event.author.empty() || event.author == "relmapd";
-  return (nobody ? "" : ", by " + event.author) + (event.note.empty() ? "" : ": " + event.note);
+  return (nobody_asked(event) ? "" : ", by " + event.author) + (event.note.empty() ? "" : ": " + event.note);
 }
 
 std::string why_text(Reason reason) {
@@ -49,6 +52,16 @@ const char* state_text(client::SessionState state) {
   return "";
 }
 
+// Robots open and end their sessions themselves, and none that is frozen: otherwise it was thawed, and is what it was
+// before it was frozen.
+bool is_thawed(client::SessionState state, bool frozen_or_by_somebody) {
+  return frozen_or_by_somebody && (state == client::SessionState::kOpen || state == client::SessionState::kEnded);
+}
+
+const char* thawed_text(client::SessionState state) {
+  return state == client::SessionState::kOpen ? "is thawed, and open as it was" : "is thawed, and ended as it was";
+}
+
 }  // namespace
 
 std::string local_time_text(std::int64_t time_us) {
@@ -76,14 +89,19 @@ bool WatchView::storage_is_news(const Status& state) {
 std::vector<std::string> WatchView::lines_of(const client::WatchEvent& event) {
   const std::int64_t time_us = event.time_us != 0 ? event.time_us : now_us();
   const auto line = [&](const std::string& what) {
-    return std::vector{local_time_text(time_us) + "  " + what + by_text(event)};
+    return std::vector{visible_text(local_time_text(time_us) + "  " + what + by_text(event))};
   };
   using Lines = std::vector<std::string>;
   return std::visit(
       Overloaded{
           [&](const client::SessionChanged& e) {
             names_[e.session] = e.name;
-            return line(session_text(e.session) + " of " + e.robot + " " + state_text(e.state));
+            const auto before = states_.find(e.session);
+            const bool frozen = before != states_.end() && before->second == client::SessionState::kFrozen;
+            const bool thawed = is_thawed(e.state, frozen || !nobody_asked(event));
+            states_[e.session] = e.state;
+            return line(session_text(e.session) + " of " + e.robot + " " +
+                        (thawed ? thawed_text(e.state) : state_text(e.state)));
           },
           [&](const client::FramesAdded& e) -> Lines {
             for (const client::AddedFrame& frame : e.frames) {
@@ -105,7 +123,7 @@ std::vector<std::string> WatchView::lines_of(const client::WatchEvent& event) {
           },
           [&](const client::SequencesSkipped& e) {
             return line(session_text(e.session) + ": " + (e.refused ? "refused " : "the robot gave up ") +
-                        sequences_text(e.first, e.last) + ", " + std::string(reason_name(e.reason)));
+                        sequences_text(e.first, e.last) + ", " + refused_text(e.reason));
           },
           [&](const client::FramesRemoved& e) {
             return line(session_text(e.session) + ": frames from " + std::to_string(e.first) + " on are deleted");
@@ -123,9 +141,10 @@ std::vector<std::string> WatchView::lines_of(const client::WatchEvent& event) {
           },
           [&](const client::RobotChanged& e) {
             const RobotTrouble trouble = trouble_of(e.robot, {});
-            return line("robot " + (e.robot.robot.empty() ? "of session " + e.robot.uuid : e.robot.robot) +
-                        (trouble.name.empty() ? " sends keyframes for " + session_text(e.robot.session)
-                                              : ": " + trouble.name + ", " + trouble.what));
+            return line(robot_words(e.robot) + (!trouble.name.empty() ? ": " + trouble.name + ", " + trouble.what
+                                                : e.robot.session == 0
+                                                    ? std::string(" is heard, and its session has not begun")
+                                                    : " sends keyframes for " + session_text(e.robot.session)));
           },
           [&](const client::StorageChanged& e) -> Lines {
             if (!storage_is_news(e.state)) return {};
@@ -146,7 +165,7 @@ std::vector<std::string> WatchView::flush() {
     if (motion.added > 0)
       text += counted_text(motion.added, "frame") + " added (" + sequences_text(motion.first, motion.last) + ")";
     if (motion.moved > 0) text += (motion.added > 0 ? ", " : "") + counted_text(motion.moved, "frame") + " adjusted";
-    lines.push_back(std::move(text));
+    lines.push_back(visible_text(text));
   }
   motion_.clear();
   return lines;

@@ -17,7 +17,8 @@ class WatchView {
   // The sessions whose names are known.
   void know(const std::vector<client::Session>& sessions);
 
-  // The lines that an event is told in, without their ends; none for what only counts, or is no news.
+  // The lines that an event is told in, without their ends; none for what only counts, or is no news. All that comes
+  // from the map is shown as visible_text() does.
   std::vector<std::string> lines_of(const client::WatchEvent& event);
   // A line for each session with frames since the last call.
   std::vector<std::string> flush();
@@ -32,6 +33,7 @@ class WatchView {
   bool storage_is_news(const Status& state);
 
   std::map<SessionNumber, std::string> names_;
+  std::map<SessionNumber, client::SessionState> states_;  // that were told
   std::map<SessionNumber, Motion> motion_;
   Reason storage_ = Reason::OK;
 };

@@ -47,6 +47,10 @@ TEST_F(WatchViewTest, ALineSaysWhenWhatWhyAndWho) {
                           "out, by anna: a mirror"));
   EXPECT_THAT(tell(client::SessionChanged{4, "", "cart", "noon", client::SessionState::kFrozen}, "anna"),
               ElementsAre("2025-11-24 16:00:00  session 4 'noon' of cart is frozen, by anna"));
+  EXPECT_THAT(tell(client::SessionChanged{4, "", "cart", "noon", client::SessionState::kEnded}, "anna"),
+              ElementsAre("2025-11-24 16:00:00  session 4 'noon' of cart is thawed, and ended as it was, by anna"));
+  EXPECT_THAT(tell(client::SessionChanged{4, "", "cart", "noon", client::SessionState::kEnded}, "relmapd"),
+              ElementsAre("2025-11-24 16:00:00  session 4 'noon' of cart has ended"));
   EXPECT_THAT(tell(client::FramesRemoved{4, 64}),
               ElementsAre("2025-11-24 16:00:00  session 4 'noon': frames from 64 on are deleted"));
   EXPECT_THAT(tell(client::SessionDeleted{4, ""}, "anna"),
@@ -60,10 +64,49 @@ TEST_F(WatchViewTest, ALineSaysWhenWhatWhyAndWho) {
               ElementsAre("2025-11-24 16:00:00  frame 3:7 has no label any more"));
   EXPECT_THAT(tell(client::SequencesSkipped{3, 5, 9, Reason::DROPPED_BY_ROBOT, false}),
               ElementsAre("2025-11-24 16:00:00  session 3 'morning': the robot gave up 5..9, DROPPED_BY_ROBOT"));
+  EXPECT_THAT(
+      tell(client::SequencesSkipped{3, 5, 5, Reason::TIME_AHEAD, true}),
+      ElementsAre("2025-11-24 16:00:00  session 3 'morning': refused 5, TIME_AHEAD, its time is more than a day "
+                  "ahead of the server's clock"));
   EXPECT_THAT(tell(client::EdgeRemoved{{{9, 1}, 2}}),
               ElementsAre("2025-11-24 16:00:00  closure 9:1/2 went with its session"));
   EXPECT_THAT(tell(client::Resynced{Reason::VIEW_EXPIRED, "events were lost", 3, 9}),
               ElementsAre("2025-11-24 16:00:00  VIEW_EXPIRED: events were lost"));
+}
+
+// Whatever is known of who did it: a session that is frozen neither begins nor ends.
+TEST_F(WatchViewTest, AThawIsNoEnd) {
+  const auto to = [&](client::SessionState state, const std::string& author) {
+    return tell(client::SessionChanged{3, "", "cart", "morning", state}, author);
+  };
+  EXPECT_THAT(to(client::SessionState::kOpen, ""),
+              ElementsAre("2025-11-24 16:00:00  session 3 'morning' of cart is open"));
+  EXPECT_THAT(to(client::SessionState::kFrozen, ""),
+              ElementsAre("2025-11-24 16:00:00  session 3 'morning' of cart is frozen"));
+  EXPECT_THAT(to(client::SessionState::kOpen, ""),
+              ElementsAre("2025-11-24 16:00:00  session 3 'morning' of cart is thawed, and open as it was"));
+  EXPECT_THAT(to(client::SessionState::kEnded, ""),
+              ElementsAre("2025-11-24 16:00:00  session 3 'morning' of cart has ended"));
+}
+
+TEST_F(WatchViewTest, NothingThatIsToldMovesTheCursorOrTurnsTextAround) {
+  EXPECT_THAT(tell(client::LabelsChanged{{3, 7}, {"a\x1b[2Jb", "c\u202Ed"}}, "an\x07na", "one\ntwo\x9b"),
+              ElementsAre("2025-11-24 16:00:00  frame 3:7 is labelled 'a\uFFFD[2Jb', 'c\uFFFDd', by an\uFFFDna: one "
+                          "two\uFFFD"));
+  tell(client::SessionChanged{5, "", "cart", "x\x1b]0;y\a", client::SessionState::kOpen});
+  tell(client::FramesAdded{{{{5, 1}, 0, {}, {}}}});
+  EXPECT_THAT(view_.flush(), ElementsAre("2025-11-24 16:00:00  session 5 'x\uFFFD]0;y\uFFFD': 1 frame added (1)"));
+}
+
+TEST_F(WatchViewTest, ARobotWithoutANameIsNamedByItsSession) {
+  client::RobotStatus robot;
+  robot.uuid = "0f1e2d3c-4b5a-4677-8899-aabbccddeeff";
+  EXPECT_THAT(tell(client::RobotChanged{robot}),
+              ElementsAre("2025-11-24 16:00:00  robot of session 0f1e2d3c is heard, and its session has not begun"));
+  robot.refused[Reason::TIME_AHEAD] = 3;
+  EXPECT_THAT(tell(client::RobotChanged{robot}),
+              ElementsAre("2025-11-24 16:00:00  robot of session 0f1e2d3c: not begun, all that it sent was refused: "
+                          "TIME_AHEAD, its time is more than a day ahead of the server's clock"));
 }
 
 TEST_F(WatchViewTest, FramesAreGatheredForEachSession) {

@@ -90,15 +90,32 @@ std::string slip_in(const CLI::App& app) {
   return option ? text : text + " It has " + listed(known, " and ") + ".";
 }
 
-// CLI11 calls a word that is no number "not in range". Returns a better message; empty if that is not the error.
-std::string no_number_in(const CLI::ParseError& error) {
+// "0.100000" as "0.1", "3600.000000" as "3600".
+std::string without_zeros(const std::string& number) {
+  if (number.find('.') == std::string::npos) return number;
+  const std::string kept = number.substr(0, number.find_last_not_of('0') + 1);
+  return kept.ends_with('.') ? kept.substr(0, kept.size() - 1) : kept;
+}
+
+// CLI11 calls a word that is no number "not in range", and prints bounds with all digits: hundreds where there is no
+// bound. Returns a better message; empty if that is not the error.
+std::string range_slip_in(const CLI::ParseError& error) {
   const std::string what = error.what();
-  constexpr std::string_view kValue = "Value ", kOutside = " not in range ";
+  constexpr std::string_view kValue = "Value ", kOutside = " not in range ", kTo = " to ";
+  constexpr double kUnbounded = 1e300;
   const std::size_t value = what.find(kValue), outside = what.find(kOutside);
   if (value == std::string::npos || outside == std::string::npos || outside < value) return "";
   const std::string given = what.substr(value + kValue.size(), outside - value - kValue.size());
-  if (double number; CLI::detail::lexical_cast(given, number)) return "";
-  return what.substr(0, value) + "'" + given + "' is not a number";
+  double number = 0, highest = 0;
+  if (!CLI::detail::lexical_cast(given, number)) return what.substr(0, value) + "'" + given + "' is not a number";
+  const std::size_t lower = outside + kOutside.size(), to = what.find(kTo, lower);
+  if (to == std::string::npos) return "";
+  const std::string upper = what.substr(to + kTo.size());
+  if (!CLI::detail::lexical_cast(upper, highest)) return "";
+  if (highest > kUnbounded)
+    return what.substr(0, outside) + (number < 0 ? " must not be negative" : " must be greater than 0");
+  return what.substr(0, lower) + without_zeros(what.substr(lower, to - lower)) + std::string(kTo) +
+         without_zeros(upper);
 }
 
 }  // namespace
@@ -142,7 +159,7 @@ int end_with(const CLI::App& app, const CLI::ParseError& error, std::ostream& ou
   // A mistyped word also makes the intended one missing; what was meant is the more useful message.
   const bool unexpected = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
                           error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
-  const std::string slip = unexpected ? slip_in(app) : no_number_in(error);
+  const std::string slip = unexpected ? slip_in(app) : range_slip_in(error);
   err << (slip.empty() ? error.what() : slip) << "\nRun " << reached(app).name << " --help for more information.\n";
   return usage;
 }

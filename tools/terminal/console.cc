@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <ctime>
 #include <iostream>
+#include <sstream>
 
 #include "proto/base/bar_text.h"
 #include "proto/base/printf_text.h"
+#include "proto/base/visible_text.h"
 
 namespace relmap::terminal {
 
@@ -24,7 +26,16 @@ void Console::reply(const std::string& document) {
   if (json && !aside_) out_ << document << '\n';
 }
 
-void Console::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows) {
+void Console::report(const Status& why) {
+  if (why.ok()) return;
+  std::istringstream lines(why.to_string());  // a message may have several
+  for (std::string line; std::getline(lines, line);) err_ << visible_text(line) << '\n';
+}
+
+void Console::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& cells) {
+  std::vector<std::vector<std::string>> rows = cells;
+  for (auto& row : rows)
+    for (std::string& cell : row) cell = visible_text(cell);
   std::vector<std::size_t> widths;
   std::vector<std::string> names = header;
   std::vector<bool> right;
@@ -47,8 +58,9 @@ void Console::table(const std::vector<std::string>& header, const std::vector<st
 
 void Console::facts(const std::vector<std::pair<std::string, std::string>>& facts) {
   std::size_t width = 0;
-  for (const auto& fact : facts) width = std::max(width, width_of(fact.first));
-  for (const auto& [name, value] : facts) out_ << padded(name, width, false) << "  " << value << '\n';
+  for (const auto& fact : facts) width = std::max(width, width_of(visible_text(fact.first)));
+  for (const auto& [name, value] : facts)
+    out_ << padded(visible_text(name), width, false) << "  " << visible_text(value) << '\n';
 }
 
 std::string bytes_text(std::uint64_t bytes) {
@@ -86,7 +98,7 @@ std::size_t width_of(const std::string& utf8) {
 bool can_ask() { return isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0; }
 
 Status ask(Console& console, const std::string& question) {
-  console.err() << question << " [y/N] " << std::flush;
+  console.err() << visible_text(question) << " [y/N] " << std::flush;
   std::string answer;
   std::getline(std::cin, answer);
   if (answer == "y" || answer == "Y" || answer == "yes" || answer == "Yes") return {};

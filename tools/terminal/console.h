@@ -1,4 +1,7 @@
 // Output of the command lines: data on stdout, everything else on stderr; and questions to the user at a terminal.
+//
+// Tables, facts, questions and reports show whatever text they are given as visible_text() does, since names, labels
+// and notes come from elsewhere. What is written to out() and err() directly is written as it is.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +27,8 @@ class Console {
   bool untrusted = false;
   // The command is done, but the daemon refused part of it for good; the exit code will say so.
   bool incomplete = false;
+  // A document that was printed tells already what failed.
+  bool outcome_told = false;
 
   std::ostream& out() { return out_; }
   std::ostream& err() { return err_; }
@@ -41,9 +46,11 @@ class Console {
     const bool was_;
   };
   void reply(const std::string& document);  // prints it if `json`
+  // Prints on err() why something failed or is not as it should be; nothing if `why` is OK.
+  void report(const Status& why);
 
   // A column whose name begins with '>' is right-aligned, for numbers; the others are left-aligned.
-  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& cells);
   // "name   value", aligned.
   void facts(const std::vector<std::pair<std::string, std::string>>& facts);
 

@@ -28,6 +28,17 @@ TEST(Console, PrintsRepliesOnlyAsJsonAndOnlyThoseThatAreTheAnswer) {
   EXPECT_EQ(out.str(), "{3}\n");
 }
 
+TEST(Console, ShowsForeignTextsWithoutObeyingThem) {
+  std::ostringstream out, err;
+  Console console(out, err);
+  console.table({"label", ">n"}, {{"a\x1b[2J", "1"}, {"b\u202E", "2"}});
+  console.facts({{"robot \a", "x\ny"}});
+  console.report({Reason::BAD_NAME, "of 'a\x1b[1m'\nsecond line"});
+  console.report({});
+  EXPECT_EQ(out.str(), "label  n\na\uFFFD[2J  1\nb\uFFFD     2\nrobot \uFFFD  x y\n");
+  EXPECT_EQ(err.str(), "BAD_NAME: of 'a\uFFFD[1m'\nsecond line\n");
+}
+
 TEST(Units, AreHumanReadable) {
   EXPECT_EQ(bytes_text(1234), "1.2 kB");
   EXPECT_EQ(bytes_text(1500000000), "1.5 GB");
@@ -51,7 +62,7 @@ TEST(ProgressBar, PrintsALineForEachStepWithoutATerminal) {
   bar.show("", 0, 0, "");  // nothing is said of no step
   bar.end();
   const std::string text = err.str();
-  EXPECT_EQ(text, "copying: 0 of 200 frames\nchecking\n");
+  EXPECT_EQ(text, "copying: 0 of 200 frames\ncopying: 200 of 200 frames\nchecking\n");
 }
 
 TEST(ProgressBar, RedrawsItselfOnATerminalAndLeavesNothingBehind) {
@@ -59,6 +70,8 @@ TEST(ProgressBar, RedrawsItselfOnATerminalAndLeavesNothingBehind) {
   ProgressBar bar(err, true);
   bar.show("copying", 1000000, 4000000, "bytes");
   EXPECT_NE(err.str().find("1.0 MB of 4.0 MB"), std::string::npos) << err.str();
+  bar.show("copying", 4000000, 4000000, "bytes");
+  EXPECT_NE(err.str().find("4.0 MB of 4.0 MB"), std::string::npos) << "its end is shown, however soon it follows";
   bar.end();
   EXPECT_TRUE(err.str().ends_with("\r\x1b[K")) << err.str();
   EXPECT_EQ(err.str().find('\n'), std::string::npos);

@@ -32,12 +32,15 @@ void ProgressBar::show(const std::string& step, std::uint64_t done, std::uint64_
     step_ = step;
     begun_ = now;
     tenths_ = 0;
+    complete_ = false;
   }
   const std::uint64_t tenths = total > 0 ? std::min(done, total) * 10 / total : 0;
   const auto since = now - shown_;
-  if (!fresh && (terminal_ ? since < kRedraw : since < kNextLine || tenths == tenths_)) return;
+  const bool completes = total > 0 && done >= total && !complete_;
+  if (!fresh && !completes && (terminal_ ? since < kRedraw : since < kNextLine || tenths == tenths_)) return;
   shown_ = now;
   tenths_ = tenths;
+  complete_ = total > 0 && done >= total;
   const std::string amount = amount_text(done, total, unit);
   if (terminal_)
     draw(amount, done, total);

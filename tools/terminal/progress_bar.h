@@ -1,5 +1,5 @@
 // Shows the progress of long work: a bar that redraws itself on a terminal; elsewhere a line for each step, and for
-// each tenth of a step unless it follows within two seconds.
+// each tenth of a step unless it follows within two seconds. That a step is complete is always shown.
 #pragma once
 
 #include <chrono>
@@ -30,7 +30,7 @@ class ProgressBar {
   std::string step_;
   std::uint64_t tenths_ = 0;
   Clock::time_point begun_, shown_;
-  bool visible_ = false;
+  bool visible_ = false, complete_ = false;  // complete: shown with all of its total
 };
 
 // Whether standard error is a terminal that can move the cursor.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import re
 import time
+import weakref
 from dataclasses import dataclass, replace
 from typing import Any, Optional, Tuple, Union
 
@@ -27,6 +29,18 @@ _OPTIONS = (
     ("grpc.use_local_subchannel_pool", 1),
     ("grpc.max_reconnect_backoff_ms", 1000),
 )
+_open_channels: "weakref.WeakSet[Any]" = weakref.WeakSet()
+
+
+@atexit.register
+def close_channels() -> None:
+    """Ends all calls of blocking clients, at the end of the program. grpcio's own thread does it, and for that the interpreter
+    must still run: a channel with a call that is not over, as that of a watch which Ctrl-C ended, would be closed when the
+    interpreter takes its objects apart, and would then wait for ever for that thread."""
+    for channel in tuple(_open_channels):
+        channel.close()
+
+
 Metadata = Optional[Tuple[Tuple[str, str], ...]]
 """The metadata of a call."""
 
@@ -98,8 +112,11 @@ class Connection:
     def open(self, where: ServerAddress) -> Any:
         """A grpc.Channel to this address."""
         if where.is_socket or self.credentials is None:
-            return grpc.insecure_channel(where.address, options=_OPTIONS)
-        return grpc.secure_channel(where.address, self.credentials.channel_credentials(), options=_OPTIONS)
+            channel = grpc.insecure_channel(where.address, options=_OPTIONS)
+        else:
+            channel = grpc.secure_channel(where.address, self.credentials.channel_credentials(), options=_OPTIONS)
+        _open_channels.add(channel)
+        return channel
 
     def open_aio(self, where: ServerAddress) -> Any:
         """A grpc.aio.Channel to this address."""

@@ -12,9 +12,6 @@ from typing import Any, Optional, Union
 
 import grpc
 
-from relmap.errors import error_of
-from relmap.reason import Reason
-
 PathLike = Union[str, "os.PathLike[str]"]
 """The path of a file."""
 
@@ -68,25 +65,21 @@ def parse_credentials(text: str) -> Credentials:
 
 
 def read_credentials(path: PathLike) -> Credentials:
-    """The credentials of a file. DaemonError (NO_SUCH_FILE, BAD_CONFIG): it cannot be read, others can read it, or it is
-    malformed."""
+    """The credentials of a file. OSError: it cannot be read. ValueError: others can read it, or it is malformed."""
+    data = Path(path).read_bytes()
+    if os.stat(path).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise ValueError(f"others can read {os.fspath(path)}: chmod 600 {os.fspath(path)}")
     try:
-        text = Path(path).read_text()
-        mode = os.stat(path).st_mode
-    except (OSError, UnicodeDecodeError) as error:
-        raise error_of(Reason.NO_SUCH_FILE, f"cannot read {os.fspath(path)}: {error}") from error
-    if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise error_of(Reason.BAD_CONFIG, f"others can read {os.fspath(path)}: chmod 600 {os.fspath(path)}")
-    try:
-        return parse_credentials(text)
-    except ValueError as error:
-        raise error_of(Reason.BAD_CONFIG, f"{os.fspath(path)}: {error}") from error
+        return parse_credentials(data.decode())
+    except ValueError as error:  # UnicodeDecodeError, too
+        raise ValueError(f"{os.fspath(path)} holds no credentials: {error}") from error
 
 
 def credentials_of(
     credentials: Optional[PathLike], token: Optional[str], tls: Union[None, bool, bytes, PathLike]
 ) -> Optional[Credentials]:
-    """The credentials that the arguments of connect() mean; None: no TLS. ValueError: they do not go together."""
+    """The credentials that the arguments of connect() mean; None: no TLS. OSError: a file cannot be read. ValueError: it holds
+    none, or the arguments do not go together."""
     if credentials is not None:
         if token is not None or tls not in (None, True):
             raise ValueError("a file of credentials has the token and the authority itself: give either it or token and tls")
@@ -104,10 +97,7 @@ def credentials_of(
         if b"-----BEGIN CERTIFICATE-----" not in tls:
             raise ValueError("tls holds no certificate in PEM; it is the path or the bytes of the authority's certificate")
         return Credentials(tls, token=word)
-    try:
-        authority = Path(tls).read_bytes()
-    except OSError as error:
-        raise error_of(Reason.NO_SUCH_FILE, f"cannot read {os.fspath(tls)}: {error}") from error
+    authority = Path(tls).read_bytes()
     if b"-----BEGIN CERTIFICATE-----" not in authority:
-        raise error_of(Reason.BAD_CONFIG, f"{os.fspath(tls)} holds no certificate in PEM")
+        raise ValueError(f"{os.fspath(tls)} holds no certificate in PEM")
     return Credentials(authority, token=word)

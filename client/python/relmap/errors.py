@@ -48,11 +48,12 @@ class RelmapError(Exception):
 
 
 class RobotDataError(RelmapError):
-    """What a robot, or an imported graph, sent cannot be taken: BAD_SIZE, TIME_BACKWARDS, BAD_NAME, ..."""
+    """What a robot, or an imported graph, sent cannot be taken: TIME_BACKWARDS, CALIBRATION_CHANGED, SESSION_FROZEN, ..."""
 
 
 class RequestError(RelmapError):
-    """What was asked for cannot be answered: NO_SUCH_FRAME, NOT_CONNECTED, NOT_A_PICTURE, NO_CALIBRATION, ..."""
+    """What was asked for cannot be answered: NO_SUCH_FRAME, NOT_CONNECTED, NOT_A_PICTURE, NO_CALIBRATION, ... Reasons of what
+    robots send are of this class where the call sends none of it: BAD_SIZE of a picture in a question, BAD_NAME of a label."""
 
 
 class ClientClosed(RequestError):
@@ -125,9 +126,12 @@ _BY_CODE = {
 }
 
 
-def error_of(reason: Reason, message: str, request_id: str = "") -> RelmapError:
-    """The exception of a reason, of the class that its group has. It is returned, not raised."""
+def error_of(reason: Reason, message: str, request_id: str = "", asks: bool = False) -> RelmapError:
+    """The exception of a reason, of the class that its group has; with `asks`, of a call that sends nothing of a robot's, so
+    that none is a RobotDataError. It is returned, not raised."""
     kind: Type[RelmapError] = _BY_REASON.get(reason) or _BY_GROUP.get(reason.group) or RelmapError
+    if asks and kind is RobotDataError:
+        kind = RequestError
     return kind(reason, message, request_id)
 
 
@@ -152,8 +156,9 @@ def silent(seconds: float) -> Unreachable:
     )
 
 
-def error_of_rpc(error: Any) -> RelmapError:
-    """The exception of a failed call of gRPC (grpc.RpcError of either kind), by grpc-status-details-bin if it is there."""
+def error_of_rpc(error: Any, asks: bool = False) -> RelmapError:
+    """The exception of a failed call of gRPC (grpc.RpcError of either kind), by grpc-status-details-bin if it is there. `asks`
+    as in error_of()."""
     details = reason_pb2.Error()
     for key, value in error.trailing_metadata() or ():
         if key == "grpc-status-details-bin":
@@ -162,5 +167,5 @@ def error_of_rpc(error: Any) -> RelmapError:
             except Exception:  # what a proxy put there
                 details.Clear()
     if details.reason:
-        return error_of(Reason(details.reason), details.message, details.request_id)
+        return error_of(Reason(details.reason), details.message, details.request_id, asks)
     return error_of(_BY_CODE.get(error.code(), Reason.INTERNAL), error.details() or "the call failed")

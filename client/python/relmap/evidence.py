@@ -81,7 +81,8 @@ class Explanation(Record):
         picture_a, picture_b: of its older and newer end, if they were asked for, else None.
         correspondences: what both pictures show, found anew; the view is b, the frame is a.
         correspondences_reason, correspondences_message: OK, or why there are none.
-        motion: what the way without the closure says.
+        motion: what the way without the closure says now; the doubts in `edge.suspicion` say what the robot's motion said when
+            the daemon judged the closure.
         agreements: other closures, at most 256.
         runner_up: picture of the best of the other places, if there is one and pictures were asked for.
         map_version: the version of the map that was asked.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
 
+from relmap.enums import NumberedEnum
 from relmap.errors import reads_reply
 from relmap.geometry import Array, frozen
 from relmap.graph import Edges
@@ -15,7 +15,7 @@ from relmap.record import Record
 from relmap.v1 import map_pb2
 
 
-class ExportFormat(enum.IntEnum):
+class ExportFormat(NumberedEnum):
     """The format of a trajectory's file."""
 
     TUM = 1

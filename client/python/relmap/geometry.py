@@ -7,13 +7,13 @@ A covariance of ``T_ab`` is 6 x 6, that of ``xi = (rho, phi)`` in ``T_ab @ exp(x
 
 from __future__ import annotations
 
-import enum
 import math
 from typing import Any, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
 
+from relmap.enums import NamedEnum
 from relmap.v1 import common_pb2
 
 Array = npt.NDArray[Any]
@@ -22,7 +22,7 @@ ArrayLike = Union[npt.ArrayLike, Sequence[float]]
 """What numpy makes an array of."""
 
 
-class PoseKind(enum.Enum):
+class PoseKind(NamedEnum):
     """What a pose is. The map has no global coordinates, so a pose is always relative to something."""
 
     RELATIVE = "relative"
@@ -48,50 +48,42 @@ def frozen(array: Array) -> Array:
 
 
 def skew(v: Array) -> Array:
-    """The matrix [v]x (3 x 3) of the cross product with `v` (3)."""
-    x, y, z = v
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    """The matrix [v]x (..., 3, 3) of the cross product with `v` (..., 3)."""
+    K = np.zeros((*np.shape(v), 3))
+    K[..., 2, 1], K[..., 0, 2], K[..., 1, 0] = np.moveaxis(v, -1, 0)
+    return np.asarray(K - np.swapaxes(K, -1, -2))
 
 
 def so3_exp(phi: Array) -> Array:
-    """The rotation (3 x 3) of a rotation vector (3, radians)."""
-    angle = float(np.sqrt(np.dot(phi, phi)))
+    """The rotations (..., 3, 3) of rotation vectors (..., 3, radians)."""
+    angle = np.sqrt(np.sum(phi * phi, axis=-1))[..., None, None]
     K = skew(phi)
-    if angle < 1e-8:
-        return np.asarray(np.eye(3) + K + 0.5 * (K @ K))
-    return np.asarray(np.eye(3) + math.sin(angle) / angle * K + (1 - math.cos(angle)) / angle**2 * (K @ K))
-
-
-def so3_log(R: Array) -> Array:
-    """The rotation vector (3, radians, of length 0..pi) of a rotation (3 x 3)."""
-    w, x, y, z = quaternion_of(R)
-    v = np.array([x, y, z])
-    sine = float(np.sqrt(v @ v))
-    if w < 0:
-        w, v = -w, -v
-    if sine < 1e-12:
-        return 2.0 * v
-    return np.asarray(2.0 * math.atan2(sine, w) / sine * v)
-
-
-def so3_exp_all(phi: Array) -> Array:
-    """The rotations (n, 3, 3) of rotation vectors (n, 3, radians)."""
-    angle = np.sqrt(np.sum(phi * phi, axis=1))[:, None, None]
-    K = np.zeros((len(phi), 3, 3))
-    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = phi.T
-    K -= np.swapaxes(K, 1, 2)
     safe = np.where(angle < 1e-8, 1.0, angle)
     first = np.where(angle < 1e-8, 1.0, np.sin(safe) / safe)
     second = np.where(angle < 1e-8, 0.5, (1 - np.cos(safe)) / safe**2)
     return np.asarray(np.eye(3) + first * K + second * (K @ K))
 
 
-def so3_log_all(R: Array) -> Array:
-    """The rotation vectors (n, 3, radians, of length 0..pi) of rotations (n, 3, 3). Of half a turn the axis is lost."""
-    axis = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1) / 2
-    sine = np.sqrt(np.sum(axis * axis, axis=1))
-    angle = np.arctan2(sine, (np.trace(R, axis1=1, axis2=2) - 1) / 2)
-    return np.asarray(np.divide(angle, sine, out=np.ones_like(sine), where=sine > 1e-12)[:, None] * axis)
+def so3_log(R: Array) -> Array:
+    """The rotation vectors (..., 3, radians, of length 0..pi) of rotations (..., 3, 3)."""
+    q = _quaternions(R)
+    v = q[..., 1:] * np.where(q[..., :1] < 0, -1.0, 1.0)
+    sine = np.sqrt(np.sum(v * v, axis=-1, keepdims=True))
+    angle = 2.0 * np.arctan2(sine, np.abs(q[..., :1]))
+    return np.asarray(np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12) * v)
+
+
+def _quaternions(R: Array) -> Array:
+    """The quaternions (..., 4: w, x, y, z) of rotations (..., 3, 3), of unit length: of the four ways to compute one that
+    which divides by the largest number."""
+    d = np.stack([np.trace(R, axis1=-2, axis2=-1), R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]], axis=-1)
+    x, y, z = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1])
+    xy, xz, yz = (R[..., i, j] + R[..., j, i] for i, j in ((0, 1), (0, 2), (1, 2)))
+    square = [1 + d[..., 0], *(1 - d[..., 0] + 2 * d[..., k] for k in (1, 2, 3))]
+    ways = ((square[0], x, y, z), (x, square[1], xy, xz), (y, xy, square[2], yz), (z, xz, yz, square[3]))
+    way = np.argmax(d, axis=-1)[..., None]
+    q = np.select([way == k for k in range(4)], [np.stack(one, axis=-1) for one in ways])
+    return np.asarray(q / np.sqrt(np.sum(q * q, axis=-1, keepdims=True)))
 
 
 def _left_jacobian(phi: Array) -> Array:

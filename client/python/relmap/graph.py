@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import datetime
-import enum
+import uuid as uuids
 from dataclasses import dataclass
-from typing import Any, Iterable, Mapping, Optional, Sequence, TypeVar
+from typing import Any, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
 from relmap.camera import RawStereo, StereoCamera, read_camera, read_raw
-from relmap.errors import reads_reply
+from relmap.enums import OpenEnum
+from relmap.errors import RequestError, reads_reply
 from relmap.geometry import Array, frozen, read_covariance, read_transform
 from relmap.ids import EdgeId, FrameId, LandmarkId, read_edge_id, read_frame_id
 from relmap.measurements import Features, read_feature_set
@@ -19,22 +20,6 @@ from relmap.record import Record
 from relmap.tables import Table
 from relmap.times import as_datetime
 from relmap.v1 import graph_pb2
-
-E = TypeVar("E", bound="OpenEnum")
-
-
-class OpenEnum(enum.IntEnum):
-    """An enumeration to which a newer relmapd may add: a number not known here becomes a member ``UNKNOWN_<number>``."""
-
-    @classmethod
-    def _missing_(cls: type[E], value: object) -> Optional[E]:
-        if not isinstance(value, int):
-            return None
-        later = int.__new__(cls, value)
-        later._name_ = f"UNKNOWN_{value}"
-        later._value_ = value
-        return later
-
 
 class EdgeKind(OpenEnum):
     """What an edge is: of the robot's own motion, a loop closure, or a bridge over motion that was not measured."""
@@ -172,7 +157,8 @@ class Suspicion:
     Attributes:
         value: 0: nothing speaks against it; 1: it is wrong as far as the map can tell.
         doubts: the heaviest first.
-        remark: what else to know, in words: what the map does not know of it, or that an operator put it into force.
+        remark: what else to know, in words: what the map does not know of it, or that an operator put it into force
+            and has neither withdrawn that nor removed it.
     """
 
     value: float
@@ -358,6 +344,13 @@ def _session_row(session: Session) -> Mapping[str, Any]:
     return row
 
 
+def _uuid_text(text: str) -> Optional[str]:
+    try:
+        return str(uuids.UUID(text))
+    except ValueError:
+        return None
+
+
 class Sessions(Table[Session]):
     """All sessions of one version of the map, ascending by number."""
 
@@ -374,6 +367,26 @@ class Sessions(Table[Session]):
             if session.name == name:
                 return session
         raise KeyError(f"no session is named {name!r}; there are " + ", ".join(repr(s.name) for s in self[:20]))
+
+    def number_of(self, session: Union[int, str]) -> int:
+        """The number of the session of this number, name, "ROBOT/NAME" or uuid; a number is not looked up.
+
+        A session that is being deleted counts only if no other is called so. RequestError: NO_SUCH_SESSION: none is;
+        INVALID_ARGUMENT: several are."""
+        if isinstance(session, int):
+            return session
+        uuid = _uuid_text(session)
+        called = [s for s in self if session in (s.name, f"{s.robot}/{s.name}") or s.uuid == uuid]
+        called = [s for s in called if s.state != SessionState.DELETING] or called
+        if not called:
+            raise RequestError(Reason.NO_SUCH_SESSION, f"no session is called {session!r}")
+        if len(called) > 1:
+            which = ", ".join(f"{s.number} (robot {s.robot})" for s in called)
+            raise RequestError(
+                Reason.INVALID_ARGUMENT,
+                f"{len(called)} sessions are called {session!r}: {which}; name one by its number, uuid or as ROBOT/NAME",
+            )
+        return called[0].number
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

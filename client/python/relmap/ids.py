@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import operator
 import re
+import uuid as uuids
 from dataclasses import dataclass
 from typing import Any, Protocol, Sequence, Union, cast
 
 from relmap.v1 import common_pb2
 
 _MAX_U32 = 2**32 - 1
+_DIGITS = re.compile(r"[0-9]+")
 
 
 def _u32(what: str, value: int) -> None:
@@ -111,8 +113,9 @@ FrameLike = Union[FrameId, str, HasFrameId]
 """A frame: its id, its text "3:120", or a Frame."""
 EdgeLike = Union[EdgeId, str, HasEdgeId]
 """An edge: its id, its text "3:120/1", or an Edge."""
-SessionLike = Union[int, HasNumber]
-"""A session: its number, or a Session."""
+SessionLike = Union[int, str, uuids.UUID, HasNumber]
+"""A session of the map: its number, name, "ROBOT/NAME", uuid, or a Session. A text of digits only is a number. For names and
+uuids the client asks the daemon which sessions there are, before each call."""
 SessionsLike = Union[SessionLike, Sequence[SessionLike]]
 """Sessions: one, or several."""
 
@@ -141,22 +144,29 @@ def as_edge(edge: EdgeLike) -> EdgeId:
     raise TypeError(f"an edge is an EdgeId, an Edge or a text such as '3:120/1', not {type(edge).__name__}")
 
 
-def as_session(session: SessionLike, what: str = "session", least: int = 1) -> int:
-    """The number of the session that is meant. ValueError: it is below `least`, or too large. TypeError: it is no session."""
+def as_session(session: SessionLike, what: str = "session", least: int = 1) -> Union[int, str]:
+    """The number of the session that is meant; or the name or uuid, if only the map tells its number (Sessions.number_of()).
+    ValueError: the number is below `least`, or too large, or the text is empty. TypeError: it is no session."""
+    if isinstance(session, uuids.UUID) or (isinstance(session, str) and session and not _DIGITS.fullmatch(session)):
+        return str(session)
     known: Any = getattr(session, "number", session)
+    if isinstance(known, str):
+        if not known:
+            raise ValueError(f"{what} is an empty text; must be a session's number, name or uuid")
+        known = int(known)
     if isinstance(known, bool) or not hasattr(known, "__index__"):
-        raise TypeError(f"{what} is a session's number or a Session, not {type(session).__name__}")
+        raise TypeError(f"{what} is a session's number, name or uuid, or a Session, not {type(session).__name__}")
     number = operator.index(known)
     if not least <= number <= _MAX_U32:
         raise ValueError(f"{what} is {number}; must be a session's number, {least} or more")
     return number
 
 
-def as_sessions(sessions: SessionsLike) -> list[int]:
-    """The numbers of the sessions that are meant. ValueError, TypeError as as_session()."""
-    if hasattr(sessions, "number") or hasattr(sessions, "__index__"):
+def as_sessions(sessions: SessionsLike) -> list[Union[int, str]]:
+    """Each session that is meant, as as_session() has it. ValueError, TypeError as as_session()."""
+    if isinstance(sessions, (str, bytes, uuids.UUID)) or hasattr(sessions, "number") or hasattr(sessions, "__index__"):
         return [as_session(cast(SessionLike, sessions))]
-    return [as_session(session, "a session") for session in cast(Sequence[SessionLike], sessions)]
+    return [as_session(session, "a session") for session in sessions]
 
 
 def read_frame_id(message: common_pb2.FrameId) -> FrameId:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import enum
-from typing import Optional
+from relmap.enums import NamedEnum, OpenEnum
 
 
-class ReasonGroup(enum.Enum):
+class ReasonGroup(NamedEnum):
     """What a reason is about; each group has an exception of its own (relmap.errors)."""
 
     OK = "ok"
@@ -19,7 +18,7 @@ class ReasonGroup(enum.Enum):
     CAMERA = "a camera"
 
 
-class Reason(enum.IntEnum):
+class Reason(OpenEnum):
     """A reason. The comment of each is in relmap/v1/reason.proto, and `relmap-admin explain NAME` says what to do.
 
     A number that this version does not know, from a newer relmapd, becomes a member named ``UNKNOWN_<number>``.
@@ -135,15 +134,6 @@ class Reason(enum.IntEnum):
     REGISTER_REFUSED = 150
     OUT_OF_FOCUS = 151
     ROWS_APART = 152
-
-    @classmethod
-    def _missing_(cls, value: object) -> Optional["Reason"]:
-        if not isinstance(value, int):
-            return None
-        later = int.__new__(cls, value)
-        later._name_ = f"UNKNOWN_{value}"
-        later._value_ = value
-        return later
 
     @property
     def group(self) -> ReasonGroup:

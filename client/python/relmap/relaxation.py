@@ -18,7 +18,7 @@ from typing import Any, Dict, List, Mapping, Tuple
 
 import numpy as np
 
-from relmap.geometry import Array, PoseKind, frozen, so3_exp_all, so3_log_all
+from relmap.geometry import Array, PoseKind, frozen, so3_exp, so3_log
 from relmap.graph import EdgeState
 from relmap.ids import FrameId
 from relmap.network import Network
@@ -103,8 +103,7 @@ class _Relaxation:
         self.piece_of = np.repeat(np.arange(len(begins)), np.diff(self.begin))
         self.part_of, first_of_part = self._find_parts()
         self.fixed = self.begin[first_of_part]
-        self.T = _place_chains(self.step, self.is_step, self.begin)
-        self._place_parts(first_of_part)
+        self.T = self._place_parts(doubtful, self.fixed)
 
     @property
     def chain_parts(self) -> Tuple[int, ...]:
@@ -162,32 +161,19 @@ class _Relaxation:
         number = {first: part for part, first in enumerate(firsts)}
         return [number[first] for first in root], np.array(firsts, np.intp)
 
-    def _place_parts(self, firsts: Array) -> None:
-        """A start: each piece as a whole, breadth first from the first piece of its part."""
-        piece_a, piece_b = self.piece_of[self.a], self.piece_of[self.b]
-        joins: List[List[Tuple[int, int]]] = [[] for _ in range(len(self.begin) - 1)]
-        # Of the closures between two pieces one is enough.
-        _, one = np.unique(np.stack([piece_a, piece_b]), axis=1, return_index=True)
-        for k in one.tolist():
-            if piece_a[k] != piece_b[k]:
-                joins[int(piece_a[k])].append((int(piece_b[k]), k))
-                joins[int(piece_b[k])].append((int(piece_a[k]), k))
-        T_ab = _transforms(self.measured)
-        done = np.zeros(len(joins), bool)
-        done[firsts] = True
-        queue = firsts.tolist()
-        for here in queue:  # grows
-            for other, k in joins[here]:
-                if done[other]:
-                    continue
-                done[other] = True
-                queue.append(other)
-                forward = piece_b[k] == other
-                end, start = (self.b[k], self.a[k]) if forward else (self.a[k], self.b[k])
-                T = T_ab[k] if forward else np.linalg.inv(T_ab[k])
-                move = self.T[start] @ T @ np.linalg.inv(self.T[end])
-                points = slice(int(self.begin[other]), int(self.begin[other + 1]))
-                self.T[points] = move @ self.T[points]
+    def _place_parts(self, doubtful: Array, fixed: Array) -> Array:
+        """A start (n, 4, 4): what measured steps join is placed by closures, and what measured edges join as a whole by
+        guesses; so guesses put nothing at odds that was measured."""
+        measured = self.is_step & ~doubtful
+        cut = np.concatenate([[True], ~measured])
+        T = _place_chains(self.step, measured, np.append(np.flatnonzero(cut), len(cut)))
+        body = np.cumsum(cut) - 1
+        root = _roots(int(body[-1]) + 1, body[self.a], body[self.b])
+        _place_bodies(T, body, np.unique(root), self.a, self.b, _transforms(self.measured))
+        guessed = np.flatnonzero(self.is_step & doubtful)
+        whole = root[body]
+        _place_bodies(T, whole, whole[fixed], guessed, guessed + 1, _transforms(self.step[guessed]))
+        return T
 
     def _round(self, kind: int, network: Network) -> Array:
         """One round: rotations (kind 1) or positions (kind 0). Returns how much each closure counts afterwards."""
@@ -196,7 +182,7 @@ class _Relaxation:
         if kind == 0:
             self.T[:, :3, 3] += change
         else:
-            self.T[:, :3, :3] = so3_exp_all(change) @ self.T[:, :3, :3]
+            self.T[:, :3, :3] = so3_exp(change) @ self.T[:, :3, :3]
         left = apart - (change[self.b] - change[self.a])
         sigmas = np.sqrt(np.sum(left * left, axis=1) / self.variance[:, kind])
         return np.asarray(np.minimum(1.0, _HUBER_SIGMAS / np.maximum(sigmas, 1e-12)))
@@ -206,8 +192,8 @@ class _Relaxation:
         """By how much b should move against a, in the part's coordinates, so that the edge fits (n, 3)."""
         if kind == 0:
             return np.asarray(np.einsum("nij,nj->ni", Ta[:, :3, :3], xi[:, :3]) - (Tb[:, :3, 3] - Ta[:, :3, 3]))
-        R: Array = Ta[:, :3, :3] @ so3_exp_all(xi[:, 3:]) @ np.swapaxes(Tb[:, :3, :3], 1, 2)
-        return so3_log_all(R)
+        R: Array = Ta[:, :3, :3] @ so3_exp(xi[:, 3:]) @ np.swapaxes(Tb[:, :3, :3], 1, 2)
+        return so3_log(R)
 
 
 def _variances(chain: SkeletonChain) -> Array:
@@ -235,7 +221,7 @@ def _roots(count: int, a: Array, b: Array) -> Array:
 def _transforms(xi: Array) -> Array:
     """T (n, 4, 4) of translations and rotation vectors (n, 6)."""
     T = np.tile(np.eye(4), (len(xi), 1, 1))
-    T[:, :3, :3], T[:, :3, 3] = so3_exp_all(xi[:, 3:]), xi[:, :3]
+    T[:, :3, :3], T[:, :3, 3] = so3_exp(xi[:, 3:]), xi[:, :3]
     return T
 
 
@@ -249,6 +235,35 @@ def _place_chains(step: Array, is_step: Array, begin: Array) -> Array:
         T[reaches] = T[reaches - shift] @ T[reaches]
         shift *= 2
     return np.asarray(T)
+
+
+def _place_bodies(T: Array, body: Array, firsts: Array, a: Array, b: Array, T_ab: Array) -> None:
+    """Moves bodies, sets of poses of which body[k] has pose k, so that one of the edges between two of them fits: breadth
+    first from the first bodies. The edges are between poses a and b, with T_ab."""
+    order = np.argsort(body, kind="stable")
+    begin = np.concatenate([[0], np.cumsum(np.bincount(body))])
+    body_a, body_b = body[a], body[b]
+    joins: List[List[Tuple[int, int]]] = [[] for _ in range(len(begin) - 1)]
+    # Of the edges between two bodies one is enough.
+    _, one = np.unique(np.stack([body_a, body_b]), axis=1, return_index=True)
+    for k in one.tolist():
+        if body_a[k] != body_b[k]:
+            joins[int(body_a[k])].append((int(body_b[k]), k))
+            joins[int(body_b[k])].append((int(body_a[k]), k))
+    done = np.zeros(len(joins), bool)
+    done[firsts] = True
+    queue = firsts.tolist()
+    for here in queue:  # grows
+        for other, k in joins[here]:
+            if done[other]:
+                continue
+            done[other] = True
+            queue.append(other)
+            forward = body_b[k] == other
+            end, start = (b[k], a[k]) if forward else (a[k], b[k])
+            move = T[start] @ (T_ab[k] if forward else np.linalg.inv(T_ab[k])) @ np.linalg.inv(T[end])
+            points = order[begin[other] : begin[other + 1]]
+            T[points] = move @ T[points]
 
 
 def relaxed_picture(skeleton: Skeleton) -> RelaxedPicture:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import math
 import uuid as uuids
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Iterator, Optional, Sequence, Union
 import numpy as np
 
 from relmap.choices import choice, choices
+from relmap.enums import NamedEnum, NumberedEnum
 from relmap.geometry import (
     Array,
     ArrayLike,
@@ -21,7 +21,7 @@ from relmap.geometry import (
     transform_message,
 )
 from relmap.graph import EdgeKind, EdgeState
-from relmap.ids import EdgeLike, FrameLike, SessionLike, as_session, as_sessions, edge_message, frame_message
+from relmap.ids import EdgeLike, FrameLike, edge_message, frame_message
 from relmap.record import Record
 from relmap.routes import RouteBy, RouteEnd, RouteFilter, RouteWeights, end_message
 from relmap.times import TimeLike, as_us
@@ -31,7 +31,7 @@ MAX_PIECE = 1000
 """The most frames, and loops, of a graph that are sent at once."""
 
 
-class EdgeAction(enum.Enum):
+class EdgeAction(NamedEnum):
     """What an operator does to a loop closure."""
 
     REMOVE = "remove"
@@ -46,7 +46,7 @@ class EdgeAction(enum.Enum):
     """Withdraws ACCEPT: it returns to its state before."""
 
 
-class EdgeOrder(enum.IntEnum):
+class EdgeOrder(NumberedEnum):
     """The order of a list of edges."""
 
     ID = 1
@@ -106,8 +106,8 @@ def _finite(what: str, value: float, low: float = 0.0, high: float = math.inf) -
 def edges_request(
     states: StatesLike,
     kinds: KindsLike,
-    session: SessionLike,
-    other_session: SessionLike,
+    session: int,
+    other_session: int,
     frame: Optional[FrameLike],
     since: Optional[TimeLike],
     until: Optional[TimeLike],
@@ -119,8 +119,8 @@ def edges_request(
 ) -> map_pb2.ListEdgesRequest:
     """The request of Client.edges(). ValueError: a filter that means nothing."""
     request = map_pb2.ListEdgesRequest(
-        session=as_session(session, "session", 0),
-        other_session=as_session(other_session, "other_session", 0),
+        session=session,
+        other_session=other_session,
         from_us=0 if since is None else as_us(since),
         until_us=0 if until is None else as_us(until),
         min_suspicion=_finite("min_suspicion", min_suspicion, 0.0, 1.0),
@@ -182,10 +182,12 @@ def route_request(
     or_from: Sequence[RouteEnd],
     or_to: Sequence[RouteEnd],
     filter: RouteFilter,
+    sessions: Sequence[int],
     covariance: bool,
     alternatives: int,
 ) -> map_pb2.FindRouteRequest:
-    """The request of Client.find_route(). ValueError: a number that is impossible."""
+    """The request of Client.find_route(); `sessions` are the numbers of those of the filter. ValueError: a number that is
+    impossible."""
     if not 0 <= alternatives <= 5:
         raise ValueError(f"alternatives is {alternatives}; must be 0..5")
     request = map_pb2.FindRouteRequest(
@@ -207,7 +209,7 @@ def route_request(
         request.weights.CopyFrom(map_pb2.RouteWeights(**values))
     request.filter.CopyFrom(
         map_pb2.RouteFilter(
-            sessions=as_sessions(filter.sessions),
+            sessions=sessions,
             avoid_frames=[frame_message(frame) for frame in filter.avoid_frames],
             avoid_labels=filter.avoid_labels,
             min_support=filter.min_support,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import enum
 import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Optional, Sequence, Union
 
 import numpy as np
 
+from relmap.enums import NumberedEnum
 from relmap.errors import reads_reply
 from relmap.geometry import (
     Array,
@@ -56,7 +56,7 @@ RouteEnd = Union[FrameId, HasFrameId, Label, Robot, View, str]
 """An end of a route: a frame, the frames of a label, a robot, or a view. A text is a frame if it has the form "3:120", else a label."""
 
 
-class RouteBy(enum.IntEnum):
+class RouteBy(NumberedEnum):
     """What a route minimises."""
 
     DISTANCE = 1

@@ -211,8 +211,9 @@ def read_closures(messages: Iterable[skeleton_pb2.SkeletonClosures]) -> Skeleton
     )
 
 
-def _six(T: Array) -> Array:
-    return np.concatenate([T[:3, 3], so3_log(T[:3, :3])])
+def _six(edges: Sequence[Edge]) -> Array:
+    T = np.array([edge.T_ab for edge in edges], float).reshape(-1, 4, 4)
+    return np.concatenate([T[:, :3, 3], so3_log(T[:, :3, :3])], axis=1)
 
 
 def _traces(edge: Edge) -> tuple[float, float]:
@@ -225,7 +226,7 @@ def _chain_of(session: int, edges: list[Edge], times: dict[FrameId, int]) -> Ske
         session,
         frozen(np.array([frame.index for frame in frames], np.int64)),
         frozen(np.array([times.get(frame, 0) // 1000 for frame in frames], np.int64)),
-        frozen(np.stack([_six(edge.T_ab) for edge in edges])),
+        frozen(_six(edges)),
         frozen(np.array([_traces(edge) for edge in edges])),
         frozen(np.ones(len(edges), np.int64)),
         frozen(np.array([edge.unmeasured for edge in edges], bool)),
@@ -261,7 +262,7 @@ def skeleton_of_edges(edges: Iterable[Edge], map_version: int = 0) -> Skeleton:
         frozen(np.array([e.id.ordinal for e in metric], np.int64)),
         frozen(np.array([int(e.state) for e in metric], np.int64)),
         frozen(np.array([e.carries for e in metric], bool)),
-        frozen(np.array([_six(e.T_ab) for e in metric], float).reshape(-1, 6)),
+        frozen(_six(metric)),
         frozen(np.array([_traces(e) for e in metric], float).reshape(-1, 2)),
         frozen(np.array([e.suspicion.value if e.suspicion else 0.0 for e in metric], float)),
         frozen(np.ones(len(metric), np.int64)),

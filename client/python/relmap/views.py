@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import re
 from dataclasses import dataclass, field
-from typing import Any, Optional, Union
+from typing import Optional, Union
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from relmap.v1 import common_pb2
 
 CameraLike = Union[StereoCamera, RawStereo, SessionLike]
 """The camera that took a view: a rectified one (the pictures are rectified), a rig before rectification (they are not),
-or a session of the map (its number, or a Session), whose camera took the raw pictures."""
+or a session of the map (its number, name or uuid, or a Session), whose camera took the raw pictures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,7 @@ class View:
         rectified: with a session as camera: the pictures are rectified already.
         supposed: the camera is only assumed; the covariance allows for another one.
         either_eye: with a session and one picture: it is not known which eye of the rig took it.
+        camera_called: the name or uuid by which `camera` names a session, since only the map tells its number; else None.
     """
 
     left: Optional[PictureLike] = None
@@ -45,6 +47,7 @@ class View:
     rectified: bool = False
     supposed: bool = False
     either_eye: bool = False
+    camera_called: Optional[str] = field(init=False, repr=False, default=None)
     _message: common_pb2.View = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -71,13 +74,28 @@ class View:
         elif isinstance(self.camera, RawStereo):
             message.raw.CopyFrom(raw_message(self.camera))
         elif self.camera is not None:
-            message.session = as_session(self.camera, "a camera other than StereoCamera and RawStereo")
+            session = as_session(self.camera, "a camera other than StereoCamera and RawStereo")
+            if isinstance(session, str):
+                object.__setattr__(self, "camera_called", session)
+            else:
+                message.session = session
         object.__setattr__(self, "_message", message)
 
     @property
     def message(self) -> common_pb2.View:
-        """The view as a message. Do not change it."""
+        """The view as a message. Do not change it. Without the camera if `camera_called` is set: see of_session()."""
         return self._message
+
+    def of_session(self, number: int) -> "View":
+        """The same view, whose camera is that of the session of this number. Pictures are not encoded again."""
+        message = common_pb2.View()
+        message.CopyFrom(self._message)
+        message.session = number
+        view = copy.copy(self)
+        object.__setattr__(view, "camera", number)
+        object.__setattr__(view, "camera_called", None)
+        object.__setattr__(view, "_message", message)
+        return view
 
 
 ViewLike = Union[View, FrameId, HasFrameId, PictureLike]
@@ -97,10 +115,5 @@ def as_view(view: ViewLike, right: Optional[PictureLike] = None, camera: Optiona
     if isinstance(view, (str, os.PathLike, bytes, np.ndarray)):
         return View(left=view, right=right, camera=camera)
     raise TypeError(f"a view is a View, a FrameId, or {KINDS_OF_PICTURES}, not {type(view).__name__}")
-
-
-def view_message(view: Any, right: Optional[PictureLike] = None, camera: Optional[CameraLike] = None) -> common_pb2.View:
-    """A view as a message; ValueError, TypeError as as_view()."""
-    return as_view(view, right, camera).message
 
 

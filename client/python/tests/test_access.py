@@ -98,11 +98,15 @@ def test_files_of_credentials_are_checked(folder: pathlib.Path, tmp_path: pathli
     open_to_others = tmp_path / "open.pem"
     open_to_others.write_text(anna)
     open_to_others.chmod(0o644)
-    with pytest.raises(relmap.DaemonError, match="others can read"):
+    with pytest.raises(ValueError, match="others can read"):
         read_credentials(open_to_others)
-    with pytest.raises(relmap.DaemonError) as raised:
-        read_credentials(tmp_path / "nothing.pem")
-    assert raised.value.reason == relmap.Reason.NO_SUCH_FILE
+    with pytest.raises(FileNotFoundError, match="nothing.pem"):
+        relmap.connect("localhost:1", credentials=tmp_path / "nothing.pem")
+    for data in (b"no credentials", b"\xff\xfe"):
+        (tmp_path / "other.pem").write_bytes(data)
+        (tmp_path / "other.pem").chmod(0o600)
+        with pytest.raises(ValueError, match="other.pem holds no credentials"):
+            relmap.connect("localhost:1", credentials=tmp_path / "other.pem")
     for text in ("", "no PEM", Credentials(b"").__repr__(), anna.replace("CERTIFICATE", "CERT")):
         with pytest.raises(ValueError):
             parse_credentials(text)

@@ -49,19 +49,23 @@ def test_records_stand_for_what_they_are_of(client: relmap.Client) -> None:
     "wrong, error, words",
     [
         (lambda c: c.edges(session=-1), ValueError, "0 or more"),
-        (lambda c: c.edges(session="2"), TypeError, "a Session"),
+        (lambda c: c.edges(session=""), ValueError, "empty"),
+        (lambda c: c.edges(session=2.0), TypeError, "a Session"),
+        (lambda c: c.skeleton(sessions=[1, None]), TypeError, "a Session"),
         (lambda c: c.edges(order="worst"), ValueError, "'suspicion'"),
         (lambda c: c.edges(states=["fine"]), ValueError, "'accepted'"),
         (lambda c: c.edges(timeout=-1), ValueError, "above 0"),
         (lambda c: c.status(timeout=-1), ValueError, "above 0"),
         (lambda c: c.find_route("1:1", "2:1", by="beauty"), ValueError, "'certainty'"),
         (lambda c: c.export_trajectories("csv"), ValueError, "'tum'"),
-        (lambda c: c.localise(np.zeros((64, 64), np.uint8), camera="1"), TypeError, "a Session"),
+        (lambda c: c.localise(np.zeros((64, 64), np.uint8), camera=1.5), TypeError, "a Session"),
         (lambda c: c.localise(open(os.devnull, "rb")), TypeError, "file.read()"),
         (lambda c: c.localise(None), TypeError, "NoneType"),
         (lambda c: c.watch(silence=0), ValueError, "silence"),
         (lambda c: c.iter_edges(min_suspicion=2), ValueError, "min_suspicion"),
-        (lambda c: c.export_frames("all"), TypeError, "a Session"),
+        (lambda c: c.export_frames(b"all"), TypeError, "a Session"),
+        (lambda c: c.iter_edges(other_session="evening"), ValueError, "needs session"),
+        (lambda c: c.watch(sessions=[0]), ValueError, "1 or more"),
         (lambda c: c.frame(("2", 8)), TypeError, "a Frame"),
     ],
 )
@@ -134,8 +138,10 @@ def test_tokens_and_certificates_are_checked(tmp_path: pathlib.Path) -> None:
     with pytest.raises(ValueError, match="PEM"):
         credentials_of(None, "1234", b"something")
     (tmp_path / "other").write_text("something")
-    with pytest.raises(relmap.DaemonError, match="PEM"):
+    with pytest.raises(ValueError, match="PEM"):
         credentials_of(None, "1234", tmp_path / "other")
+    with pytest.raises(FileNotFoundError):
+        credentials_of(None, "1234", tmp_path / "nothing")
 
 
 def test_what_is_printed_is_short(client: relmap.Client) -> None:
@@ -263,6 +269,37 @@ def test_programs_that_end_early_lose_nothing(own_daemon: Daemon) -> None:
         client.wait_idle()
         found = {session.name: (session.frames, session.state.name) for session in client.sessions()}
     assert found == {"forgotten": (3, "OPEN"), "interrupted": (3, "OPEN")}
+
+
+LEFT_OPEN = """
+import atexit, sys, threading
+
+def tell():  # registered first, runs last
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and thread.name != "relmap silence":
+            thread.join(20)
+            print(thread.name, "is at work" if thread.is_alive() else "is done", flush=True)
+
+atexit.register(tell)
+import points_world, relmap
+client = relmap.connect(sys.argv[1], timeout=600)
+session = client.session("cart", points_world.CAMERA, name="left open")
+session.open()
+for step in points_world.drive(3):
+    session.add(step.time, step.T_odom_frame, step.step_cov, tracks=step.tracks, features=step.features)
+events = client.watch()
+next(events)
+"""
+
+
+def test_no_call_outlasts_the_program(own_daemon: Daemon) -> None:
+    """While the interpreter ends, nothing could end a call any more, and grpcio would wait for that."""
+    path = os.pathsep.join([str(PYTHON), str(PYTHON / "notebooks")])
+    done = subprocess.run(
+        [sys.executable, "-c", LEFT_OPEN, own_daemon.server],
+        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path}, timeout=PATIENCE_S,
+    )  # fmt: skip
+    assert done.returncode == 0 and "is at work" not in done.stdout, done.stdout + done.stderr
 
 
 def test_a_program_that_loses_keyframes_says_so(own_daemon: Daemon) -> None:

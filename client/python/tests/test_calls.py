@@ -265,7 +265,7 @@ def test_each_group_of_reasons_is_an_exception(client: relmap.Client) -> None:
             rng.integers(0, 60, (n, 128), dtype=np.uint8),
         )  # fmt: skip
         client.localise(relmap.View(features=strange, camera=points_world.CAMERA))
-    with pytest.raises(relmap.RobotDataError):
+    with pytest.raises(relmap.RequestError):
         client.set_label("1:1", "x" * 100)
     with pytest.raises(relmap.ClosureStateError):
         client.edit_edge("1:5/0", "remove")

@@ -5,16 +5,20 @@ from __future__ import annotations
 import pathlib
 import xml.dom.minidom
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 import relmap
 from relmap import geometry
-from relmap.drawing.html import table_html
+from relmap.drawing.html import _verification_text, table_html
 from relmap.drawing.picture import draw_map
+from relmap.drawing.style import text_width
 from relmap.drawing.svg import Svg
 from relmap.geometry import frozen
 from relmap.graph import EdgeState, LabelledFrames
+from relmap.routes import Route
 from relmap.skeleton import Skeleton, SkeletonChain, SkeletonClosures
 
 EVIL = '<script>alert(1)</script>&"\'\x00\x1b\ud800'
@@ -88,15 +92,6 @@ def test_a_true_circle_stays() -> None:
     np.testing.assert_allclose(T, expected, atol=1e-4)
 
 
-def test_chains_without_pins_are_relaxed_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    import relmap.network
-
-    skeleton, _ = _circle(200, 0.01, 4)
-    pinned = np.concatenate(skeleton.relaxed_picture().chains)
-    monkeypatch.setattr(relmap.network, "_MAX_PINNED", 0)
-    np.testing.assert_allclose(np.concatenate(skeleton.relaxed_picture().chains), pinned, atol=2e-3)
-
-
 def _ahead(session: int, metres: list[float], unmeasured: int = -1, carried: int = -1, variance: float = 1e-6) -> SkeletonChain:
     """A drive straight ahead, with a step of so many metres to each point but the first; that with the number `unmeasured` or
     `carried` is doubtful, and has this variance."""
@@ -148,16 +143,16 @@ def test_guesses_beside_which_nothing_was_measured_have_their_own_variances() ->
     np.testing.assert_allclose(_z(ridden, three), [0, 1, 3.5, 4.5], atol=2e-2)
 
 
-@pytest.mark.parametrize("pins, pinned", [(600, 1500), (1, 1500), (1, 5)])
+@pytest.mark.parametrize("dense, exact", [(400, 8), (5, 8), (5, 1)])
 def test_chains_of_many_pieces_are_laid_out_by_what_was_measured(
-    pins: int, pinned: int, monkeypatch: pytest.MonkeyPatch
+    dense: int, exact: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each of two drives round one circle has guesses, metres and radians off, beside which the other measured; a third drive
     elsewhere is a part of its own."""
     import relmap.network
 
-    monkeypatch.setattr(relmap.network, "_MAX_PINS", pins)
-    monkeypatch.setattr(relmap.network, "_MAX_PINNED", pinned)
+    monkeypatch.setattr(relmap.network, "_MAX_DENSE", dense)
+    monkeypatch.setattr(relmap.network, "_MAX_EXACT_DEGREE", exact)
     rng = np.random.default_rng(5)
     skeleton, true = _circle(200, 1e-6)
     drive = skeleton.chains[0]
@@ -205,6 +200,54 @@ def test_texts_are_escaped() -> None:
     svg.text((1, 1), EVIL, fill=EVIL)
     xml.dom.minidom.parseString(svg.finish(EVIL))
     assert "<script" not in table_html([EVIL], [{EVIL: EVIL}], 5, EVIL)
+
+
+def _route(steps: int, labels: dict[int, str]) -> Route:
+    """A route straight to the right, a metre a step."""
+    n = steps + 1
+    T = np.tile(np.eye(4), (n, 1, 1))
+    T[:, 0, 3] = np.arange(n)
+    return Route(
+        frames=tuple(relmap.FrameId(1, k) for k in range(n)), T=T, cov=None, T_to_next=T[1:], distance_m=np.arange(n),
+        time_s=np.arange(n), labels=tuple((labels[k],) if k in labels else () for k in range(n)),
+        edges=tuple(relmap.EdgeId(relmap.FrameId(1, k + 1), 0) for k in range(steps)),
+        kinds=(relmap.EdgeKind.ODOMETRY,) * steps, long_loop=np.zeros(steps, bool), carried=np.zeros(steps, bool),
+        unmeasured=np.zeros(steps, bool), cost=1.0 * steps, long_loops=0, carried_stretches=(), unmeasured_stretches=(),
+        unmeasured_m=0.0, frame_by_frame="", bound_closures=False, no_way_by_edges=False, from_view=None, to_view=None,
+        shared=0.0, alternatives=(), map_version=1,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("steps", [3, 40, 400])
+def test_no_label_of_a_route_runs_into_the_rings_at_its_ends(steps: int) -> None:
+    """Neither that of an end nor that of a frame beside it."""
+    named = {0: "dock", 1: "gate", steps - 1: "hall", steps: "kitchen"}
+    document = xml.dom.minidom.parseString(_route(steps, named).draw().svg)
+    rings = [c for c in document.getElementsByTagName("circle") if c.getAttribute("r") == "6"]
+    assert len(rings) == 2
+    texts = {t.firstChild.nodeValue: t for t in document.getElementsByTagName("text")}
+    assert {"dock", "kitchen"} <= texts.keys()
+    for name in named.values():
+        if name not in texts:
+            continue  # there is no room for it
+        left, baseline = (float(texts[name].getAttribute(a)) for a in ("x", "y"))
+        right = left + text_width(name, 11)
+        for ring in rings:
+            x, y = (float(ring.getAttribute(a)) for a in ("cx", "cy"))
+            away = np.hypot(max(left - x, 0, x - right), max(baseline - 9 - y, 0, y - baseline - 2))
+            assert away >= 8, f"{name} is {away:.1f} points from the middle of a ring"
+
+
+def test_what_was_not_verified_here_is_not_said_to_be() -> None:
+    def said(verification: relmap.Verification) -> str:
+        return _verification_text(
+            cast(relmap.Edge, SimpleNamespace(id=relmap.EdgeId(relmap.FrameId(3, 7), 1), verification=verification, inliers=41))
+        )
+
+    assert said(relmap.Verification.PNP) == "verified by pnp: 41 inliers"
+    assert said(relmap.Verification.IMPORTED) == "imported with session 3, not verified here"
+    for other in (relmap.Verification.COMPOUNDED, relmap.Verification.NONE):
+        assert "inliers" not in said(other) and "not verified" in said(other)
 
 
 def test_an_empty_map_is_drawn() -> None:

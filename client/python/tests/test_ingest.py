@@ -101,6 +101,7 @@ def test_refusals_are_told_once(own_daemon: Daemon) -> None:
             assert raised.value.reason == relmap.Reason.SESSION_FROZEN
             assert 10 in [r.sequence for r in raised.value.refusals]
             assert isinstance(raised.value, relmap.RobotDataError)
+            assert "an operator has frozen the session" in str(raised.value)
             client.freeze_session(session.number, False)
             _add(session, steps[11])
             assert session.flush() == 12

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import grpc
+import numpy as np
 import pytest
 import relmap
 from relmap.errors import error_of, error_of_rpc
@@ -86,3 +87,28 @@ def test_errors_without_details_are_those_of_the_code() -> None:
     assert isinstance(error_of_rpc(_Failed(grpc.StatusCode.UNAVAILABLE)), relmap.Unreachable)
     assert isinstance(error_of_rpc(_Failed(grpc.StatusCode.UNAVAILABLE, b"\xff\xff garbage")), relmap.Unreachable)
     assert error_of_rpc(_Failed(grpc.StatusCode.UNKNOWN)).reason == relmap.Reason.INTERNAL
+
+
+def test_what_a_question_asks_is_no_data_of_a_robot() -> None:
+    """BAD_SIZE of a keyframe is about what a robot sent, of a picture in a question about what was asked."""
+    assert type(error_of(relmap.Reason.BAD_SIZE, "why")) is relmap.RobotDataError
+    assert type(error_of(relmap.Reason.BAD_SIZE, "why", asks=True)) is relmap.RequestError
+    assert type(error_of(relmap.Reason.NEW_PLACE, "why", asks=True)) is relmap.PlaceNotRecognised
+    assert type(error_of(relmap.Reason.DEADLINE, "why", asks=True)) is relmap.DeadlineExceeded
+
+
+def test_a_picture_of_another_size_than_its_camera_is_a_wrong_question(client: relmap.Client) -> None:
+    grey = np.zeros((100, 120), np.uint8)
+    small = relmap.StereoCamera(f=400, cx=256, cy=192, baseline=0.12, width=512, height=384)
+    calls = (
+        lambda: client.localise(grey, camera=small),
+        lambda: client.match_image(grey, camera=small),
+        lambda: client.find_route("1:1", relmap.View(left=grey, camera=small)),
+    )
+    for call in calls:
+        with pytest.raises(relmap.RequestError, match="120 x 100") as raised:
+            call()
+        assert raised.value.reason == relmap.Reason.BAD_SIZE
+    with pytest.raises(relmap.RequestError) as raised:
+        client.set_label("1:1", "two\nlines")
+    assert raised.value.reason == relmap.Reason.BAD_NAME

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import pathlib
+import pickle
 import struct
 import zlib
 
@@ -14,6 +15,7 @@ import relmap
 from relmap import geometry
 from relmap.address import ServerAddress, resolve_server
 from relmap.crc32c import crc32c
+from relmap.graph import EdgeEvent
 from relmap.measurements import Features, Tracks
 from relmap.pictures import encode_png, picture_bytes
 from relmap.requests import as_uuid, edges_request
@@ -44,6 +46,23 @@ def test_exp_and_log_are_inverse() -> None:
         step = rng.normal(0, 1e-5, 6)
         right = geometry.log(T @ geometry.exp(step) @ geometry.inverse(T))
         np.testing.assert_allclose(right, geometry.adjoint(T) @ step, atol=1e-9)
+
+
+def test_rotations_are_the_same_one_by_one_and_all_at_once() -> None:
+    axis = np.random.default_rng(4).normal(size=(5, 40, 3))
+    axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+    angles = np.array([0, 1e-12, 1e-9, 1e-6, 0.1, 1.5, 2.2, 3.1, np.pi - 1e-9, np.pi]).repeat(4)
+    phi = axis * angles[:, None]
+    R = geometry.so3_exp(phi)
+    assert R.shape == (5, 40, 3, 3)
+    back = geometry.so3_log(R)
+    # Of half a turn either direction of the axis is right.
+    same = np.where(np.sum(back * phi, axis=-1, keepdims=True) < 0, -back, back)
+    np.testing.assert_allclose(same[:, :-4], back[:, :-4])
+    np.testing.assert_allclose(same, phi, atol=1e-8)
+    for one, turn, vector in zip(phi[0], R[0], back[0]):
+        np.testing.assert_array_equal(geometry.so3_exp(one), turn)
+        np.testing.assert_array_equal(geometry.so3_log(turn), vector)
 
 
 def test_messages_of_transforms_come_back() -> None:
@@ -263,3 +282,15 @@ def test_addresses_are_found_as_by_cpp(tmp_path: pathlib.Path) -> None:
     for text in ("nowhere", "host:", "host:x", ":5", "host:0", "host:65536"):
         with pytest.raises(relmap.RequestError):
             resolve_server(text)
+
+
+def test_enumerations_print_as_names() -> None:
+    state, later = relmap.EdgeState.ACCEPTED, relmap.Reason(999)
+    assert (str(state), repr(state), f"{state}", f"{state:>9}") == ("ACCEPTED", "EdgeState.ACCEPTED", "ACCEPTED", " ACCEPTED")
+    assert (str(later), repr(later)) == ("UNKNOWN_999", "Reason.UNKNOWN_999")
+    assert state == 2 and f"{state:d}" == "2" and {2: "x"}[state] == "x"
+    assert pickle.loads(pickle.dumps(state)) is state
+    for member in (relmap.EdgeAction.REMOVE, relmap.EdgeOrder.TIME, relmap.PoseKind.RELATIVE, relmap.RouteBy.TIME, relmap.ExportFormat.TUM):
+        assert str(member) == member.name and repr(member) == f"{type(member).__name__}.{member.name}"
+    event = EdgeEvent(7, state, relmap.Reason.CONSISTENT, None, "", 0, "")
+    assert "state=EdgeState.ACCEPTED, reason=Reason.CONSISTENT" in repr(event)

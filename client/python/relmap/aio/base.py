@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import uuid as uuids
-from typing import Any, AsyncIterator, Awaitable, Callable, List, Optional, Set, TypeVar
+from typing import Any, AsyncIterator, Awaitable, Callable, List, Optional, Set, TypeVar, Union
 
 from relmap.aio.calls import Caller
 from relmap.connection import Timeout
 from relmap.errors import Unreachable, ViewExpired
+from relmap.graph import Sessions, read_session
+from relmap.ids import SessionLike, SessionsLike, as_session, as_sessions
 from relmap.operations import OnProgress, read_progress
-from relmap.v1 import admin_pb2
+from relmap.v1 import admin_pb2, map_pb2
+from relmap.views import View
 
 T = TypeVar("T")
 
@@ -48,11 +51,37 @@ class ClientBase:
     async def _ask(self, method: Any, request: Any, timeout: Timeout) -> Any:
         return await self._caller.ask(method, request, timeout)
 
-    async def _edit(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+    async def _list_sessions(self, timeout: Timeout) -> Sessions:
+        return Sessions(
+            await self._list(
+                self._map.ListSessions, map_pb2.ListSessionsRequest, lambda reply: reply.sessions, read_session, timeout
+            )
+        )
+
+    async def _numbers(self, sessions: SessionsLike, timeout: Timeout) -> List[int]:
+        """The numbers of the sessions that are meant; the daemon is asked only if one is named. RequestError as
+        Sessions.number_of()."""
+        return await self._looked_up(as_sessions(sessions), timeout)
+
+    async def _number(self, session: SessionLike, timeout: Timeout, what: str = "session", least: int = 1) -> int:
+        """The same of one session; `what` and `least` as in as_session()."""
+        return (await self._looked_up([as_session(session, what, least)], timeout))[0]
+
+    async def _looked_up(self, known: List[Union[int, str]], timeout: Timeout) -> List[int]:
+        listed = Sessions() if all(isinstance(one, int) for one in known) else await self._list_sessions(timeout)
+        return [listed.number_of(one) for one in known]
+
+    async def _with_camera(self, view: View, timeout: Timeout) -> View:
+        """The view with the number of the session whose camera took it."""
+        if view.camera_called is None:
+            return view
+        return view.of_session(await self._number(view.camera_called, timeout))
+
+    async def _edit(self, method: Any, request: Any, timeout: Timeout) -> Any:
         request.idempotency_key = uuids.uuid4().hex  # so that it may be sent again
         return await self._retry(method, request, timeout)
 
-    async def _retry(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+    async def _retry(self, method: Any, request: Any, timeout: Timeout) -> Any:
         pause = FIRST_PAUSE_S
         while True:
             try:
@@ -63,7 +92,7 @@ class ClientBase:
             await asyncio.sleep(pause)
             pause *= 4
 
-    async def _work(self, method: Any, request: Any, on_progress: Optional[OnProgress], timeout: Optional[float]) -> Any:
+    async def _work(self, method: Any, request: Any, on_progress: Optional[OnProgress], timeout: Timeout) -> Any:
         last = admin_pb2.Progress()
         async for reply in self._caller.stream(method, request, timeout):
             if on_progress is not None and reply.WhichOneof("outcome") is None:
@@ -85,7 +114,7 @@ class ClientBase:
         request: Callable[[], Any],
         items: Callable[[Any], Any],
         read: Callable[[Any], T],
-        timeout: Optional[float],
+        timeout: Timeout,
     ) -> List[T]:
         """All pages of a list; if its version of the map expires, once more from the beginning."""
         countdown = self._caller.countdown(timeout)
@@ -98,7 +127,7 @@ class ClientBase:
 
         return await self._restarted(whole)
 
-    async def _replies(self, method: Any, request: Any, timeout: Optional[float]) -> List[Any]:
+    async def _replies(self, method: Any, request: Any, timeout: Timeout) -> List[Any]:
         """All replies of a stream; if its version of the map expires, once more from the beginning."""
         countdown = self._caller.countdown(timeout)
 
@@ -114,21 +143,6 @@ class ClientBase:
             except ViewExpired as error:
                 last = error
         raise last
-
-    def _iterate(
-        self,
-        method: Any,
-        request: Callable[[], Any],
-        items: Callable[[Any], Any],
-        read: Callable[[Any], T],
-        timeout: Optional[float],
-    ) -> AsyncIterator[T]:
-        """The items of a list, page by page; the timeout is for each page."""
-
-        def replies() -> AsyncIterator[Any]:
-            return self._pages(method, request(), timeout)
-
-        return self._given(replies, items, read, "items", "list")
 
     async def _given(
         self,

@@ -6,7 +6,7 @@ from typing import Optional, Union
 
 from relmap.aio.base import ClientBase
 from relmap.evidence import ClosureMatrix, EdgeEdit, Explanation, read_count, read_edit, read_explanation
-from relmap.ids import EdgeLike, FrameLike, SessionsLike, as_sessions, edge_message, frame_message
+from relmap.ids import EdgeLike, FrameLike, SessionsLike, edge_message, frame_message
 from relmap.requests import EdgeAction, edge_state_request
 from relmap.v1 import evidence_pb2, map_pb2
 
@@ -31,11 +31,13 @@ class ClosureCalls(ClientBase):
     ) -> ClosureMatrix:
         """How many loop closures there are between each two sessions; only pairs with one of `sessions`, if any are given.
         RequestError: NO_SUCH_SESSION."""
+        countdown = self._caller.countdown(timeout)
+        numbers = await self._numbers(sessions, countdown)
 
         def request() -> evidence_pb2.GetClosureMatrixRequest:
-            return evidence_pb2.GetClosureMatrixRequest(sessions=as_sessions(sessions))
+            return evidence_pb2.GetClosureMatrixRequest(sessions=numbers)
 
-        cells = await self._list(self._map.GetClosureMatrix, request, lambda reply: reply.cells, read_count, timeout)
+        cells = await self._list(self._map.GetClosureMatrix, request, lambda reply: reply.cells, read_count, countdown)
         return ClosureMatrix(cells)
 
     async def edit_edge(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, AsyncIterator, List, Optional, Union
 
-from relmap.aio.base import LONG_S, ClientBase, copied
+from relmap.aio.base import LONG_S, ClientBase
 from relmap.choices import choice
+from relmap.connection import Countdown
 from relmap.exports import ExportedFrame, ExportFormat, TrajectoryFile, read_exported_frame
 from relmap.graph import Edges, read_edge
-from relmap.ids import SessionLike, SessionsLike, as_session, as_sessions
+from relmap.ids import SessionLike, SessionsLike, as_sessions
 from relmap.routes import Trajectory, parse_tum
 from relmap.v1 import map_pb2
 
@@ -34,9 +35,16 @@ class ExportCalls(ClientBase):
             RequestError: NO_SUCH_SESSION, NOT_STEREO: a mono session, which has no motion.
             ViewExpired: the version expired again and again; export one session at a time.
         """
-        request = map_pb2.ExportRequest(format=int(choice("format", ExportFormat, format)), sessions=as_sessions(sessions))  # type: ignore[arg-type]
+        kind = choice("format", ExportFormat, format)
+        countdown = self._caller.countdown(timeout)
+        return await self._trajectories(kind, await self._numbers(sessions, countdown), countdown)
+
+    async def _trajectories(
+        self, format: ExportFormat, sessions: List[int], countdown: Countdown
+    ) -> tuple[TrajectoryFile, ...]:
+        request = map_pb2.ExportRequest(format=int(format), sessions=sessions)  # type: ignore[arg-type]
         files: List[TrajectoryFile] = []
-        for reply in await self._replies(self._map.Export, request, timeout):
+        for reply in await self._replies(self._map.Export, request, countdown):
             doubtful = Edges(read_edge(edge) for edge in reply.unmeasured)
             if files and files[-1].session == reply.session:
                 last = files[-1]
@@ -48,8 +56,9 @@ class ExportCalls(ClientBase):
     async def odometry(self, session: SessionLike, *, timeout: Optional[float] = LONG_S) -> Trajectory:
         """The motion of a session, chained along its odometry edges: it drifts, and knows of no closure. Raises as
         export_trajectories()."""
-        number = as_session(session)
-        files = await self.export_trajectories(ExportFormat.TUM, number, timeout=timeout)
+        countdown = self._caller.countdown(timeout)
+        number = await self._number(session, countdown)
+        files = await self._trajectories(ExportFormat.TUM, [number], countdown)
         return parse_tum(number, b"".join(file.data for file in files))
 
     def export_frames(
@@ -64,12 +73,16 @@ class ExportCalls(ClientBase):
             RequestError: NO_SUCH_SESSION, NOT_STEREO.
             ViewExpired: as above; the message says how many frames were given out.
         """
-        request = map_pb2.ExportRequest(
-            format=map_pb2.EXPORT_FORMAT_FRAMES, sessions=as_sessions(sessions), landmarks=landmarks
-        )
+        as_sessions(sessions)  # so that wrong arguments are told here, and not when the first frame is asked for
         countdown = self._caller.countdown(timeout)
 
-        def replies() -> AsyncIterator[Any]:
-            return self._caller.resumed(self._map.Export, copied(request), countdown)
+        async def replies() -> AsyncIterator[Any]:
+            request = map_pb2.ExportRequest(
+                format=map_pb2.EXPORT_FORMAT_FRAMES,
+                sessions=await self._numbers(sessions, countdown),
+                landmarks=landmarks,
+            )
+            async for reply in self._caller.resumed(self._map.Export, request, countdown):
+                yield reply
 
         return self._given(replies, lambda reply: reply.frames, read_exported_frame, "frames", "export")

@@ -6,7 +6,7 @@ import uuid as uuids
 from typing import Any, List, Optional
 
 from relmap.aio.base import LONG_S, ClientBase, copied
-from relmap.ids import SessionLike, SessionsLike, as_session, as_sessions
+from relmap.ids import SessionLike, SessionsLike
 from relmap.operations import (
     AuditLog,
     Backup,
@@ -44,10 +44,11 @@ class OperatorCalls(ClientBase):
         Raises:
             DaemonError: BUDGET_EXCEEDED: the daemon verifies, backs up or compacts already.
         """
-        request = admin_pb2.VerifyRequest(sessions=as_sessions(sessions))
+        countdown = self._caller.countdown(timeout)
+        request = admin_pb2.VerifyRequest(sessions=await self._numbers(sessions, countdown))
         findings: List[Finding] = []
         summary = admin_pb2.VerifySummary()
-        async for reply in self._caller.stream(self._admin.Verify, request, timeout):
+        async for reply in self._caller.stream(self._admin.Verify, request, countdown):
             findings.extend(read_finding(finding) for finding in reply.findings)
             if reply.HasField("summary"):
                 summary = reply.summary
@@ -82,8 +83,9 @@ class OperatorCalls(ClientBase):
     async def repair(self, sessions: SessionsLike = (), *, timeout: Optional[float] = None) -> None:
         """Always refused (DaemonError, FOLDER_LOCKED), since a map is repaired only while no daemon serves it; the message
         says how."""
-        request = admin_pb2.RepairRequest(sessions=as_sessions(sessions))
-        async for _ in self._caller.stream(self._admin.Repair, request, timeout):
+        countdown = self._caller.countdown(timeout)
+        request = admin_pb2.RepairRequest(sessions=await self._numbers(sessions, countdown))
+        async for _ in self._caller.stream(self._admin.Repair, request, countdown):
             pass
 
     async def reindex(self, vocabulary: str = "", *, timeout: Optional[float] = None) -> None:
@@ -118,9 +120,10 @@ class OperatorCalls(ClientBase):
         self, session: SessionLike, frozen: bool = True, *, timeout: Optional[float] = None
     ) -> None:
         """Freezes a session, or thaws it: a frozen one takes no keyframes, and its edges and landmarks do not change.
-        RequestError: NO_SUCH_SESSION. RobotDataError: SESSION_DELETED."""
-        request = admin_pb2.FreezeSessionRequest(session=as_session(session), frozen=frozen)
-        await self._edit(self._admin.FreezeSession, request, timeout)
+        RequestError: NO_SUCH_SESSION, SESSION_DELETED."""
+        countdown = self._caller.countdown(timeout)
+        request = admin_pb2.FreezeSessionRequest(session=await self._number(session, countdown), frozen=frozen)
+        await self._edit(self._admin.FreezeSession, request, countdown)
 
     async def delete_session(
         self,
@@ -140,8 +143,10 @@ class OperatorCalls(ClientBase):
             RequestError: NO_SUCH_SESSION, INVALID_ARGUMENT: the uuid is another's.
             DeadlineExceeded: the deletion continues; the same call reports its progress.
         """
-        request = admin_pb2.DeleteSessionRequest(session=as_session(session), uuid=uuid, idempotency_key=uuids.uuid4().hex)
-        await self._work(self._admin.DeleteSession, request, on_progress, timeout)
+        countdown = self._caller.countdown(timeout)
+        number = await self._number(session, countdown)
+        request = admin_pb2.DeleteSessionRequest(session=number, uuid=uuid, idempotency_key=uuids.uuid4().hex)
+        await self._work(self._admin.DeleteSession, request, on_progress, countdown)
 
     async def audit(
         self,

@@ -20,6 +20,7 @@ from relmap.routes import (
     read_transform_between,
 )
 from relmap.v1 import map_pb2
+from relmap.views import View
 
 
 class RouteCalls(ClientBase):
@@ -59,11 +60,18 @@ class RouteCalls(ClientBase):
             PlaceNotRecognised: for an end that is a view.
             ViewExpired: the version expired again and again: try again when the daemon is less busy.
         """
+        countdown = self._caller.countdown(timeout)
+
+        async def known(end: RouteEnd) -> RouteEnd:
+            return await self._with_camera(end, countdown) if isinstance(end, View) else end
+
         request = route_request(
-            start, goal, by, weights, count_standing, max_cost, or_from, or_to, filter, covariance, alternatives
-        )
+            await known(start), await known(goal), by, weights, count_standing, max_cost,
+            [await known(end) for end in or_from], [await known(end) for end in or_to],
+            filter, await self._numbers(filter.sessions, countdown), covariance, alternatives,
+        )  # fmt: skip
         parts: List[RouteParts] = []
-        for reply in await self._replies(self._map.FindRoute, request, timeout):
+        for reply in await self._replies(self._map.FindRoute, request, countdown):
             while len(parts) <= reply.route:
                 parts.append(RouteParts())
             parts[reply.route].add(reply)

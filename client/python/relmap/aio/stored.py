@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, AsyncIterator, Optional
 
 from relmap.aio.base import ClientBase
-from relmap.graph import Edge, Edges, Frame, LabelledFrames, Labels, Sessions, read_edge, read_frame, read_session
-from relmap.ids import FrameLike, SessionLike, frame_message, read_frame_id
+from relmap.graph import Edge, Edges, Frame, LabelledFrames, Labels, Sessions, read_edge, read_frame
+from relmap.ids import FrameLike, SessionLike, as_session, frame_message, read_frame_id
 from relmap.requests import EdgeOrder, KindsLike, OrderLike, StatesLike, edges_request
 from relmap.status import DaemonStatus, Robots, read_robot, read_status
 from relmap.times import TimeLike
@@ -41,11 +41,7 @@ class StoredCalls(ClientBase):
 
     async def sessions(self, *, timeout: Optional[float] = None) -> Sessions:
         """All sessions, of one version of the map."""
-        return Sessions(
-            await self._list(
-                self._map.ListSessions, map_pb2.ListSessionsRequest, lambda reply: reply.sessions, read_session, timeout
-            )
-        )
+        return await self._list_sessions(timeout)
 
     async def edges(
         self,
@@ -80,13 +76,16 @@ class StoredCalls(ClientBase):
             ViewExpired: the version expired again and again; use iter_edges(), or narrower filters.
         """
 
+        countdown = self._caller.countdown(timeout)
+        one = await self._number(session, countdown, "session", 0)
+        other = await self._number(other_session, countdown, "other_session", 0)
+
         def request() -> map_pb2.ListEdgesRequest:
             return edges_request(
-                states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges,
-                around_metres, order,
-            )  # fmt: skip
+                states, kinds, one, other, frame, since, until, min_suspicion, around, around_edges, around_metres, order
+            )
 
-        return Edges(await self._list(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout))
+        return Edges(await self._list(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, countdown))
 
     def iter_edges(
         self,
@@ -118,16 +117,23 @@ class StoredCalls(ClientBase):
             timeout: seconds for each page, since what is done with the edges takes time, too.
         """
 
-        def request() -> map_pb2.ListEdgesRequest:
+        def request(one: int, other: int) -> map_pb2.ListEdgesRequest:
             made = edges_request(
-                states, kinds, session, other_session, frame, since, until, min_suspicion, around, around_edges,
-                around_metres, order,
-            )  # fmt: skip
+                states, kinds, one, other, frame, since, until, min_suspicion, around, around_edges, around_metres, order
+            )
             made.page_size = page_size
             return made
 
-        request()  # so that wrong arguments are told here, and not when the first edge is asked for
-        return self._iterate(self._map.ListEdges, request, lambda reply: reply.edges, read_edge, timeout)
+        # So that wrong arguments are told here, and not when the first edge is asked for.
+        ends = as_session(session, "session", 0), as_session(other_session, "other_session", 0)
+        request(*(1 if isinstance(end, str) else end for end in ends))
+
+        async def replies() -> AsyncIterator[Any]:
+            one, other = await self._looked_up(list(ends), timeout)
+            async for reply in self._pages(self._map.ListEdges, request(one, other), timeout):
+                yield reply
+
+        return self._given(replies, lambda reply: reply.edges, read_edge, "items", "list")
 
     async def labels(
         self, prefix: str = "", words: str = "", *, timeout: Optional[float] = None

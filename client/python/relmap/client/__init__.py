@@ -54,8 +54,8 @@ def connect(
         Unreachable: no daemon answers; the message says why.
         AccessError: the daemon does not know the caller, or the data folder may not be read.
         RequestError: `server` is neither a folder nor HOST:PORT.
-        DaemonError: NO_SUCH_FILE, BAD_CONFIG: the credentials cannot be used.
-        ValueError, TypeError: arguments that do not go together, or mean nothing.
+        OSError: a file of credentials cannot be read.
+        ValueError, TypeError: it holds none, or others can read it; arguments that do not go together, or mean nothing.
     """
     if not isinstance(server, (str, os.PathLike)):
         raise TypeError(f"server is a data folder or 'HOST:PORT', not {type(server).__name__}")

@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import time
 import uuid as uuids
-from typing import Any, Iterator, Callable, List, Optional, Set, TypeVar
+from typing import Any, Iterator, Callable, List, Optional, Set, TypeVar, Union
 
 from relmap.client.calls import Caller
 from relmap.connection import Timeout
 from relmap.errors import Unreachable, ViewExpired
+from relmap.graph import Sessions, read_session
+from relmap.ids import SessionLike, SessionsLike, as_session, as_sessions
 from relmap.operations import OnProgress, read_progress
-from relmap.v1 import admin_pb2
+from relmap.v1 import admin_pb2, map_pb2
+from relmap.views import View
 
 T = TypeVar("T")
 
@@ -49,11 +52,37 @@ class ClientBase:
     def _ask(self, method: Any, request: Any, timeout: Timeout) -> Any:
         return self._caller.ask(method, request, timeout)
 
-    def _edit(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+    def _list_sessions(self, timeout: Timeout) -> Sessions:
+        return Sessions(
+            self._list(
+                self._map.ListSessions, map_pb2.ListSessionsRequest, lambda reply: reply.sessions, read_session, timeout
+            )
+        )
+
+    def _numbers(self, sessions: SessionsLike, timeout: Timeout) -> List[int]:
+        """The numbers of the sessions that are meant; the daemon is asked only if one is named. RequestError as
+        Sessions.number_of()."""
+        return self._looked_up(as_sessions(sessions), timeout)
+
+    def _number(self, session: SessionLike, timeout: Timeout, what: str = "session", least: int = 1) -> int:
+        """The same of one session; `what` and `least` as in as_session()."""
+        return (self._looked_up([as_session(session, what, least)], timeout))[0]
+
+    def _looked_up(self, known: List[Union[int, str]], timeout: Timeout) -> List[int]:
+        listed = Sessions() if all(isinstance(one, int) for one in known) else self._list_sessions(timeout)
+        return [listed.number_of(one) for one in known]
+
+    def _with_camera(self, view: View, timeout: Timeout) -> View:
+        """The view with the number of the session whose camera took it."""
+        if view.camera_called is None:
+            return view
+        return view.of_session(self._number(view.camera_called, timeout))
+
+    def _edit(self, method: Any, request: Any, timeout: Timeout) -> Any:
         request.idempotency_key = uuids.uuid4().hex  # so that it may be sent again
         return self._retry(method, request, timeout)
 
-    def _retry(self, method: Any, request: Any, timeout: Optional[float]) -> Any:
+    def _retry(self, method: Any, request: Any, timeout: Timeout) -> Any:
         pause = FIRST_PAUSE_S
         while True:
             try:
@@ -64,7 +93,7 @@ class ClientBase:
             time.sleep(pause)
             pause *= 4
 
-    def _work(self, method: Any, request: Any, on_progress: Optional[OnProgress], timeout: Optional[float]) -> Any:
+    def _work(self, method: Any, request: Any, on_progress: Optional[OnProgress], timeout: Timeout) -> Any:
         last = admin_pb2.Progress()
         for reply in self._caller.stream(method, request, timeout):
             if on_progress is not None and reply.WhichOneof("outcome") is None:
@@ -86,7 +115,7 @@ class ClientBase:
         request: Callable[[], Any],
         items: Callable[[Any], Any],
         read: Callable[[Any], T],
-        timeout: Optional[float],
+        timeout: Timeout,
     ) -> List[T]:
         """All pages of a list; if its version of the map expires, once more from the beginning."""
         countdown = self._caller.countdown(timeout)
@@ -99,7 +128,7 @@ class ClientBase:
 
         return self._restarted(whole)
 
-    def _replies(self, method: Any, request: Any, timeout: Optional[float]) -> List[Any]:
+    def _replies(self, method: Any, request: Any, timeout: Timeout) -> List[Any]:
         """All replies of a stream; if its version of the map expires, once more from the beginning."""
         countdown = self._caller.countdown(timeout)
 
@@ -115,21 +144,6 @@ class ClientBase:
             except ViewExpired as error:
                 last = error
         raise last
-
-    def _iterate(
-        self,
-        method: Any,
-        request: Callable[[], Any],
-        items: Callable[[Any], Any],
-        read: Callable[[Any], T],
-        timeout: Optional[float],
-    ) -> Iterator[T]:
-        """The items of a list, page by page; the timeout is for each page."""
-
-        def replies() -> Iterator[Any]:
-            return self._pages(method, request(), timeout)
-
-        return self._given(replies, items, read, "items", "list")
 
     def _given(
         self,

@@ -11,7 +11,7 @@ import grpc
 from relmap.client.silence import Heard
 from relmap.connection import Connection, Countdown, Stubs, Timeout, check_boot, checked_timeout, unreachable
 from relmap.errors import ClientClosed, DeadlineExceeded, RelmapError, Unreachable, error_of_rpc
-from relmap.v1 import status_pb2
+from relmap.v1 import map_pb2, status_pb2
 
 MAX_RESUMPTIONS = 3
 """How often a stream is resumed without progress in between."""
@@ -57,10 +57,10 @@ class Caller:
         limit = timeout.left if isinstance(timeout, Countdown) else self._asked(timeout)
         return method(request, timeout=None if limit == math.inf else limit, metadata=self._metadata)
 
-    def _failed(self, error: Any, timeout: Timeout) -> RelmapError:
+    def _failed(self, error: Any, request: Any, timeout: Timeout) -> RelmapError:
         if self.closed:
             return ClientClosed()
-        failed = error_of_rpc(error)
+        failed = error_of_rpc(error, asks=not isinstance(request, map_pb2.ImportGraphRequest))
         asked = self._asked(timeout)
         if isinstance(failed, DeadlineExceeded) and asked != math.inf:
             return DeadlineExceeded(failed.reason, f"{failed.message}; the timeout was {asked:g} s", failed.request_id)
@@ -71,16 +71,16 @@ class Caller:
             return timeout.asked
         return self.connection.timeout if timeout is None else checked_timeout(timeout)
 
-    def countdown(self, timeout: Optional[float]) -> Countdown:
-        """A countdown that begins now, from the timeout; None: from that of the connection."""
-        return Countdown(self._asked(timeout))
+    def countdown(self, timeout: Timeout) -> Countdown:
+        """A countdown that begins now, from the timeout; None: from that of the connection. One that runs goes on."""
+        return timeout if isinstance(timeout, Countdown) else Countdown(self._asked(timeout))
 
     def ask(self, method: Any, request: Any, timeout: Timeout = None) -> Any:
         """The reply to a request. RelmapError: why there is none."""
         try:
             return self._call(method, request, timeout)
         except grpc.RpcError as error:
-            raise self._failed(error, timeout) from None
+            raise self._failed(error, request, timeout) from None
 
     def stream(
         self, method: Any, request: Any, timeout: Timeout = None, silence: Optional[float] = None
@@ -92,7 +92,7 @@ class Caller:
             for reply in call if silence is None else Heard(call, silence):
                 yield reply
         except grpc.RpcError as error:
-            raise self._failed(error, timeout) from None
+            raise self._failed(error, request, timeout) from None
         finally:
             call.cancel()
 

@@ -20,7 +20,7 @@ class EditCalls(ClientBase):
         self, frame: FrameLike, label: str, present: bool = True, *, timeout: Optional[float] = None
     ) -> tuple[str, ...]:
         """Adds a label to a frame, or removes it if `present` is False. Returns the frame's labels afterwards.
-        RequestError: NO_SUCH_FRAME, NO_SUCH_LABEL. RobotDataError: BAD_NAME."""
+        RequestError: NO_SUCH_FRAME, NO_SUCH_LABEL, BAD_NAME."""
         request = map_pb2.SetLabelRequest(frame=frame_message(frame), label=label, remove=not present)
         return tuple((self._edit(self._map.SetLabel, request, timeout)).labels)
 

@@ -85,6 +85,7 @@ class Line:
         except RelmapError:
             pass
         self._state.warn_of_loss()
+        self.close()  # while the threads of gRPC still run
 
     def check(self) -> None:
         """Raises why the session cannot go on: RelmapError; ValueError: it is not open."""

@@ -10,7 +10,7 @@ from relmap.ids import FrameLike, frame_message
 from relmap.pictures import PictureLike
 from relmap.places import Localisation, PlaceMatches, read_localisation, read_matches
 from relmap.v1 import map_pb2
-from relmap.views import CameraLike, ViewLike, view_message
+from relmap.views import CameraLike, ViewLike, as_view
 
 
 class PlaceCalls(ClientBase):
@@ -32,20 +32,23 @@ class PlaceCalls(ClientBase):
             view: a View, a frame (what it saw), or a picture: a path, the bytes of a JPEG or PNG file, or an array of uint8
                 (H x W, or H x W x 3 in RGB).
             right: the right picture of a stereo pair.
-            camera: that took the pictures: a session of the map, a RawStereo, or a StereoCamera if they are rectified; None:
+            camera: that took the pictures: a session of the map (its number, name or uuid), a RawStereo, or a StereoCamera if they are rectified; None:
                 not known, and the focal length is estimated.
             prior: a frame near the view: its surroundings are searched first.
             correspondences: with the points that the view and the frame both show.
 
         Raises:
             PlaceNotRecognised: NEW_PLACE, AMBIGUOUS_PLACE, TOO_FEW_INLIERS, EMPTY_MAP, ...
-            RequestError: NO_CALIBRATION, WRONG_CALIBRATION, NOT_STEREO, NO_SUCH_FRAME, a damaged picture, ...
+            RequestError: NO_CALIBRATION, WRONG_CALIBRATION, BAD_SIZE (the picture and its camera differ in size), NOT_STEREO,
+                NO_SUCH_FRAME, NO_SUCH_SESSION, a damaged picture, ...
             CameraError: ROWS_APART: the pair is not rectified.
         """
-        request = map_pb2.LocaliseRequest(view=view_message(view, right, camera), correspondences=correspondences)
+        countdown = self._caller.countdown(timeout)
+        seen = self._with_camera(as_view(view, right, camera), countdown)
+        request = map_pb2.LocaliseRequest(view=seen.message, correspondences=correspondences)
         if prior is not None:
             request.prior.CopyFrom(frame_message(prior))
-        return read_localisation(self._ask(self._map.Localise, request, timeout), correspondences)
+        return read_localisation(self._ask(self._map.Localise, request, countdown), correspondences)
 
     def match_image(
         self,
@@ -75,8 +78,10 @@ class PlaceCalls(ClientBase):
                 result's `reason` says why.
             RequestError: as localise().
         """
+        countdown = self._caller.countdown(timeout)
+        seen = self._with_camera(as_view(view, right, camera), countdown)
         request = map_pb2.MatchImageRequest(
-            view=view_message(view, right, camera),
+            view=seen.message,
             max_places=max_places,
             max_verified=max_verified,
             thumbnails=thumbnails,
@@ -84,4 +89,4 @@ class PlaceCalls(ClientBase):
         )
         if near is not None:
             request.near.CopyFrom(frame_message(near))
-        return read_matches(self._ask(self._map.MatchImage, request, timeout), correspondences)
+        return read_matches(self._ask(self._map.MatchImage, request, countdown), correspondences)

@@ -21,6 +21,7 @@ from relmap.routes import (
     read_transform_between,
 )
 from relmap.v1 import map_pb2
+from relmap.views import View
 
 
 class RouteCalls(ClientBase):
@@ -60,11 +61,18 @@ class RouteCalls(ClientBase):
             PlaceNotRecognised: for an end that is a view.
             ViewExpired: the version expired again and again: try again when the daemon is less busy.
         """
+        countdown = self._caller.countdown(timeout)
+
+        def known(end: RouteEnd) -> RouteEnd:
+            return self._with_camera(end, countdown) if isinstance(end, View) else end
+
         request = route_request(
-            start, goal, by, weights, count_standing, max_cost, or_from, or_to, filter, covariance, alternatives
-        )
+            known(start), known(goal), by, weights, count_standing, max_cost,
+            [known(end) for end in or_from], [known(end) for end in or_to],
+            filter, self._numbers(filter.sessions, countdown), covariance, alternatives,
+        )  # fmt: skip
         parts: List[RouteParts] = []
-        for reply in self._replies(self._map.FindRoute, request, timeout):
+        for reply in self._replies(self._map.FindRoute, request, countdown):
             while len(parts) <= reply.route:
                 parts.append(RouteParts())
             parts[reply.route].add(reply)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import List, Optional
+from typing import List, Optional, Set
 
 from relmap.client.stored import StoredCalls
 from relmap.drawing.picture import Drawing, draw_map
@@ -45,11 +45,14 @@ class ShapeCalls(StoredCalls):
         """
         if level not in (0, 1, 2, 3):
             raise ValueError(f"level is {level!r}; must be 0, 1, 2 or 3")
-        request = skeleton_pb2.GetSkeletonRequest(level=level, sessions=as_sessions(sessions), candidates=candidates)
+        countdown = self._caller.countdown(timeout)
+        request = skeleton_pb2.GetSkeletonRequest(
+            level=level, sessions=self._numbers(sessions, countdown), candidates=candidates
+        )
         chains: List[SkeletonChain] = []
         closures: List[skeleton_pb2.SkeletonClosures] = []
         total, version = 0, 0
-        for reply in self._replies(self._map.GetSkeleton, request, timeout):
+        for reply in self._replies(self._map.GetSkeleton, request, countdown):
             chains.extend(read_chain(chain) for chain in reply.chains)
             closures.append(reply.closures)
             total, version = reply.frames_total, reply.map_version
@@ -82,24 +85,23 @@ class ShapeCalls(StoredCalls):
             ViewExpired: as skeleton().
         """
         listed = self.sessions(timeout=timeout)
+        wanted = [listed.number_of(session) for session in as_sessions(sessions)]
         if level is None:
-            wanted = set(as_sessions(sessions))
             level = _level_for(sum(session.frames for session in listed if not wanted or session.number in wanted))
         try:
-            skeleton = self.skeleton(level, sessions=sessions, candidates=candidates, timeout=timeout)
+            skeleton = self.skeleton(level, sessions=wanted, candidates=candidates, timeout=timeout)
         except DaemonError as error:
             if error.reason != Reason.UNIMPLEMENTED:
                 raise
-            skeleton = self._skeleton_of_edges(sessions, candidates, timeout)  # of an older daemon
+            skeleton = self._skeleton_of_edges(set(wanted), candidates, timeout)  # of an older daemon
         named = self.labels(timeout=timeout) if labels else ()
         names = {session.number: session.name for session in listed}
         return draw_map(skeleton.relaxed_picture(), width, names, named)
 
     def _skeleton_of_edges(
-        self, sessions: SessionsLike, candidates: bool, timeout: Optional[float]
+        self, wanted: Set[int], candidates: bool, timeout: Optional[float]
     ) -> Skeleton:
         edges = self.edges(states=() if candidates else (EdgeState.ACCEPTED,), timeout=timeout)
-        wanted = set(as_sessions(sessions))
         return skeleton_of_edges(
             edge for edge in edges if not wanted or {edge.a.session, edge.b.session} <= wanted
         )

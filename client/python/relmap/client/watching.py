@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Iterator, Optional
+from typing import Iterator, List, Optional, Union
 
 from relmap.client.base import FIRST_PAUSE_S, MAX_PAUSE_S, ClientBase
 from relmap.client.calls import Caller
@@ -51,13 +51,18 @@ class WatchCalls(ClientBase):
             raise ValueError(f"silence is {silence}; must be above 0")
         start = watch_pb2.WATCH_FROM_OLDEST if oldest else watch_pb2.WATCH_FROM_NOW
         request = watch_pb2.WatchMapRequest(
-            sessions=as_sessions(sessions), resume_token=resume_token, no_frames=no_frames, **{"from": start}
+            sessions=[], resume_token=resume_token, no_frames=no_frames, **{"from": start}
         )
-        return self._watch(request, patience, silence)
+        return self._watch(as_sessions(sessions), request, patience, silence)
 
     def _watch(
-        self, request: watch_pb2.WatchMapRequest, patience: Optional[float], silence: float
+        self,
+        sessions: List[Union[int, str]],
+        request: watch_pb2.WatchMapRequest,
+        patience: Optional[float],
+        silence: float,
     ) -> Iterator[MapEvent]:
+        request.sessions.extend(self._looked_up(sessions, None))
         caller = self._caller
         gone_since: Optional[float] = None
         pause = FIRST_PAUSE_S

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 from relmap.drawing.svg import safe_text
+from relmap.graph import Verification
 
 if TYPE_CHECKING:
     from relmap.evidence import EdgeEdit, Explanation
+    from relmap.graph import Edge
 
 
 def _cell(value: Any) -> str:
@@ -22,13 +24,24 @@ def table_html(columns: Sequence[str], rows: Sequence[Mapping[str, Any]], total:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 
+def _verification_text(edge: "Edge") -> str:
+    """How geometry confirmed a closure, or why nothing says so."""
+    if edge.verification == Verification.IMPORTED:
+        return f"imported with session {edge.id.frame.session}, not verified here"
+    if edge.verification == Verification.COMPOUNDED:
+        return "made of the edges through a session that was deleted, not verified itself"
+    if edge.verification == Verification.NONE:
+        return "not verified"
+    return f"verified by {edge.verification.name.lower()}: {edge.inliers} inliers"
+
+
 def explanation_html(explanation: "Explanation") -> str:
     """What a loop closure is believed for, with its pictures if they were asked for."""
     edge = explanation.edge
     lines = [
         f"<b>{safe_text(str(edge.id))}</b>: {safe_text(str(edge.a))} and {safe_text(str(edge.b))},"
         f" {safe_text(edge.state.name.lower())} ({safe_text(edge.reason.name)}),"
-        f" {edge.inliers} inliers, {safe_text(edge.verification.name.lower())}"
+        f" {safe_text(_verification_text(edge))}"
     ]
     if edge.suspicion is not None:
         lines.append(f"suspicion {edge.suspicion.value:.2f}")

@@ -34,6 +34,7 @@ _MARGIN = 24.0
 _MOST_PARTS = 13
 _MOST_LABELS = 60
 _MOST_SESSIONS = 12  # in the legend
+_RING = 7.0  # radius of the mark at an end of a route, points, with its rim
 _RELAXED = "A relaxed picture: cycles are bent until they close. Not for measuring."
 
 
@@ -66,21 +67,31 @@ def _check_width(width: int) -> None:
 
 
 class _Labels:
-    """Places texts beside their points so that they do not cover one another."""
+    """Places texts beside their points so that they cover neither one another nor marks."""
 
     def __init__(self, width: float) -> None:
         self._width = width
         self._boxes: List[Tuple[float, float, float, float]] = []
+        self._marks: List[Tuple[Point, float]] = []
+
+    def avoid(self, at: Sequence[float], radius: float) -> None:
+        """Keeps texts off a round mark, also the text of the point that lies in it."""
+        x, y = float(at[0]), float(at[1])
+        self._marks.append(((x, y), radius))
+        self._boxes.append((x - radius, y - radius, x + radius, y + radius))
 
     def draw(self, svg: Svg, at: Point, text: str) -> None:
         wide, high = text_width(text, 11), 13.0
-        tries = (
-            (at[0] + 7, at[1] + 4),
-            (at[0] - 7 - wide, at[1] + 4),
-            (at[0] - wide / 2, at[1] - 8),
-            (at[0] - wide / 2, at[1] + 16),
-        )
         svg.circle(at, 3.5, fill=INK, stroke=PAPER, stroke_width=1)
+        # Beyond the marks that the point lies in.
+        away = [(float(np.hypot(at[0] - mark[0], at[1] - mark[1])), radius) for mark, radius in self._marks]
+        clear = max((distance + radius for distance, radius in away if distance < radius), default=3.0)
+        tries = (
+            (at[0] + clear + 4, at[1] + 4),
+            (at[0] - clear - 4 - wide, at[1] + 4),
+            (at[0] - wide / 2, at[1] - clear - 5),
+            (at[0] - wide / 2, at[1] + clear + 13),
+        )
         for x, y in tries:
             x = min(max(x, 2.0), max(self._width - wide - 2, 2.0))
             box = (x, y - high, x + wide, y + 3)
@@ -312,6 +323,8 @@ def draw_route(route: "Route", width: int = 800) -> Drawing:
     svg.circle(points[0], 6, fill=PAPER, stroke=INK, stroke_width=2)
     svg.circle(points[-1], 6, fill=QUERY, stroke=PAPER, stroke_width=2)
     labels = _Labels(width)
+    for end in (points[0], points[-1]):
+        labels.avoid(end, _RING)
     shown = [(i, label) for i, all_of in enumerate(route.labels) for label in all_of]
     for i, label in shown[:_MOST_LABELS]:
         labels.draw(svg, (float(points[i][0]), float(points[i][1])), shortened(label, 11, 160))
@@ -343,6 +356,7 @@ def draw_neighbourhood(around: "Neighbourhood", width: int = 800) -> Drawing:
             svg.line(a, b, stroke=colour, stroke_width=1.2 if edge.kind == EdgeKind.LOOP else 2)
     _arrow(svg, points[0], plan.direction(around.T[0]), QUERY)
     labels = _Labels(width)
+    labels.avoid(points[0], _RING)
     shown = [(i, label) for i, all_of in enumerate(around.labels) for label in all_of]
     for i, label in shown[:_MOST_LABELS]:
         labels.draw(svg, (float(points[i][0]), float(points[i][1])), shortened(label, 11, 160))
