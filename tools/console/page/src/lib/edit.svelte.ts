@@ -15,7 +15,7 @@ export class Edit {
     this.dismiss();
     try {
       await call(this.keys.of(what));
-      this.keys.done(what);
+      this.keys.done();
       return true;
     } catch (error) {
       this.failed = what;

@@ -54,6 +54,7 @@ class Sessions {
       this.problem = null;
     } catch (error) {
       this.problem = problemOf(error);
+      if (this.users) this.again.ask();
     } finally {
       this.reading = false;
     }
