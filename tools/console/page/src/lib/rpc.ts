@@ -3,7 +3,10 @@ import { Code, ConnectError, createClient } from '@connectrpc/connect';
 import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { Admin } from '../proto/relmap/v1/admin_pb';
 import { Map as MapService } from '../proto/relmap/v1/map_pb';
-import { ErrorSchema, Reason } from '../proto/relmap/v1/reason_pb';
+import { ErrorSchema } from '../proto/relmap/v1/reason_pb';
+import { reasonText } from './reasons';
+
+export { reasonText };
 
 const transport = createGrpcWebTransport({ baseUrl: location.origin, useBinaryFormat: true, defaultTimeoutMs: 30_000 });
 export const map = createClient(MapService, transport);
@@ -44,11 +47,6 @@ export function isAborted(error: unknown): boolean {
     (error instanceof DOMException && error.name === 'AbortError') ||
     (error instanceof ConnectError && error.code === Code.Canceled)
   );
-}
-
-// "DISK_FULL"; a number for a reason that this page does not know.
-export function reasonText(reason: Reason): string {
-  return Reason[reason] ?? `REASON_${reason}`;
 }
 
 // ---- What the console itself answers (tools/console/README.md)
