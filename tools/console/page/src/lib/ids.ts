@@ -29,3 +29,8 @@ export function parseEdge(text: string | null): Edge | null {
   const match = /^(\d{1,10}):(\d{1,10})\/(\d{1,10})$/.exec(text ?? '');
   return match ? { session: Number(match[1]), index: Number(match[2]), ordinal: Number(match[3]) } : null;
 }
+
+// As requests have it.
+export function edgeId(edge: Edge): { frame: Frame; ordinal: number } {
+  return { frame: { session: edge.session, index: edge.index }, ordinal: edge.ordinal };
+}
