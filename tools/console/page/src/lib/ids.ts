@@ -31,6 +31,11 @@ export function parseEdge(text: string | null): Edge | null {
   return session === undefined || index === undefined || ordinal === undefined ? null : { session, index, ordinal };
 }
 
+// As requests have it.
+export function edgeId(edge: Edge): { frame: Frame; ordinal: number } {
+  return { frame: { session: edge.session, index: edge.index }, ordinal: edge.ordinal };
+}
+
 // What the groups match, each a number of 32 bits; empty: something else.
 function numbers(form: RegExp, text: string | null): number[] {
   const found = (form.exec(text ?? '') ?? []).slice(1).map(Number);
