@@ -11,7 +11,7 @@ Object.defineProperty(globalThis, 'crypto', { value: webcrypto, configurable: tr
 Object.assign(globalThis, { location: { origin: 'http://localhost' } });
 const { EditKeys, newKey } = await import('../src/lib/edit_keys');
 const { allPages, seldom } = await import('../src/lib/pages');
-const { ConnectError, Code } = await import('@connectrpc/connect');
+const { CallError, Code } = await import('../src/lib/grpc_web');
 const { ErrorSchema, Reason } = await import('../src/proto/relmap/v1/reason_pb');
 
 const session = (number: number, frames = 10): Session =>
@@ -55,7 +55,7 @@ test('an edit that is tried again at once keeps its key, others get new ones', (
 });
 
 const expired = () =>
-  new ConnectError('gone', Code.Aborted, undefined, [{ desc: ErrorSchema, value: { reason: Reason.VIEW_EXPIRED, message: 'gone' } }]);
+  new CallError(10, 'gone', create(ErrorSchema, { reason: Reason.VIEW_EXPIRED, message: 'gone' }));
 
 test('all pages of a list are read, anew if their version is gone', async () => {
   let seen: number[] = [];
@@ -73,7 +73,7 @@ test('all pages of a list are read, anew if their version is gone', async () => 
   await assert.rejects(allPages(async () => (++tries, Promise.reject(expired())), () => {}, () => {}));
   assert.equal(tries, 3);
   tries = 0;
-  await assert.rejects(allPages(async () => (++tries, Promise.reject(new ConnectError('no', Code.Internal))), () => {}, () => {}));
+  await assert.rejects(allPages(async () => (++tries, Promise.reject(new CallError(Code.internal, 'no'))), () => {}, () => {}));
   assert.equal(tries, 1);
 });
 

@@ -4,7 +4,7 @@ import { create, type MessageInitShape } from '@bufbuild/protobuf';
 import { ProgressSchema, VerifySummarySchema } from '../src/proto/relmap/v1/admin_pb';
 import { ClosureMatrixCellSchema } from '../src/proto/relmap/v1/evidence_pb';
 import { LabelledFramesSchema, SessionSchema, SessionState } from '../src/proto/relmap/v1/graph_pb';
-import { request as auditRequest, timeUs, wrongWith as wrongWithQuery } from '../src/views/audit/query';
+import { isShown, request as auditRequest, timeUs, wrongWith as wrongWithQuery } from '../src/views/audit/query';
 import { begun, outcomeText, progressText, remainingText, share } from '../src/views/jobs/job';
 import { parseSessions } from '../src/views/jobs/session_numbers';
 import { joined, request, wrongWith } from '../src/views/labels/find';
@@ -120,8 +120,17 @@ test('labels: what is asked for, what may be added, pages together', () => {
 test('the audit log is asked for times in UTC', () => {
   assert.equal(timeUs('2026-11-30T21:04'), BigInt(Date.UTC(2026, 10, 30, 21, 4)) * 1000n);
   for (const text of ['', 'x', '2026-13-40T99:99', '2026-11-30']) assert.equal(timeUs(text), 0n, text);
-  const query = { who: ' anna ', method: '', failed: true, from: '2026-11-30T21:04', until: '2026-11-30T21:03' };
+  const query = { who: ' anna ', method: '', failed: true, from: '2026-11-30T21:04', until: '2026-11-30T21:03', reads: false };
   assert.notEqual(wrongWithQuery(query), '');
   assert.equal(wrongWithQuery({ ...query, until: '' }), '');
   assert.deepEqual(auditRequest({ ...query, from: '', until: '' }), { who: 'anna', method: '', failed: true, fromUs: 0n, untilUs: 0n });
+});
+
+test('what only reads is left out of the audit log, unless it failed or is asked for', () => {
+  const query = { who: '', method: '', failed: false, from: '', until: '', reads: false };
+  assert.equal(isShown(query, { method: 'Admin.ListAudit', outcome: 0 }), false);
+  assert.equal(isShown(query, { method: 'Admin.ListAudit', outcome: 22 }), true);
+  assert.equal(isShown(query, { method: 'Admin.Verify', outcome: 0 }), true);
+  assert.equal(isShown({ ...query, reads: true }, { method: 'Admin.GetStats', outcome: 0 }), true);
+  assert.equal(isShown({ ...query, method: 'Admin.GetStats' }, { method: 'Admin.GetStats', outcome: 0 }), true);
 });

@@ -6,6 +6,7 @@ export interface AuditQuery {
   failed: boolean;
   from: string; // "2026-11-30T21:04", UTC, as an input gives it; empty: any
   until: string;
+  reads: boolean; // also what only reads
 }
 
 // Microseconds since 1970; 0: none, or no time.
@@ -35,3 +36,11 @@ export const auditedMethods = [
   'Admin.Verify', 'Admin.Backup', 'Admin.Compact', 'Admin.Repair', 'Admin.Reindex', 'Admin.GetStats', 'Admin.WaitIdle',
   'Admin.Commit', 'Admin.SetLogLevel', 'Admin.FreezeSession', 'Admin.DeleteSession', 'Admin.ListAudit',
 ];
+
+// Of these, those that change nothing and keep nobody waiting; this page makes some of them by itself.
+const reading = new Set(['Admin.GetStats', 'Admin.WaitIdle', 'Admin.ListAudit']);
+
+// Whether an entry is to be shown. What failed always is, and what was asked for by name.
+export function isShown(query: AuditQuery, entry: { method: string; outcome: number }): boolean {
+  return query.reads || query.method !== '' || entry.outcome !== 0 || !reading.has(entry.method);
+}
