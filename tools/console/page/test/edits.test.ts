@@ -1,0 +1,53 @@
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { create } from '@bufbuild/protobuf';
+import { EdgeState } from '../src/proto/relmap/v1/graph_pb';
+import { EditEffectSchema } from '../src/proto/relmap/v1/map_pb';
+import { Reason } from '../src/proto/relmap/v1/reason_pb';
+import {
+  conflictOf, lastToUndo, possible, readList, requestOf, undoOf, withDone, withUndone, type Done,
+} from '../src/views/review/edits';
+
+const done = (id: string): Done => ({
+  id, name: '2:5/1', ends: '1:1 – 2:5', what: 'remove', note: '', when: 0, sequence: '70',
+  state: EdgeState.REMOVED, changed: 1, undo: ['restore'], undone: false,
+});
+
+test('each edit is undone as the table of the operations guide says', () => {
+  assert.deepEqual(undoOf('remove', '2:5/1', undefined), ['restore']);
+  assert.deepEqual(undoOf('removeAlone', '2:5/1', undefined), ['restore']);
+  assert.deepEqual(undoOf('accept', '2:5/1', undefined), ['withdraw']);
+  assert.deepEqual(undoOf('withdraw', '2:5/1', undefined), ['accept']);
+  assert.deepEqual(undoOf('proposeAccepted', '2:5/1', undefined), ['withdraw', 'removeAlone']);
+  const closures = [{ id: { frame: { session: 2, index: 5 }, ordinal: 1 }, reasonBefore: Reason.REMOVED_ALONE }];
+  assert.deepEqual(undoOf('restore', '2:5/1', create(EditEffectSchema, { closures })), ['removeAlone']);
+  assert.deepEqual(undoOf('restore', '2:6/1', create(EditEffectSchema, { closures })), ['remove']);
+});
+
+test('only what the state allows is offered', () => {
+  assert.deepEqual(possible(EdgeState.REMOVED, Reason.REMOVED_ALONE),
+    { remove: false, removeAlone: false, restore: true, accept: true, withdraw: false });
+  assert.deepEqual(possible(EdgeState.ACCEPTED, Reason.ACCEPTED_BY_OPERATOR),
+    { remove: true, removeAlone: true, restore: false, accept: false, withdraw: true });
+  assert.equal(possible(EdgeState.ACCEPTED, Reason.CONSISTENT).accept, true);
+  assert.deepEqual(requestOf('accept'), { state: EdgeState.ACCEPTED, decided: true, alone: false });
+});
+
+test('the history takes back the newest edit that stands', () => {
+  let list = withDone(withDone([], done('1')), done('2'));
+  assert.equal(lastToUndo(list)!.id, '2');
+  list = withUndone(list, '2');
+  assert.equal(lastToUndo(list)!.id, '1');
+  assert.equal(lastToUndo(withUndone(list, '1')), null);
+  assert.deepEqual(readList(JSON.stringify(list)), list);
+  assert.deepEqual(readList('{"x":'), []);
+  assert.deepEqual(readList('[null, {"name": 3}]'), []);
+});
+
+test('somebody else’s later edit is told before undoing', () => {
+  const words = { state: (state: EdgeState) => EdgeState[state]!, author: (author: string) => author };
+  const event = (sequence: bigint, author: string) => ({ journalSequence: sequence, author, state: EdgeState.ACCEPTED });
+  assert.equal(conflictOf(done('1'), [event(70n, 'anna')], words), '');
+  assert.equal(conflictOf(done('1'), [event(70n, 'anna'), event(75n, 'bob')], words),
+    'Since then bob has changed this closure: it is now ACCEPTED.');
+});
