@@ -527,6 +527,7 @@ struct DaemonStatus {
 
   std::uint64_t ingest_keyframes = 0, ingest_repeats = 0, ingest_parts_corrupt = 0, robots = 0;
   ReasonCounts not_taken;
+  std::uint64_t map_version = 0;  // grows with every change of the map since the daemon started
 };
 
 }  // namespace relmap::client

@@ -4,18 +4,15 @@
 #include <unordered_set>
 
 namespace relmap::client {
-namespace {
 
-// The covariance with these traces that is the same in all directions. A step without any would be infinitely stiff.
-Matrix6 isotropic(double translation_trace, double rotation_trace) {
+// A step without any variance would be infinitely stiff.
+Matrix6 isotropic_covariance(double translation_trace, double rotation_trace) {
   constexpr double kLeast = 1e-10;
   Vector6 diagonal;
   diagonal << Vector3::Constant(std::max(translation_trace / 3, kLeast)),
       Vector3::Constant(std::max(rotation_trace / 3, kLeast));
   return diagonal.asDiagonal();
 }
-
-}  // namespace
 
 const Matrix6& carried_covariance() {
   static const Matrix6 covariance = Vector6(1e4, 1e4, 1e4, 1, 1, 1).asDiagonal();
@@ -36,6 +33,16 @@ MeasuredSets choose_pulling(std::vector<Spring>& springs) {
   return measured;
 }
 
+Spring spring_of(const Skeleton::Closure& closure) {
+  Spring spring;
+  spring.edge = closure.id;
+  spring.kind = EdgeKind::kLoop;
+  spring.relaxed = {closure.a, closure.id.frame, closure.T_ab,
+                    isotropic_covariance(closure.translation_variance, closure.rotation_variance),
+                    RelaxationEdgeKind::kLoop};
+  return spring;
+}
+
 std::vector<Spring> springs_of(const Skeleton& skeleton) {
   std::vector<Spring> springs;
   std::unordered_set<FrameId> points;
@@ -48,19 +55,15 @@ std::vector<Spring> springs_of(const Skeleton& skeleton) {
       if (point.frames == 1) spring.edge = {point.frame, 0};
       spring.kind = point.unmeasured ? EdgeKind::kPrior : EdgeKind::kOdometry;
       spring.doubtful = point.unmeasured || point.carried;
-      spring.relaxed = {
-          chain.points[i - 1].frame, point.frame, point.T_before_this,
-          point.carried ? carried_covariance() : isotropic(point.translation_variance, point.rotation_variance),
-          RelaxationEdgeKind::kOdometry};
+      spring.relaxed = {chain.points[i - 1].frame, point.frame, point.T_before_this,
+                        point.carried ? carried_covariance()
+                                      : isotropic_covariance(point.translation_variance, point.rotation_variance),
+                        RelaxationEdgeKind::kOdometry};
     }
   for (const Skeleton::Closure& closure : skeleton.closures) {
     if (closure.state != EdgeState::kAccepted || !closure.carries) continue;
     if (!points.contains(closure.a) || !points.contains(closure.id.frame)) continue;
-    Spring& spring = springs.emplace_back();
-    spring.edge = closure.id;
-    spring.kind = EdgeKind::kLoop;
-    spring.relaxed = {closure.a, closure.id.frame, closure.T_ab,
-                      isotropic(closure.translation_variance, closure.rotation_variance), RelaxationEdgeKind::kLoop};
+    springs.push_back(spring_of(closure));
   }
   choose_pulling(springs);
   return springs;

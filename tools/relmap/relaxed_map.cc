@@ -139,8 +139,8 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   for (const client::Spring& spring : map.springs) {
     if (spring.doubtful) continue;
     MapPart& part = *part_of.at(spring.relaxed.a);
-    const Tear strain = strain_of(spring, *part.find(spring.relaxed.a), *part.find(spring.relaxed.b));
-    if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
+    const client::Tear strain = client::strain_of(spring, *part.find(spring.relaxed.a), *part.find(spring.relaxed.b));
+    if (strain.sigmas > client::kTearSigmas) part.tears.push_back(strain);
   }
   for (const client::Edge& edge : map.graph.edges) {
     if (!in_graph(edge) || !is_doubtful(edge)) continue;
@@ -153,7 +153,7 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     part->doubtful.push_back(step);
     if (part != other) other->doubtful.push_back(step);
   }
-  for (MapPart& part : map.parts) sort_worst_first(part.tears);
+  for (MapPart& part : map.parts) client::sort_worst_first(part.tears);
   for (const client::LabelledFrames& label : labels)
     for (const FrameId frame : label.frames)
       if (const auto part = part_of.find(frame); part != part_of.end())
