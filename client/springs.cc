@@ -4,6 +4,21 @@
 #include <unordered_set>
 
 namespace relmap::client {
+namespace {
+
+RelaxationEdgeKind relaxation_kind(EdgeKind kind) {
+  switch (kind) {
+    case EdgeKind::kLoop:
+      return RelaxationEdgeKind::kLoop;
+    case EdgeKind::kPrior:
+      return RelaxationEdgeKind::kPrior;
+    case EdgeKind::kOdometry:
+      break;
+  }
+  return RelaxationEdgeKind::kOdometry;
+}
+
+}  // namespace
 
 // A step without any variance would be infinitely stiff.
 Matrix6 isotropic_covariance(double translation_trace, double rotation_trace) {
@@ -31,6 +46,22 @@ MeasuredSets choose_pulling(std::vector<Spring>& springs) {
     if (!spring.doubtful) measured.connect(spring.relaxed.a, spring.relaxed.b);
   for (Spring& spring : springs) spring.pulls = !spring.doubtful || !measured.join(spring.relaxed.a, spring.relaxed.b);
   return measured;
+}
+
+std::vector<Spring> springs_of(const std::vector<Edge>& edges) {
+  std::vector<Spring> springs;
+  for (const Edge& edge : edges) {
+    const bool holds_nothing = edge.unmeasured && edge.source == MotionSource::kUnsensed;
+    if (!in_graph(edge) || holds_nothing) continue;
+    Spring& spring = springs.emplace_back();
+    spring.edge = edge.id;
+    spring.kind = edge.kind;
+    spring.doubtful = is_doubtful(edge);
+    spring.relaxed = {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : carried_covariance(),
+                      relaxation_kind(edge.kind)};
+  }
+  choose_pulling(springs);
+  return springs;
 }
 
 Spring spring_of(const Skeleton::Closure& closure) {

@@ -57,6 +57,9 @@ class LayoutKeeper {
   // Ends the thread, and all who wait. What is served stays served.
   void stop();
 
+  // The connection, for others who ask the daemon with the console's own credentials; it is made if there is none.
+  Result<std::shared_ptr<client::Client>> client() { return connected(); }
+
   KeeperState state() const;
   // The answer to /map/layout. With `after` it waits, no longer than `wait`, until the layout is not of this version,
   // or its progress or an error has changed.

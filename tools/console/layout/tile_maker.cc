@@ -9,7 +9,8 @@
 namespace relmap::console {
 namespace {
 
-constexpr double kPixels = 512, kShortest = 8;  // of a tile; of a closure that is drawn though nothing is wrong with it
+constexpr double kShownPixels = 512,
+                 kShortest = 8;  // of a tile; of a closure that is drawn though nothing is wrong with it
 
 class TileMaker {
  public:
@@ -31,7 +32,7 @@ class TileMaker {
       if (tile.vertices.size() <= kMaxVertices || tolerance > layout_.size) break;
       const bool finest = stride >= kMostStride || !content_.keyframes;
       if (!finest) stride *= 2;
-      if (finest) tolerance = std::max(2 * tolerance, index_.tile_size(id_.zoom) / (2 * kPixels));
+      if (finest) tolerance = std::max(2 * tolerance, index_.tile_size(id_.zoom) / (2 * kShownPixels));
     }
     add_closures(tile);
     return tile;
@@ -138,7 +139,7 @@ class TileMaker {
       return p.x() >= box.low.x() && p.y() >= box.low.y() && (p.x() < box.high.x() || last_column) &&
              (p.y() < box.high.y() || last_row);
     };
-    const double shortest = kShortest / kPixels * index_.tile_size(id_.zoom);
+    const double shortest = kShortest / kShownPixels * index_.tile_size(id_.zoom);
     std::vector<std::uint32_t> chosen;
     for (const std::uint32_t c : index_.closures(found_in_)) {
       const MapLayout::Closure& closure = layout_.closures[c];
