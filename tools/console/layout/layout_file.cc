@@ -242,7 +242,7 @@ Result<MapLayout> decode_layout(ByteSpan bytes) {
   const ByteSpan magic = header.get_bytes(kMagic.size());
   if (!header.ok() || std::memcmp(magic.data(), kMagic.data(), kMagic.size()) != 0)
     return {Reason::CORRUPT, "this is no layout"};
-  if (const auto format = header.get<std::uint32_t>(); format != kLayoutFormat)
+  if (const auto format = header.get<std::uint32_t>(); header.ok() && format != kLayoutFormat)
     return {Reason::UNSUPPORTED, "a layout of format " + std::to_string(format) + "; this program reads format " +
                                      std::to_string(kLayoutFormat)};
   const auto crc = header.get<std::uint32_t>();
