@@ -158,12 +158,12 @@ TEST_F(ConsoleLayout, OutlastsTheConsoleAndTheDaemon) {
     EXPECT_EQ(wait_for(keeper, whole)["frames"], kSessions * kFrames);
     version = keeper.state().layout->version;
   }
-  // Another console starts with it: this one has nothing else, for its daemon refuses to tell the shape.
+  // Another console starts with it.
   LayoutKeeper keeper(options());
   const json first = wait_for(keeper, [](const json& state) { return state["version"] != 0; });
-  EXPECT_EQ(first["version"], version);
-  const json state = wait_for(keeper, whole);
-  EXPECT_GE(state["version"], version);
+  EXPECT_GE(first["version"], version);
+  EXPECT_TRUE(keeper.tile({version, {0, 0, 0}}).ok()) << "as it was on disk";
+  EXPECT_GE(wait_for(keeper, whole)["version"], version);
 }
 
 TEST_F(ConsoleLayout, ADamagedFileIsToldAndMadeAnew) {
@@ -264,9 +264,11 @@ TEST_F(ConsoleLayout, DrawsEveryKeyframeFromNearby) {
 
 TEST_F(ConsoleLayout, HasSmallLayoutsAroundClosures) {
   const auto client = daemon->client();
-  const auto closures =
-      client->edges({.states = {client::EdgeState::kAccepted}, .kinds = {client::EdgeKind::kLoop}, .limit = 3})
-          .or_throw();
+  client::EdgeFilter filter;
+  filter.states = {client::EdgeState::kAccepted};
+  filter.kinds = {client::EdgeKind::kLoop};
+  filter.limit = 3;
+  const auto closures = client->edges(filter).or_throw();
   ASSERT_FALSE(closures.empty());
   for (const client::Edge& closure : closures) {
     const auto local = console::local_layout({closure.id, 20}, *client).or_throw();
