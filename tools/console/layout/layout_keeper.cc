@@ -177,22 +177,24 @@ Status LayoutKeeper::find_behind(client::Client& client, const client::DaemonSta
   const std::shared_ptr<const MapLayout> layout = state().layout;
   if (!layout) return {};
   if (!behind_known_ || boot_id_ != status.boot_id) {
-    std::uint64_t commit = 0, frames = 0, version = 0;
+    bool told = false;
+    std::uint64_t commit = 0, frames = 0;
     const auto first = client.skeleton({.level = 0, .candidates = true}, [&](const client::Skeleton& so_far) -> Status {
+      told = true;
       commit = so_far.commit_number;
       frames = so_far.frames;
-      version = so_far.map_version;
+      map_version_ = so_far.map_version;
       return {Reason::VIEW_EXPIRED, "enough is known"};
     });
-    if (version == 0 && !first.ok()) return first.status();
+    if (!told) return first.status();
     boot_id_ = status.boot_id;
     behind_known_ = true;
     const bool same = commit == layout->commit_number && frames == layout->frames;
     const std::uint64_t commits = commit > layout->commit_number ? commit - layout->commit_number : 1;
-    map_version_ = same ? version : version - std::min(version, commits);
+    behind_before_ = same ? 0 : commits;
   }
   const MutexLock lock(mutex_);
-  state_.behind = status.map_version - std::min(status.map_version, map_version_);
+  state_.behind = behind_before_ + status.map_version - std::min(status.map_version, map_version_);
   return {};
 }
 
@@ -244,6 +246,7 @@ Status LayoutKeeper::make_at(std::uint32_t level, bool coarse, client::Client& c
   next_ = Clock::now() + std::max<Clock::duration>(kLeastPause, 3 * took);
   boot_id_ = status.boot_id;
   map_version_ = layout.map_version;
+  behind_before_ = 0;
   behind_known_ = true;
   publish(std::move(layout));
   unsaved_ = !coarse;

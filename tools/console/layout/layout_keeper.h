@@ -105,10 +105,11 @@ class LayoutKeeper {
 
   // Of the thread.
   MapIdentity map_;
-  std::string boot_id_;            // of the daemon that has the version below
-  std::uint64_t map_version_ = 0;  // which the layout shows
-  bool behind_known_ = false;      // these two are set
-  Clock::time_point next_{};       // no layout is made before
+  std::string boot_id_;              // of the daemon that has the version below
+  std::uint64_t map_version_ = 0;    // which the layout shows, or that came after those in `behind_before_`
+  std::uint64_t behind_before_ = 0;  // versions that the layout was behind already when this daemon was met
+  bool behind_known_ = false;        // these three are set
+  Clock::time_point next_{};         // no layout is made before
   bool unsaved_ = false;
   Clock::time_point saved_{};
   Clock::time_point shown_{};  // progress, last
