@@ -99,12 +99,12 @@ TEST(MapShape, ContradictionsAreTearsOfTheClosure) {
   Skeleton torn = drive();
   close_loop(torn, 40);
   const MapShape shape = shape_of(torn);
-  const std::vector<Tear> tears = tears_of(shape);
+  const std::vector<client::Tear> tears = tears_of(shape);
   ASSERT_FALSE(tears.empty());
-  EXPECT_GT(tears[0].sigmas, kTearSigmas);
+  EXPECT_GT(tears[0].sigmas, client::kTearSigmas);
   ASSERT_FALSE(strained_of(shape).empty());
   EXPECT_EQ(strained_of(shape)[0].edge, (EdgeId{point_at(100), 1}));
-  for (const Tear& tear : tears)
+  for (const client::Tear& tear : tears)
     EXPECT_THAT(tear.words(), HasSubstr(tear.edge.valid() ? "1:100/1 from 1:" : "motion from 1:"));
 }
 
