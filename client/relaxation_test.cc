@@ -79,6 +79,21 @@ TEST(Relaxation, ConsistentEdgesGiveTheExactPoses) {
   EXPECT_TRUE(result->converged);
 }
 
+TEST(Relaxation, SaysHowFarItIsAndEndsWhenItIsTold) {
+  const Circle circle(5, 20);
+  RelaxationOptions options;
+  int asked = 0;
+  options.proceed = [&](int iterations) {
+    EXPECT_EQ(iterations, asked++);
+    return Status();
+  };
+  const auto whole = relax(circle.frames, circle.edges, options);
+  ASSERT_TRUE(whole.ok());
+  EXPECT_EQ(asked, whole->iterations);
+  options.proceed = [](int iterations) { return iterations < 1 ? Status() : Status(Reason::SHUTTING_DOWN, "enough"); };
+  EXPECT_EQ(relax(circle.frames, circle.edges, options).reason(), Reason::SHUTTING_DOWN);
+}
+
 TEST(Relaxation, EndsWhereADenseGaussNewtonEnds) {
   const Circle circle(5, 20);
   RelaxationOptions options;

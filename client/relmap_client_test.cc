@@ -168,6 +168,23 @@ class FakeMap final : public v1::Map::Service {
     return grpc::Status::OK;
   }
   // Two pages of one cell each.
+  grpc::Status GetNeighbourhood(grpc::ServerContext*, const v1::GetNeighbourhoodRequest* request,
+                                v1::GetNeighbourhoodReply* reply) override {
+    if (request->root().session() != 1) return refusal(Reason::NO_SUCH_FRAME, "no such frame");
+    for (std::uint32_t i = 0; i < request->max_frames(); ++i) {
+      v1::NeighbourhoodFrame& frame = *reply->add_frames();
+      *frame.mutable_frame() = to_wire(FrameId{1, request->root().index() + i});
+      *frame.mutable_root_from_frame() = to_wire(SE3{Matrix3::Identity(), {0, 0, 1.0 * i}});
+      frame.set_distance_m(i);
+    }
+    v1::Edge& edge = *reply->add_edges();
+    *edge.mutable_id() = to_wire(EdgeId{{1, 6}, 0});
+    *edge.mutable_a_from_b() = to_wire(SE3());
+    edge.set_kind(v1::EDGE_KIND_ODOMETRY);
+    edge.set_state(v1::EDGE_STATE_ACCEPTED);
+    reply->set_cut(request->max_metres() == 20 && request->max_edges() == 7);
+    return grpc::Status::OK;
+  }
   grpc::Status GetClosureMatrix(grpc::ServerContext*, const v1::GetClosureMatrixRequest* request,
                                 v1::GetClosureMatrixReply* reply) override {
     v1::ClosureMatrixCell& cell = *reply->add_cells();
@@ -376,6 +393,19 @@ TEST_F(ClientTest, ListsEdgesByAllFiltersAndStopsAtTheLimit) {
   EXPECT_EQ(asked.region().max_metres(), 3.5);
   EXPECT_EQ(asked.order(), v1::EDGE_ORDER_SUSPICION);
   EXPECT_EQ(asked.page_size(), 5u);
+}
+
+TEST_F(ClientTest, ReadsWhatIsAroundAFrame) {
+  const auto around = client()->neighbourhood({FrameId{1, 5}, 7, 20}, 3);
+  ASSERT_TRUE(around.ok());
+  ASSERT_EQ(around->frames.size(), 3u);
+  EXPECT_EQ(around->frames[2].frame, (FrameId{1, 7}));
+  EXPECT_EQ(around->frames[2].T_root_frame.t.z(), 2);
+  EXPECT_EQ(around->frames[2].distance_m, 2);
+  ASSERT_EQ(around->edges.size(), 1u);
+  EXPECT_EQ(around->edges[0].id, (EdgeId{{1, 6}, 0}));
+  EXPECT_TRUE(around->cut);
+  EXPECT_EQ(client()->neighbourhood({FrameId{2, 5}}).reason(), Reason::NO_SUCH_FRAME);
 }
 
 TEST_F(ClientTest, ReadsWhyAClosureIsBelieved) {

@@ -54,7 +54,7 @@ void tell(const MapOptions& options, const MapShape& shape, const MapPicture& pi
   if (picture.parts.size() > 1) err << ", in " << picture.parts.size() << " parts that nothing connects";
   err << '\n';
   if (const std::string text = shape_text(shape); !text.empty()) err << text << '\n';
-  if (!shape.layout.converged) err << kNotConverged << '\n';
+  if (!shape.layout.converged) err << client::kNotConverged << '\n';
   if (picture.mono_sessions > 0) err << not_placed_text(picture.mono_sessions, "drawn") << '\n';
   if (picture.query && !shape.find(picture.query->frame))
     err << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
@@ -106,8 +106,8 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
     route->frames = drawn_of(*shape, route->frames);
     picture.route = route;
   }
-  const std::vector<Tear> tears = options.tears ? tears_of(*shape) : std::vector<Tear>();
-  const std::vector<Tear> strained = options.tears ? strained_of(*shape) : std::vector<Tear>();
+  const std::vector<client::Tear> tears = options.tears ? tears_of(*shape) : std::vector<client::Tear>();
+  const std::vector<client::Tear> strained = options.tears ? strained_of(*shape) : std::vector<client::Tear>();
   mark_tears(tears, strained, picture);
   if (options.colour == "time") colour_by_time(*shape, picture);
   if (options.colour == "uncertainty") colour_by_uncertainty(*shape, picture);

@@ -54,13 +54,13 @@ MapShape shape_of(Skeleton skeleton) {
 }
 
 TEST(MapShape, HasEveryKeyframeOfASmallMapAndFewerPointsOfALargerOne) {
-  EXPECT_EQ(level_for(1), 3u);
-  EXPECT_EQ(level_for(50'000), 3u);
+  EXPECT_EQ(client::level_for(1), 3u);
+  EXPECT_EQ(client::level_for(50'000), 3u);
   std::uint32_t before = 3;
   for (std::uint64_t keyframes = 50'001; keyframes < 10'000'000; keyframes += keyframes / 3) {
-    EXPECT_LT(level_for(keyframes), 3u);
-    EXPECT_LE(level_for(keyframes), before);
-    before = level_for(keyframes);
+    EXPECT_LT(client::level_for(keyframes), 3u);
+    EXPECT_LE(client::level_for(keyframes), before);
+    before = client::level_for(keyframes);
   }
   EXPECT_EQ(before, 0u);
 }
@@ -99,12 +99,12 @@ TEST(MapShape, ContradictionsAreTearsOfTheClosure) {
   Skeleton torn = drive();
   close_loop(torn, 40);
   const MapShape shape = shape_of(torn);
-  const std::vector<Tear> tears = tears_of(shape);
+  const std::vector<client::Tear> tears = tears_of(shape);
   ASSERT_FALSE(tears.empty());
-  EXPECT_GT(tears[0].sigmas, kTearSigmas);
+  EXPECT_GT(tears[0].sigmas, client::kTearSigmas);
   ASSERT_FALSE(strained_of(shape).empty());
   EXPECT_EQ(strained_of(shape)[0].edge, (EdgeId{point_at(100), 1}));
-  for (const Tear& tear : tears)
+  for (const client::Tear& tear : tears)
     EXPECT_THAT(tear.words(), HasSubstr(tear.edge.valid() ? "1:100/1 from 1:" : "motion from 1:"));
 }
 
