@@ -12,6 +12,31 @@
 
 namespace relmap::client {
 
+namespace {
+
+constexpr int kMaxReplyBytes = 16 << 20;
+
+}  // namespace
+
+grpc::ChannelArguments usual_channel_arguments() {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxReplyBytes);
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // gRPC shares connections between channels. The one of an older client may lead to a daemon that was killed, and look
+  // connected until somebody writes to it.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  // Reconnects soon after a daemon was restarted.
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  return arguments;
+}
+
+std::shared_ptr<grpc::Channel> open_channel_for_tokens(const ServerAddress& where, const std::string& authorities,
+                                                       const grpc::ChannelArguments& arguments) {
+  if (where.is_socket() || authorities.empty())
+    return grpc::CreateCustomChannel(where.address, grpc::InsecureChannelCredentials(), arguments);
+  return grpc::CreateCustomChannel(where.address, grpc::SslCredentials({authorities, "", ""}), arguments);
+}
+
 Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, const std::string& credentials,
                                                     const grpc::ChannelArguments& arguments) {
   if (where.is_socket() || credentials.empty())

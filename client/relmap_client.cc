@@ -18,20 +18,6 @@ namespace {
 
 using MapStub = v1::Map::Stub;
 
-constexpr int kMaxReplyBytes = 16 << 20;
-
-grpc::ChannelArguments channel_arguments() {
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kMaxReplyBytes);
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // gRPC shares connections between channels. The one of an older client may lead to a daemon that was killed, and look
-  // connected until somebody writes to it.
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // Reconnects soon after a daemon was restarted.
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  return arguments;
-}
-
 // Why there is no connection, as gRPC puts it; empty if it does not know yet.
 std::string why_not(v1::Map::Stub& map) {
   grpc::ClientContext context;
@@ -75,7 +61,7 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   if (!where.ok()) return where.status();
   if (Status names = check_names(options); !names.ok()) return names;
   const Impl::Clock::time_point until = Impl::Clock::now() + options.connect_timeout;
-  auto channel = open_channel(*where, options.credentials, channel_arguments());
+  auto channel = open_channel(*where, options.credentials, usual_channel_arguments());
   if (!channel.ok()) return channel.status();
   auto impl = std::make_unique<Impl>(server, std::move(*channel), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";

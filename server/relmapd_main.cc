@@ -16,13 +16,13 @@
 
 #include "server/monitor/last_words.h"
 #include "server/monitor/log.h"
-#include "server/monitor/service_manager.h"
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
 #include "server/ops/process.h"
 #include "server/ops/settings.h"
 #include "server/ops/signals.h"
 #include "server/rpc/log_level.h"
+#include "server/service/service_manager.h"
 #include "tools/terminal/command_line.h"
 
 namespace {
@@ -221,7 +221,7 @@ void reload(const CommandLine& line, relmap::ops::Daemon& daemon) try {
 }
 
 int run(const CommandLine& line, Config config) {
-  relmap::monitor::ServiceManager manager;
+  relmap::service::ServiceManager manager;
   limit_connections(config);
   auto daemon = relmap::ops::Daemon::start(config);
   if (daemon.reason() == Reason::SHUTTING_DOWN) {
@@ -230,10 +230,10 @@ int run(const CommandLine& line, Config config) {
   }
   if (!daemon.ok()) return fail(daemon.status());
   const auto state = [&] {
-    return relmap::monitor::ServiceManager::State{(*daemon)->health().live, (*daemon)->status_line()};
+    return relmap::service::ServiceManager::State{(*daemon)->health().live, (*daemon)->status_line()};
   };
   struct Stops {  // before the daemon is gone, of which the manager's thread asks
-    relmap::monitor::ServiceManager& told;
+    relmap::service::ServiceManager& told;
     ~Stops() { told.stops(); }
   } const stops{manager};
   manager.serves(state);

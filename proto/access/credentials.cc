@@ -86,4 +86,30 @@ Result<Credentials> read_credentials(const std::string& path) {
   return credentials;
 }
 
+Result<std::string> read_authorities(const std::string& path) {
+  const auto text = read_file(path);
+  if (!text.ok()) return text.status();
+  std::string authorities;
+  bool has_key = false;
+  const Bio bio = reader_of(*text);
+  char *name = nullptr, *header = nullptr;
+  unsigned char* bytes = nullptr;
+  long size = 0;
+  while (PEM_read_bio(bio.get(), &name, &header, &bytes, &size) == 1) {
+    const std::string_view kind = name;
+    has_key = has_key || kind.ends_with("PRIVATE KEY");
+    if (kind == kCertificateBlock) authorities += block(std::string(kind), bytes, size);
+    OPENSSL_free(name);
+    OPENSSL_free(header);
+    OPENSSL_free(bytes);
+  }
+  ERR_clear_error();
+  if (has_key)
+    return Status(Reason::BAD_CONFIG, path +
+                                          " has a private key, with which all callers would be taken for its owner: " +
+                                          "give ca.crt, the certificate of the authority, instead");
+  if (authorities.empty()) return Status(Reason::BAD_CONFIG, path + " has no certificate of an authority");
+  return authorities;
+}
+
 }  // namespace relmap::access

@@ -30,4 +30,9 @@ Result<Credentials> parse_credentials(std::string_view text);
 // NO_SUCH_FILE. BAD_CONFIG, with the path: it is malformed, or others than its owner can read it.
 Result<Credentials> read_credentials(const std::string& path);
 
+// The certificates of authorities in a file for a program that asks a daemon for others, each with a token of his own:
+// ca.crt, or credentials with a token, which is not looked at. NO_SUCH_FILE. BAD_CONFIG: there is none, or the file has
+// a private key, with which all others would be taken for its owner.
+Result<std::string> read_authorities(const std::string& path);
+
 }  // namespace relmap::access

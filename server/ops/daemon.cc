@@ -19,7 +19,6 @@
 #include "server/monitor/health.h"
 #include "server/monitor/http_server.h"
 #include "server/monitor/metrics_page.h"
-#include "server/monitor/periodic.h"
 #include "server/ops/endpoint.h"
 #include "server/ops/private_folder.h"
 #include "server/ops/process.h"
@@ -30,6 +29,7 @@
 #include "server/rpc/handshake_log.h"
 #include "server/rpc/log_level.h"
 #include "server/rpc/server.h"
+#include "server/service/periodic.h"
 #include "storage/io/file.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
@@ -147,7 +147,7 @@ struct Daemon::Impl {
   std::unique_ptr<rpc::RpcServer> server;
   std::unique_ptr<monitor::MetricsPage> metrics;
   std::unique_ptr<monitor::HttpServer> http;
-  std::unique_ptr<monitor::Periodic> pulse;
+  std::unique_ptr<service::Periodic> pulse;
   std::string socket, address, http_address;
   access::SealKey lcm_secret{};
   std::uint64_t lcm_access_version = 0;  // of the access list that LCM uses
@@ -273,7 +273,7 @@ Status Daemon::Impl::serve() {
   if (!options.host.empty()) address = HostPort{options.host, server->port()}.to_string();
   start_lcm();
   if (Status opened = serve_http(); !opened.ok()) return opened;
-  pulse = std::make_unique<monitor::Periodic>(kPulse, [this] { beat(); });
+  pulse = std::make_unique<service::Periodic>(kPulse, [this] { beat(); });
   const Status written = write_endpoints();
   if (written.ok() || mapper->stats().storage.reason() != Reason::READ_ONLY) return written;
   spdlog::warn("clients find the daemon only by --server unix:{}{}: {}", socket,

@@ -1,4 +1,4 @@
-#include "server/monitor/service_manager.h"
+#include "server/service/service_manager.h"
 
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -13,7 +13,7 @@
 #include <fstream>
 #include <utility>
 
-namespace relmap::monitor {
+namespace relmap::service {
 
 namespace {
 
@@ -115,4 +115,4 @@ void ServiceManager::send(const std::string& message) const {
   close(socket);
 }
 
-}  // namespace relmap::monitor
+}  // namespace relmap::service

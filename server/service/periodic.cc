@@ -1,4 +1,4 @@
-#include "server/monitor/periodic.h"
+#include "server/service/periodic.h"
 
 #include <spdlog/spdlog.h>
 
@@ -6,7 +6,7 @@
 
 #include "proto/base/status.h"
 
-namespace relmap::monitor {
+namespace relmap::service {
 
 Periodic::Periodic(std::chrono::milliseconds interval, std::function<void()> work)
     : interval_(interval), work_(std::move(work)), thread_([this] { run(); }) {}
@@ -41,4 +41,4 @@ void Periodic::run() {
   }
 }
 
-}  // namespace relmap::monitor
+}  // namespace relmap::service

@@ -1,4 +1,4 @@
-#include "server/monitor/service_manager.h"
+#include "server/service/service_manager.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@
 
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap::monitor {
+namespace relmap::service {
 namespace {
 
 using std::chrono::milliseconds;
@@ -141,4 +141,4 @@ TEST(ProcessActivity, GrowsWhileTheProcessWorks) {
 }
 
 }  // namespace
-}  // namespace relmap::monitor
+}  // namespace relmap::service

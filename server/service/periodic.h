@@ -7,7 +7,7 @@
 
 #include "proto/base/mutex.h"
 
-namespace relmap::monitor {
+namespace relmap::service {
 
 class Periodic {
  public:
@@ -32,4 +32,4 @@ class Periodic {
   std::thread thread_;
 };
 
-}  // namespace relmap::monitor
+}  // namespace relmap::service

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "proto/base/mutex.h"
-#include "server/monitor/periodic.h"
+#include "server/service/periodic.h"
 
-namespace relmap::monitor {
+namespace relmap::service {
 
 class ServiceManager {
  public:
@@ -55,4 +55,4 @@ class ServiceManager {
   std::unique_ptr<Periodic> thread_;                    // declared last: it uses all others
 };
 
-}  // namespace relmap::monitor
+}  // namespace relmap::service

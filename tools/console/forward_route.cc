@@ -1,0 +1,71 @@
+#include "tools/console/forward_route.h"
+
+#include <array>
+#include <utility>
+
+#include "tools/console/forward/grpc_web.h"
+
+namespace relmap::console {
+
+namespace {
+
+constexpr std::size_t kMaxMessage = std::size_t{16} << 20;
+constexpr std::string_view kType = "application/grpc-web+proto";
+// What is passed on of a request's headers, as it is.
+constexpr std::array<std::string_view, 2> kPassedOn{"x-request-id", "traceparent"};
+
+bool is_grpc_web(std::string_view type) {
+  const std::string_view name = type.substr(0, type.find(';'));
+  return name == kType || name == "application/grpc-web";
+}
+
+Awaitable<std::optional<Response>> forward(DaemonLink& link, Request& request, ResponseStream& stream) {
+  if (!is_forwarded(request.parts.at(0), request.parts.at(1)))
+    co_return error_response({Reason::NO_SUCH_FILE, "only methods of relmap.v1 and of gRPC's health are forwarded"});
+  if (!is_grpc_web(request.header("content-type"))) {
+    Response response = error_response({Reason::UNSUPPORTED, "the content has to be " + std::string(kType)});
+    response.status = 415;
+    co_return response;
+  }
+  const auto message = request_message(request.body, kMaxMessage);
+  if (!message.ok()) {
+    Response response = error_response(message.status());
+    response.status = 400;
+    co_return response;
+  }
+  CallOptions options;
+  options.token = request.caller.token;
+  for (const std::string_view name : kPassedOn)
+    if (const std::string_view value = request.header(name); !value.empty()) options.metadata.emplace_back(name, value);
+  if (const std::string_view timeout = request.header("grpc-timeout"); !timeout.empty()) {
+    options.timeout = timeout_of(timeout);
+    if (!options.timeout)
+      co_return error_response({Reason::INVALID_ARGUMENT, "'" + std::string(timeout) + "' is no grpc-timeout"});
+  }
+  std::string asked(*message);
+  request.body = std::string();  // a stream may last for hours
+  ForwardedCall call = co_await link.call(request.path, std::move(asked), std::move(options));
+  Response head;
+  head.type = kType;
+  stream.begin(std::move(head));
+  for (;;) {
+    const std::optional<std::string> next = co_await call.next([&stream] { return stream.gone(); });
+    if (!next) break;
+    co_await stream.write(message_frame(*next));
+  }
+  co_await stream.write(trailers_frame(call.end()));
+  co_return std::nullopt;
+}
+
+}  // namespace
+
+void add_forwarding(DaemonLink& link, Router& router) {
+  Route route;
+  route.method = "POST";
+  route.pattern = "/*/*";
+  route.stream = [&link](Request& request, ResponseStream& stream) { return forward(link, request, stream); };
+  route.body_limit = kMaxMessage + kFrameHead;
+  router.add(std::move(route));
+}
+
+}  // namespace relmap::console

@@ -1,0 +1,12 @@
+// POST /relmap.v1.SERVICE/METHOD: gRPC-Web, forwarded to the daemon as the caller.
+#pragma once
+
+#include "tools/console/forward/daemon_link.h"
+#include "tools/console/http/router.h"
+
+namespace relmap::console {
+
+// `link` must outlive the routes.
+void add_forwarding(DaemonLink& link, Router& router);
+
+}  // namespace relmap::console

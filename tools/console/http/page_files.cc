@@ -1,0 +1,74 @@
+#include "tools/console/http/page_files.h"
+
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "proto/base/bytes.h"
+#include "proto/base/crc32c.h"
+#include "proto/base/hex.h"
+#include "tools/console/http/gzip.h"
+
+namespace relmap::console {
+
+namespace {
+
+std::uint32_t crc_of(std::string_view text) {
+  return crc32c(ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+struct Prepared {
+  Response plain, compressed;  // the latter with an empty body where it does not pay
+};
+
+// Not a lambda: closures of coroutines must outlive them, and a copy in the router does.
+struct ServeFile {
+  std::shared_ptr<const Prepared> file;
+  Awaitable<Response> operator()(const Request& request) const {
+    const bool compressed = !file->compressed.body.empty() && accepts_gzip(request.header("accept-encoding"));
+    co_return compressed ? file->compressed : file->plain;
+  }
+};
+
+}  // namespace
+
+std::string_view type_of(std::string_view name) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kTypes{{
+      {".html", "text/html; charset=utf-8"},
+      {".js", "text/javascript; charset=utf-8"},
+      {".css", "text/css; charset=utf-8"},
+      {".svg", "image/svg+xml"},
+      {".json", "application/json"},
+      {".png", "image/png"},
+      {".ico", "image/x-icon"},
+      {".woff2", "font/woff2"},
+      {".wasm", "application/wasm"},
+      {".txt", "text/plain; charset=utf-8"},
+  }};
+  for (const auto& [ending, type] : kTypes)
+    if (name.ends_with(ending)) return type;
+  return "application/octet-stream";
+}
+
+void add_page(std::span<const PageFile> files, Router& router) {
+  for (const PageFile& file : files) {
+    auto prepared = std::make_shared<Prepared>();
+    Response& plain = prepared->plain;
+    plain.type = type_of(file.name);
+    plain.body = file.bytes;
+    plain.cache = "no-cache";  // asked for again each time, and answered by 304
+    const std::string mark = hex(crc_of(file.bytes)) + "-" + std::to_string(file.bytes.size());
+    plain.etag = "\"" + mark + "\"";
+    if (auto packed = may_compress(plain.type) ? gzip(file.bytes, Effort::kBest) : std::nullopt) {
+      prepared->compressed = plain;
+      prepared->compressed.body = std::move(*packed);
+      prepared->compressed.encoding = "gzip";
+      prepared->compressed.etag = "\"" + mark + "-gzip\"";
+    }
+    const ServeFile serve{std::move(prepared)};
+    router.add({"GET", "/" + std::string(file.name), Access::kAnyone, serve});
+    if (file.name == "index.html") router.add({"GET", "/", Access::kAnyone, serve});
+  }
+}
+
+}  // namespace relmap::console

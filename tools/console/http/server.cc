@@ -1,0 +1,209 @@
+#include "tools/console/http/server.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <cctype>
+#include <deque>
+#include <thread>
+
+#include "proto/base/mutex.h"
+#include "tools/console/http/connection.h"
+#include "tools/console/http/tls_context.h"
+
+namespace relmap::console {
+
+namespace {
+
+using tcp = asio::ip::tcp;
+using Error = boost::system::error_code;
+
+constexpr int kThreads = 3;
+constexpr int kWorkers = 2;
+constexpr std::chrono::milliseconds kPause{100};  // where nothing can be accepted
+
+// The names by which a browser may ask a server that listens at this host.
+std::vector<std::string> names_of(const std::string& host, bool any) {
+  std::vector<std::string> names{"localhost", "127.0.0.1", "::1"};
+  std::string own = host;
+  for (char& c : own) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (!any) names.push_back(std::move(own));
+  std::array<char, 256> machine{};
+  if (any && gethostname(machine.data(), machine.size() - 1) == 0) {
+    const auto name = parse_host(machine.data());
+    if (name.ok()) names.push_back(name->name);
+  }
+  return names;
+}
+
+}  // namespace
+
+struct Server::Impl {
+  explicit Impl(ServerOptions given) : options(std::move(given)) {}
+
+  void accept(tcp::acceptor& acceptor) {
+    acceptor.async_accept(asio::make_strand(io), [this, &acceptor](Error error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error) take(std::move(socket));
+      if (error) std::this_thread::sleep_for(kPause);  // no file is free, for example
+      accept(acceptor);
+    });
+  }
+
+  void take(tcp::socket socket) try {
+    Error ignored;
+    (void)socket.set_option(tcp::no_delay(true), ignored);
+    (void)socket.set_option(asio::socket_base::keep_alive(true), ignored);
+    if (tls) {
+      auto context = tls->now();
+      start(std::make_shared<Connection<asio::ssl::stream<beast::tcp_stream>>>(*served, context, std::move(socket),
+                                                                               *context));
+    } else {
+      start(std::make_shared<Connection<beast::tcp_stream>>(*served, nullptr, std::move(socket)));
+    }
+  } catch (const std::exception&) {  // memory ran out: the browser sees a closed connection
+  }
+
+  template <typename One>
+  void start(std::shared_ptr<One> connection) {
+    if (!admit(connection)) return;
+    const auto executor = connection->executor();
+    asio::co_spawn(executor, One::run(std::move(connection)), asio::detached);
+  }
+
+  // Makes room for it; false: every other one is being answered.
+  bool admit(const std::shared_ptr<OpenConnection>& connection) {
+    std::shared_ptr<OpenConnection> oldest;
+    {
+      const MutexLock lock(mutex);
+      std::erase_if(open, [](const auto& one) { return one.expired(); });
+      if (open.size() >= options.max_connections) {
+        for (auto one = open.begin(); one != open.end() && !oldest; ++one) {
+          auto held = one->lock();
+          if (!held || !held->idle()) continue;
+          oldest = std::move(held);
+          open.erase(one);
+          break;
+        }
+        if (!oldest) return false;
+      }
+      open.push_back(connection);
+    }
+    if (oldest) oldest->close();
+    return true;
+  }
+
+  void run() {
+    for (;;) {
+      try {
+        io.run();
+        return;
+      } catch (const std::exception&) {  // of one connection, which is gone
+      }
+    }
+  }
+
+  const ServerOptions options;
+  std::unique_ptr<TlsFiles> tls;  // null: none
+  std::unique_ptr<OwnNames> names;
+  std::uint16_t port = 0;
+  bool local = true;
+  Router router;
+  Gate gate;
+  std::unique_ptr<Served> served;
+  Mutex mutex;
+  std::deque<std::weak_ptr<OpenConnection>> open RELMAP_GUARDED_BY(mutex);  // the oldest first
+  // After what connections use: they are destroyed with it.
+  asio::io_context io{kThreads};
+  std::vector<std::unique_ptr<tcp::acceptor>> acceptors;
+  asio::thread_pool workers{kWorkers};
+  std::array<std::thread, kThreads> threads;
+};
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Result<std::unique_ptr<Server>> Server::listen(const ServerOptions& options) {
+  std::unique_ptr<Server> server(new Server(std::make_unique<Impl>(options)));
+  Impl& impl = *server->impl_;
+  if (!options.certificate.empty()) {
+    impl.tls = std::make_unique<TlsFiles>(options.certificate, options.key);
+    if (Status read = impl.tls->read(); !read.ok()) return read;
+  }
+  const auto failed = [&](const Error& error) {
+    return Status(Reason::PORT_IN_USE,
+                  "cannot listen on " + options.host + ":" + std::to_string(options.port) + ": " + error.message());
+  };
+  Error error;
+  tcp::resolver resolver(impl.io);
+  const auto found = resolver.resolve(options.host, "0", tcp::resolver::passive, error);
+  if (error) return failed(error);
+  impl.port = options.port;
+  bool any = false;
+  for (const auto& entry : found) {
+    tcp::endpoint at = entry.endpoint();
+    at.port(impl.port);
+    auto acceptor = std::make_unique<tcp::acceptor>(impl.io);
+    (void)acceptor->open(at.protocol(), error);
+    if (error) continue;  // no IPv6 on this machine, for example
+    (void)acceptor->set_option(asio::socket_base::reuse_address(true), error);
+    if (at.protocol() == tcp::v6())
+      (void)acceptor->set_option(asio::ip::v6_only(!at.address().is_unspecified()), error);
+    (void)acceptor->bind(at, error);
+    if (error == boost::system::errc::address_not_available ||
+        (error == asio::error::address_in_use && impl.port != options.port))
+      continue;  // IPv6 is switched off; or the port that the system chose for one address is taken at another
+    if (!error) (void)acceptor->listen(asio::socket_base::max_listen_connections, error);
+    if (error) return failed(error);
+    impl.port = acceptor->local_endpoint(error).port();
+    impl.local = impl.local && at.address().is_loopback();
+    any = any || at.address().is_unspecified();
+    impl.acceptors.push_back(std::move(acceptor));
+  }
+  if (impl.acceptors.empty()) return failed(make_error_code(boost::system::errc::address_not_available));
+  impl.names = std::make_unique<OwnNames>(names_of(options.host, any), options.proxied);
+  return server;
+}
+
+Server::~Server() { stop(); }
+
+std::uint16_t Server::port() const { return impl_->port; }
+bool Server::is_local() const { return impl_->local; }
+bool Server::uses_tls() const { return impl_->tls != nullptr; }
+asio::any_io_executor Server::worker() { return impl_->workers.get_executor(); }
+
+void Server::serve(Router router, Gate gate) {
+  impl_->router = std::move(router);
+  impl_->gate = std::move(gate);
+  impl_->served.reset(new Served{impl_->options, impl_->router, impl_->gate, *impl_->names});
+  for (const auto& acceptor : impl_->acceptors) impl_->accept(*acceptor);
+  for (std::thread& thread : impl_->threads) thread = std::thread([impl = impl_.get()] { impl->run(); });
+}
+
+void Server::stop() {
+  impl_->io.stop();
+  for (std::thread& thread : impl_->threads)
+    if (thread.joinable()) thread.join();
+  impl_->workers.stop();
+  impl_->workers.join();
+}
+
+Awaitable<bool> wait_until(std::function<bool()> done, std::chrono::steady_clock::time_point until) {
+  constexpr std::chrono::milliseconds kLook{50};
+  asio::steady_timer timer(co_await asio::this_coro::executor);
+  while (!done()) {
+    if (std::chrono::steady_clock::now() >= until) co_return false;
+    timer.expires_after(kLook);
+    co_await timer.async_wait(asio::use_awaitable);
+  }
+  co_return true;
+}
+
+}  // namespace relmap::console
