@@ -16,6 +16,11 @@ namespace {
 
 constexpr int kMaxReplyBytes = 16 << 20;
 
+std::shared_ptr<grpc::ChannelCredentials> with_token(std::shared_ptr<grpc::ChannelCredentials> by,
+                                                     const std::string& token) {
+  return token.empty() ? by : grpc::CompositeChannelCredentials(by, grpc::AccessTokenCredentials(token));
+}
+
 }  // namespace
 
 grpc::ChannelArguments usual_channel_arguments() {
@@ -31,10 +36,12 @@ grpc::ChannelArguments usual_channel_arguments() {
 }
 
 std::shared_ptr<grpc::Channel> open_channel_for_tokens(const ServerAddress& where, const std::string& authorities,
-                                                       const grpc::ChannelArguments& arguments) {
+                                                       const grpc::ChannelArguments& arguments,
+                                                       const std::string& token) {
   if (where.is_socket() || authorities.empty())
     return grpc::CreateCustomChannel(where.address, grpc::InsecureChannelCredentials(), arguments);
-  return grpc::CreateCustomChannel(where.address, grpc::SslCredentials({authorities, "", ""}), arguments);
+  return grpc::CreateCustomChannel(where.address, with_token(grpc::SslCredentials({authorities, "", ""}), token),
+                                   arguments);
 }
 
 Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, const std::string& credentials,
@@ -43,10 +50,9 @@ Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, 
     return grpc::CreateCustomChannel(where.address, grpc::InsecureChannelCredentials(), arguments);
   const auto shown = access::read_credentials(credentials);
   if (!shown.ok()) return shown.status();
-  std::shared_ptr<grpc::ChannelCredentials> by =
-      grpc::SslCredentials({shown->authorities, shown->key, shown->certificate});
-  if (!shown->token.empty()) by = grpc::CompositeChannelCredentials(by, grpc::AccessTokenCredentials(shown->token));
-  return grpc::CreateCustomChannel(where.address, by, arguments);
+  return grpc::CreateCustomChannel(
+      where.address,
+      with_token(grpc::SslCredentials({shown->authorities, shown->key, shown->certificate}), shown->token), arguments);
 }
 
 std::string other_causes(const ServerAddress& where, const std::string& credentials, const std::string& why) {

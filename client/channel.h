@@ -19,9 +19,10 @@ Result<std::shared_ptr<grpc::Channel>> open_channel(const ServerAddress& where, 
                                                     const grpc::ChannelArguments& arguments);
 
 // The same for a daemon that serves TLS, for callers who show a token with each call or nothing: `authorities` (PEM)
-// may have issued the daemon's certificate. Empty: without TLS.
+// may have issued the daemon's certificate. Empty: without TLS. `token`: shown with each call; empty: none.
 std::shared_ptr<grpc::Channel> open_channel_for_tokens(const ServerAddress& where, const std::string& authorities,
-                                                       const grpc::ChannelArguments& arguments);
+                                                       const grpc::ChannelArguments& arguments,
+                                                       const std::string& token = "");
 
 // The arguments of every channel to a daemon: how large its messages may be, and how soon one that was restarted is
 // found again.

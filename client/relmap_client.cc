@@ -61,7 +61,10 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   if (!where.ok()) return where.status();
   if (Status names = check_names(options); !names.ok()) return names;
   const Impl::Clock::time_point until = Impl::Clock::now() + options.connect_timeout;
-  auto channel = open_channel(*where, options.credentials, usual_channel_arguments());
+  auto channel =
+      options.authorities.empty()
+          ? open_channel(*where, options.credentials, usual_channel_arguments())
+          : Result(open_channel_for_tokens(*where, options.authorities, usual_channel_arguments(), options.token));
   if (!channel.ok()) return channel.status();
   auto impl = std::make_unique<Impl>(server, std::move(*channel), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";

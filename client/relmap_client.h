@@ -31,6 +31,9 @@ struct ClientOptions {
   // File that proves who the caller is (proto/access/credentials.h), for daemons that serve TLS at HOST:PORT. Empty:
   // none, and no TLS. A daemon of this machine, named by its data folder, needs none.
   std::string credentials;
+  // Instead of a file, for programs that call for others: a bearer token, and whose certificates a daemon at HOST:PORT
+  // may show (PEM; empty: no TLS, and the token is not sent).
+  std::string token = {}, authorities = {};
   // Names the calls in the daemon's logs (x-request-id: at most 64 letters, digits and "-_."); empty: the daemon makes
   // a name for each.
   std::string request_id;

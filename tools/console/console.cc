@@ -42,12 +42,16 @@ Result<std::unique_ptr<Console>> Console::start(const ConsoleOptions& options) {
                             .text()}});
   console->login_->add_routes(router);
   add_frames(*console->link_, router);
+  console->map_ = std::make_unique<MapRoutes>(options.server, options.authorities, options.cache, *console->login_,
+                                              *console->server_);
+  console->map_->add_to(router);
   add_forwarding(*console->link_, router);
   console->server_->serve(std::move(router), console->login_->gate());
   return console;
 }
 
 Console::~Console() {
+  if (map_) map_->stop();
   server_->stop();
   link_.reset();
   server_.reset();  // with the coroutines that still wait, which use the login

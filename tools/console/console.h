@@ -8,6 +8,7 @@
 #include "tools/console/forward/daemon_link.h"
 #include "tools/console/http/server.h"
 #include "tools/console/login.h"
+#include "tools/console/map_route.h"
 
 namespace relmap::console {
 
@@ -35,6 +36,7 @@ class Console {
   std::unique_ptr<Server> server_;
   std::unique_ptr<DaemonLink> link_;
   std::unique_ptr<Login> login_;
+  std::unique_ptr<MapRoutes> map_;
 };
 
 }  // namespace relmap::console

@@ -64,6 +64,13 @@ Login::Login(DaemonLink& link, std::uint16_t port)
       key_(kind_ == Kind::kKey ? access::new_token() : std::string()),
       cookie_("relmap_token_" + std::to_string(port)) {}
 
+Result<Caller> Login::last_let_in() const {
+  const MutexLock lock(mutex_);
+  if (kind_ == Kind::kToken && last_token_.empty())
+    return Status(Reason::UNAUTHENTICATED, "the console has no token to ask with: somebody has to log in first");
+  return Caller{last_token_};
+}
+
 Gate Login::gate() {
   return {[this](const Request& request) { return identify(request); },
           [this](const Caller& caller) { return authorise(caller.token); }};
@@ -101,8 +108,9 @@ Awaitable<Status> Login::authorise(std::string token) {
     known = found != let_in_.end() && now < found->second;
   }
   if (known) co_return Status();
-  Status asked = co_await ask_daemon(std::move(token));
+  Status asked = co_await ask_daemon(token);
   const MutexLock lock(mutex_);
+  if (asked.ok()) last_token_ = std::move(token);
   if (let_in_.size() >= kMaxTokens) std::erase_if(let_in_, [&](const auto& one) { return one.second <= now; });
   if (asked.ok() && let_in_.size() < kMaxTokens)
     let_in_[hash] = now + kAskedAgain;

@@ -44,6 +44,10 @@ class Login {
   Kind kind() const { return kind_; }
   const std::string& key() const { return key_; }  // 64 hexadecimal digits, new at every start; of kKey
 
+  // By what the console itself asks the daemon, for what it shows to everyone: the token of the caller who was let in
+  // last. UNAUTHENTICATED: the daemon asks for tokens, and nobody has logged in yet.
+  Result<Caller> last_let_in() const;
+
   // For Server::serve().
   Gate gate();
   // /login and /logout.
@@ -60,7 +64,8 @@ class Login {
   const Kind kind_;
   const std::string key_, cookie_;
   LoginTries tries_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
+  std::string last_token_ RELMAP_GUARDED_BY(mutex_);
   // By the hash of a token: until when it need not be asked about again.
   std::map<std::string, std::chrono::steady_clock::time_point> let_in_ RELMAP_GUARDED_BY(mutex_);
 };

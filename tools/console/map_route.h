@@ -1,0 +1,40 @@
+// The map for drawing: /map/layout, tiles, places, small layouts, and the samples of health.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "tools/console/http/router.h"
+#include "tools/console/http/server.h"
+#include "tools/console/layout/health_samples.h"
+#include "tools/console/layout/layout_keeper.h"
+#include "tools/console/login.h"
+
+namespace relmap::console {
+
+// What the console keeps of the map and its daemon. Thread-safe.
+class MapRoutes {
+ public:
+  // `server` and `authorities` as of ConsoleOptions; `cache`: folder for layouts, or empty. `login` and `http` must
+  // outlive it.
+  MapRoutes(std::string server, std::string authorities, std::string cache, const Login& login, Server& http);
+
+  void add_to(Router& router);
+  // Those who wait for a newer layout are answered, and nothing is kept up any more.
+  void stop();
+
+ private:
+  Result<std::unique_ptr<client::Client>> connect(const Caller& caller, std::chrono::milliseconds deadline) const;
+  Awaitable<Response> state(const Request& request);
+  Awaitable<Response> tile(const Request& request);
+  Awaitable<Response> places(const Request& request);
+  Awaitable<Response> around(const Request& request);
+  Awaitable<Response> samples(const Request& request);
+
+  const std::string server_, authorities_;
+  Server& http_;
+  LayoutKeeper keeper_;
+  HealthSamples samples_;
+};
+
+}  // namespace relmap::console
