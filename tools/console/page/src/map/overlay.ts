@@ -78,9 +78,9 @@ export class Overlay {
     context.lineJoin = context.lineCap = 'round';
 
     this.trails(camera, size, pixel, marks.trails, palette);
-    for (const closure of marks.closures) this.closure(camera, size, closure, palette[closure.state], 2, true);
+    for (const closure of marks.closures) this.closure(camera, size, closure, css(palette[closure.state]), 2, true);
     if (marks.closure) {
-      this.closure(camera, size, marks.closure, palette.selected, 1.5, false);
+      this.closure(camera, size, marks.closure, css(palette.selected, 0.22), 16, false);
       const { ax, ay, bx, by } = marks.closure;
       for (const [x, y] of [toScreen(camera, size, ax, ay), toScreen(camera, size, bx, by)])
         this.ring(x, y, 8, palette.selected, palette.ground);
@@ -140,9 +140,9 @@ export class Overlay {
     context.setTransform(pixel, 0, 0, pixel, 0, 0);
   }
 
-  private closure(camera: Camera, size: Size, { ax, ay, bx, by }: Line, colour: Palette['text'], width: number, dashed: boolean) {
+  private closure(camera: Camera, size: Size, { ax, ay, bx, by }: Line, colour: string, width: number, dashed: boolean) {
     const { context } = this;
-    context.strokeStyle = css(colour);
+    context.strokeStyle = colour;
     context.lineWidth = width;
     context.setLineDash(dashed ? [8, 3] : []);
     context.beginPath();
