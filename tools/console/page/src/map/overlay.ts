@@ -3,7 +3,7 @@
 import { toScreen, type Camera, type Size } from './camera';
 import { metres, plain } from '../lib/format';
 import { css, sessionColour, type Palette } from './palette';
-import { Placement, scaleBar } from './placement';
+import { clipped, Placement, scaleBar } from './placement';
 
 interface At {
   x: number; // metres
@@ -100,8 +100,12 @@ export class Overlay {
     for (const { robot, at } of robots) this.robot(camera, robot, at, palette);
     for (const { robot, at } of robots) this.text(plain(robot.name, 30), at, 13, palette.text, palette, placement, true);
     for (const torn of marks.torn) {
-      const at = toScreen(camera, size, (torn.ax + torn.bx) / 2, (torn.ay + torn.by) / 2);
-      if (near(...at, 20)) this.text(torn.text, at, 9, palette.torn, palette, placement, true);
+      const ends = [toScreen(camera, size, torn.ax, torn.ay), toScreen(camera, size, torn.bx, torn.by)] as const;
+      const seen = clipped(...ends[0], ...ends[1], size.width, size.height);
+      if (!seen) continue;
+      // Tiles have only closures of which they have an end.
+      if (!near(...ends[0], 0) && !near(...ends[1], 0)) this.closure(camera, size, torn, css(palette.torn), 2.5, true);
+      this.text(torn.text, [(seen[0] + seen[2]) / 2, (seen[1] + seen[3]) / 2], 9, palette.torn, palette, placement, true);
     }
     for (const caption of marks.captions) {
       const at = toScreen(camera, size, caption.x, caption.y);
