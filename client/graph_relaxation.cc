@@ -71,6 +71,8 @@ class Relaxer {
     double cost = out.initial_cost, damping = 1e-6;
     out.converged = false;
     while (out.iterations < options_.max_iterations && !out.converged) {
+      if (options_.proceed)
+        if (Status going = options_.proceed(out.iterations); !going.ok()) return going;
       ++out.iterations;
       const Eigen::VectorXd gradient = linearise(system);
       const Eigen::VectorXd diagonal = system.diagonal();

@@ -16,7 +16,8 @@ struct RelaxedGraph {
   bool converged = true;
 };
 
-// `graph` must be connected, with covariances that are positive definite. NUMERICAL: the cost is not finite.
+// `graph` must be connected, with covariances that are positive definite. NUMERICAL: the cost is not finite. That of
+// RelaxationOptions::proceed.
 Result<RelaxedGraph> relax_graph(const PoseGraph& graph, const RelaxationOptions& options);
 
 }  // namespace relmap::client

@@ -371,6 +371,19 @@ struct Region {
   double max_metres = 0;        // along the path; 0: no limit
 };
 
+// What is around a frame in the graph.
+struct Neighbourhood {
+  struct Member {
+    FrameId frame;
+    SE3 T_root_frame;  // along the path by which the search found it
+    double distance_m = 0;
+    std::int64_t time_us = 0;
+  };
+  std::vector<Member> frames;  // in the order of discovery, the root first
+  std::vector<Edge> edges;     // of the graph, between these frames
+  bool cut = false;            // more frames are within the limits
+};
+
 enum class EdgeOrder : std::uint8_t {
   kId = 1,
   kSuspicion = 2,  // loop closures only, the most suspicious first
@@ -527,6 +540,7 @@ struct DaemonStatus {
 
   std::uint64_t ingest_keyframes = 0, ingest_repeats = 0, ingest_parts_corrupt = 0, robots = 0;
   ReasonCounts not_taken;
+  std::uint64_t map_version = 0;  // grows with every change of the map since the daemon started
 };
 
 }  // namespace relmap::client

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "proto/base/ids.h"
@@ -36,6 +37,9 @@ struct RelaxationOptions {
   // the number of its frames and edges, but for the start, which factorises one number for each of them. Then it
   // converges slowly to the last digits, which no picture shows.
   int max_direct = 20'000;
+  // Called before each iteration with the number of iterations that were done of a component. A status other than OK
+  // ends the relaxation, which returns it.
+  std::function<Status(int iterations)> proceed = {};
 };
 
 struct RelaxedPose {
@@ -59,7 +63,7 @@ struct Relaxation {
 Status check_graph(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges);
 
 // Relaxes each connected component by Levenberg-Marquardt on SE(3).
-// The reasons of check_graph(); NUMERICAL: the cost is not finite.
+// The reasons of check_graph(); NUMERICAL: the cost is not finite. That of `proceed`.
 Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges,
                          const RelaxationOptions& options = {});
 

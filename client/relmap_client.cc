@@ -170,6 +170,17 @@ Result<Frame> Client::frame(FrameId id, bool with_thumbnail, bool with_picture) 
   return read_frame(reply.frame());
 }
 
+Result<Neighbourhood> Client::neighbourhood(const Region& region, std::uint32_t max_frames) {
+  v1::GetNeighbourhoodRequest request;
+  *request.mutable_root() = to_wire(region.root);
+  request.set_max_edges(region.max_edges);
+  request.set_max_metres(region.max_metres);
+  request.set_max_frames(max_frames);
+  v1::GetNeighbourhoodReply reply;
+  if (Status status = impl_->ask_map(&MapStub::GetNeighbourhood, request, reply); !status.ok()) return status;
+  return read_neighbourhood(reply);
+}
+
 Result<std::vector<Session>> Client::sessions() {
   std::vector<Session> all;
   const Status status = impl_->list<v1::ListSessionsReply>(&MapStub::ListSessions, v1::ListSessionsRequest(),

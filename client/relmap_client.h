@@ -70,6 +70,8 @@ class Client {
   // Whole lists, all pages from one map version; VIEW_EXPIRED if that version expires meanwhile.
   Result<std::vector<Session>> sessions();
   Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
+  // At most `max_frames` (0: 1000) of a region, those with the fewest edges to its root. NO_SUCH_FRAME.
+  Result<Neighbourhood> neighbourhood(const Region& region, std::uint32_t max_frames = 0);
   // The loop closures between each two sessions that have any; `sessions`: only pairs with one of these; empty: all.
   Result<std::vector<ClosureMatrixCell>> closure_matrix(const std::vector<SessionNumber>& sessions = {});
   Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "", const std::string& words = "");

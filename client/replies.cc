@@ -474,6 +474,22 @@ Status read_route_reply(const v1::FindRouteReply& message, Route& route) {
   return {};
 }
 
+Result<Neighbourhood> read_neighbourhood(const v1::GetNeighbourhoodReply& message) {
+  Neighbourhood found;
+  for (const v1::NeighbourhoodFrame& frame : message.frames()) {
+    const auto T = from_wire(frame.root_from_frame());
+    if (!T.ok()) return ill_formed("neighbourhood", T.status());
+    found.frames.push_back({read_id(frame.frame()), *T, frame.distance_m(), frame.time_us()});
+  }
+  for (const v1::Edge& e : message.edges()) {
+    auto edge = read_edge(e);
+    if (!edge.ok()) return edge.status();
+    found.edges.push_back(std::move(edge).value());
+  }
+  found.cut = message.cut();
+  return found;
+}
+
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message) {
   const auto T = from_wire(message.a_from_b());
   if (!T.ok()) return ill_formed("transform", T.status());

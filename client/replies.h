@@ -19,6 +19,7 @@ class FindRouteReply;
 class FindRouteRequest;
 class Frame;
 class FrameId;
+class GetNeighbourhoodReply;
 class GetSkeletonReply;
 class GetStatusReply;
 class Robot;
@@ -39,6 +40,7 @@ v1::ListEdgesRequest edges_message(const EdgeFilter& filter);
 
 // CORRUPT: the daemon's reply is malformed.
 Result<Edge> read_edge(const v1::Edge& message);
+Result<Neighbourhood> read_neighbourhood(const v1::GetNeighbourhoodReply& message);
 Result<EdgeExplanation> read_explanation(const v1::ExplainEdgeReply& message);
 ClosureMatrixCell read_cell(const v1::ClosureMatrixCell& message);
 AuditEntry read_audit(const v1::AuditEntry& message);

@@ -116,7 +116,7 @@ void list(ByteReader in) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const ByteSpan bytes(data + 1, size - 1);
-  switch (data[0] % 18) {
+  switch (data[0] % 19) {
     case 0:
       read_as(bytes, read_edge);
       break;
@@ -184,6 +184,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
           must(v1::MotionSource_IsValid(frame.source()));
       break;
     }
+    case 18:
+      read_as(bytes, read_neighbourhood);
+      break;
     default: {
       v1::GetSkeletonReply message;
       Skeleton skeleton;

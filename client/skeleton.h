@@ -17,6 +17,13 @@ struct SkeletonOptions {
   bool candidates = false;                   // with closures that are not in force
 };
 
+// The level at which a picture shows a map with so many keyframes: every frame of a small one.
+constexpr std::uint32_t level_for(std::uint64_t keyframes) {
+  if (keyframes <= 50'000) return 3;
+  if (keyframes <= 500'000) return 2;
+  return keyframes <= 3'000'000 ? 1 : 0;
+}
+
 struct Skeleton {
   // A kept frame, and the step to it from the point before; of the first point of a chain there is none.
   struct Point {

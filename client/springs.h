@@ -38,11 +38,24 @@ class MeasuredSets {
   std::unordered_map<FrameId, FrameId> parent_;
 };
 
+// An edge of the graph that is in force.
+inline bool in_graph(const Edge& edge) { return edge.state == EdgeState::kAccepted && edge.carries; }
+// Motion that nothing measured, or along which the robot was carried.
+inline bool is_doubtful(const Edge& edge) { return edge.unmeasured || !edge.carried_by.empty(); }
+
 // Sets Spring::pulls, and returns what measured edges connect.
 MeasuredSets choose_pulling(std::vector<Spring>& springs);
 
-// Those of a skeleton. Its covariances are the same in all directions, since it tells their traces only. Closures whose
-// ends are no points, because the skeleton is not read whole, are left out.
+// The covariance with these traces, m^2 and rad^2, that is the same in all directions: a skeleton tells no more.
+Matrix6 isotropic_covariance(double translation_trace, double rotation_trace);
+
+// Those of edges of the map that are in the graph; without steps of which nothing is known.
+std::vector<Spring> springs_of(const std::vector<Edge>& edges);
+
+// A closure of a skeleton, whether or not it is in force.
+Spring spring_of(const Skeleton::Closure& closure);
+
+// Those of a skeleton. Closures whose ends are no points, because the skeleton is not read whole, are left out.
 std::vector<Spring> springs_of(const Skeleton& skeleton);
 
 }  // namespace relmap::client

@@ -36,6 +36,7 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.connections_open = m.connections().open();
   s.connections_refused = m.connections().refused();
   s.connections_displaced = m.connections().displaced();
+  s.map_version = m.map_version();
   s.sessions = m.sessions();
   s.labels = m.labels();
   s.frames = m.frames();

@@ -111,6 +111,7 @@ const std::map<std::string, Part> kParts = {
     {"tools/terminal", {{"proto"}, {"eigen", "cli11"}}},
     {"tools/g2o", {{"proto"}, {"eigen"}}},
     {"tools/batch", {{"proto", "client", "tools/terminal"}, {"eigen", "json"}}},
+    {"tools/console/layout", {{"proto", "client"}, {"eigen", "json"}}},
     {"tools/relmap", {{"proto", "client", "tools/batch", "tools/terminal", "tools/g2o"}, {"eigen", "cli11"}}},
     {"tools/relmap-admin",
      {{"proto", "proto/access", "storage", "storage/maintenance", "storage/migrate", "storage/rocksdb", "server/place",

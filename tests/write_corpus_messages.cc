@@ -412,6 +412,7 @@ void write_replies(const std::string& root) {
   add_message<v1::TransformBetweenReply>(replies, 9);
   add_message<v1::GetStatusReply>(replies, 10);
   add_message<v1::Robot>(replies, 11);
+  add_message<v1::GetNeighbourhoodReply>(replies, 18);
   v1::GetSkeletonReply skeleton;
   add_skeleton(skeleton);
   replies.add("skeleton", {17}, as_bytes(skeleton.SerializeAsString()));

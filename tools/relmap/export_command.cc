@@ -39,7 +39,7 @@ class Report {
   struct Part {
     std::string file, root, title;   // "part 1 of 3: 195 frames in the frame of 1:0"
     std::vector<std::string> notes;  // what the file itself does not say
-    std::vector<Tear> tears;
+    std::vector<client::Tear> tears;
     std::vector<DoubtfulStep> doubtful;
     std::size_t frames = 0;
     std::uint64_t landmarks = 0;
@@ -58,7 +58,7 @@ class Report {
   void tell_relaxed(const RelaxedMap& map) {
     relaxed_frames_ = map.graph.frames.size();
     converged_ = map.converged;
-    if (!converged_) advise(kNotConverged);
+    if (!converged_) advise(client::kNotConverged);
   }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
     if (json_)
@@ -80,7 +80,7 @@ class Report {
   }
 
  private:
-  static std::string line_of(const Tear& tear) { return tear.words(); }
+  static std::string line_of(const client::Tear& tear) { return tear.words(); }
   static std::string line_of(const DoubtfulStep& step) {
     return (step.carried_by.empty() ? "not measured: " : "carried: ") + step.words();
   }
@@ -92,7 +92,7 @@ class Report {
   }
   void add_json(const Part& part) {
     std::vector<Json> tears, doubtful;
-    for (const Tear& tear : part.tears)
+    for (const client::Tear& tear : part.tears)
       tears.push_back(Json()
                           .add("edge", tear.edge.to_string())
                           .add("from", tear.a.to_string())

@@ -125,9 +125,9 @@ class Features {
   std::string text_;
 };
 
-std::vector<Json> tears_json(const std::vector<Tear>& tears) {
+std::vector<Json> tears_json(const std::vector<client::Tear>& tears) {
   std::vector<Json> list;
-  for (const Tear& tear : tears)
+  for (const client::Tear& tear : tears)
     list.push_back(Json()
                        .add("edge", tear.edge.to_string())
                        .add("metres", tear.metres, 4)
@@ -177,7 +177,7 @@ std::vector<std::string> description(const RelaxedMap& map, std::size_t number) 
   for (const SessionNumber session : part.sessions())
     sessions += (sessions.empty() ? "" : ", ") + session_text(map, session);
   lines.push_back(counted_text(part.frames.size(), "frame") + " of session " + sessions);
-  for (const Tear& tear : part.tears) lines.push_back("tear " + tear.words());
+  for (const client::Tear& tear : part.tears) lines.push_back("tear " + tear.words());
   for (const DoubtfulStep& step : part.doubtful)
     lines.push_back((step.carried_by.empty() ? "not measured: " : "carried: ") + step.words());
   return lines;
@@ -306,7 +306,7 @@ void write_geojson(const RelaxedMap& map, std::size_t number, const std::optiona
     const client::Spring& spring = map.springs[index];
     if (spring.kind != client::EdgeKind::kLoop && !spring.doubtful) joined.insert({spring.relaxed.a, spring.relaxed.b});
   }
-  for (const Tear& tear : part.tears) torn.insert(tear.edge);
+  for (const client::Tear& tear : part.tears) torn.insert(tear.edge);
   std::vector<FrameId> run;
   const auto end_run = [&] {
     if (!run.empty())

@@ -171,7 +171,7 @@ TEST(GraphFiles, G2oCanBeReadBack) {
 TEST(GraphFiles, TearsAndGuessesAreListedInEachFormatWithComments) {
   const RelaxedMap map = relaxed(3);
   ASSERT_GE(map.parts[0].tears.size(), 1u);
-  EXPECT_GT(map.parts[0].tears[0].sigmas, kTearSigmas);
+  EXPECT_GT(map.parts[0].tears[0].sigmas, client::kTearSigmas);
   const std::string id = map.parts[0].tears[0].edge.to_string();
   EXPECT_THAT(tum(map, 0), HasSubstr("# tear " + id));
   EXPECT_THAT(g2o(map, 0), HasSubstr("# tear " + id));

@@ -49,9 +49,9 @@ Result<MapPicture::Query> find_query(const MapOptions& options, client::Client& 
   return MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
 }
 
-void tell_tears(const std::vector<Tear>& tears, const std::vector<Tear>& strained, std::ostream& err) {
+void tell_tears(const std::vector<client::Tear>& tears, const std::vector<client::Tear>& strained, std::ostream& err) {
   if (tears.empty())
-    err << "no tear: the picture stretches no edge by more than " << fixed(kTearSigmas, 0) << " sigmas\n";
+    err << "no tear: the picture stretches no edge by more than " << fixed(client::kTearSigmas, 0) << " sigmas\n";
   for (std::size_t i = 0; i < std::min(tears.size(), kMaxListed); ++i) err << "tear: " << tears[i].words() << '\n';
   if (tears.size() > kMaxListed) err << count_text(tears.size()) << " tears in all\n";
   for (std::size_t i = 0; i < std::min(strained.size(), kMaxListed); ++i)
@@ -64,7 +64,7 @@ void tell(const MapOptions& options, const MapShape& shape, const MapPicture& pi
   if (picture.parts.size() > 1) err << ", in " << picture.parts.size() << " parts that nothing connects";
   err << '\n';
   if (const std::string text = shape_text(shape); !text.empty()) err << text << '\n';
-  if (!shape.layout.converged) err << kNotConverged << '\n';
+  if (!shape.layout.converged) err << client::kNotConverged << '\n';
   if (picture.mono_sessions > 0) err << not_placed_text(picture.mono_sessions, "drawn") << '\n';
   if (picture.query && !shape.find(picture.query->frame))
     err << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
@@ -116,8 +116,8 @@ Status draw(const MapOptions& options, client::Client& client, terminal::Console
     route->frames = drawn_of(*shape, route->frames);
     picture.route = route;
   }
-  const std::vector<Tear> tears = options.tears ? tears_of(*shape) : std::vector<Tear>();
-  const std::vector<Tear> strained = options.tears ? strained_of(*shape) : std::vector<Tear>();
+  const std::vector<client::Tear> tears = options.tears ? tears_of(*shape) : std::vector<client::Tear>();
+  const std::vector<client::Tear> strained = options.tears ? strained_of(*shape) : std::vector<client::Tear>();
   mark_tears(tears, strained, picture);
   if (options.colour == "time") colour_by_time(*shape, picture);
   if (options.colour == "uncertainty") colour_by_uncertainty(*shape, picture);

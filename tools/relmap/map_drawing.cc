@@ -65,9 +65,10 @@ MapPicture picture_of(const MapShape& shape, const std::vector<client::LabelledF
   return picture;
 }
 
-void mark_tears(const std::vector<Tear>& tears, const std::vector<Tear>& strained, MapPicture& picture) {
-  for (const Tear& tear : tears) picture.tears.push_back({tear.a, tear.b, tear.sigmas});
-  for (const Tear& strain : strained)
+void mark_tears(const std::vector<client::Tear>& tears, const std::vector<client::Tear>& strained,
+                MapPicture& picture) {
+  for (const client::Tear& tear : tears) picture.tears.push_back({tear.a, tear.b, tear.sigmas});
+  for (const client::Tear& strain : strained)
     picture.strained.push_back(strain.name() + ": " + fixed(strain.sigmas, 1) + " sigmas, " + fixed(strain.metres, 2) +
                                " m");
 }

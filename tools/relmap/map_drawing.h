@@ -10,7 +10,8 @@ namespace relmap::cli {
 client::MapPicture picture_of(const MapShape& shape, const std::vector<client::LabelledFrames>& labels);
 
 // Marks tears, and lists the closures that are stretched most; both as of map_shape.h.
-void mark_tears(const std::vector<Tear>& tears, const std::vector<Tear>& strained, client::MapPicture& picture);
+void mark_tears(const std::vector<client::Tear>& tears, const std::vector<client::Tear>& strained,
+                client::MapPicture& picture);
 // When each point was taken.
 void colour_by_time(const MapShape& shape, client::MapPicture& picture);
 // How well the position of each point relative to the root of its part is known.

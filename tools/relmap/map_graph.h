@@ -21,8 +21,6 @@ struct MapGraph {
   std::vector<SessionNumber> sessions() const;
 };
 
-inline bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }
-
 // Reads the graph of the chosen sessions (numbers or names; none: all except mono sessions). NO_SUCH_SESSION;
 // NOT_STEREO if a mono session was chosen.
 Result<MapGraph> read_map_graph(const std::vector<std::string>& choice, client::Client& client,

@@ -38,16 +38,17 @@ Skeleton::Point divide(const Skeleton::Point& before, Skeleton::Point& point, st
 }
 
 // The strains of edges that the layout was made of and could have stretched.
-std::vector<Tear> strains_of(const MapShape& shape,
-                             const std::function<bool(const client::Spring&, const Tear&)>& wanted) {
-  std::vector<Tear> strains;
+std::vector<client::Tear> strains_of(const MapShape& shape,
+                                     const std::function<bool(const client::Spring&, const client::Tear&)>& wanted) {
+  std::vector<client::Tear> strains;
   for (const client::Spring& spring : shape.layout.springs) {
     const SE3* const a = shape.find(spring.relaxed.a);
     const SE3* const b = shape.find(spring.relaxed.b);
     if (spring.doubtful || !a || !b) continue;
-    if (const Tear strain = strain_of(spring, *a, *b); wanted(spring, strain)) strains.push_back(strain);
+    if (const client::Tear strain = client::strain_of(spring, *a, *b); wanted(spring, strain))
+      strains.push_back(strain);
   }
-  sort_worst_first(strains);
+  client::sort_worst_first(strains);
   return strains;
 }
 
@@ -65,12 +66,6 @@ const SE3* MapShape::find(FrameId frame) const {
   return found == at.end() ? nullptr : &layout.parts[found->second.part].places[found->second.place].T_root_frame;
 }
 
-std::uint32_t level_for(std::uint64_t keyframes) {
-  if (keyframes <= 50'000) return 3;
-  if (keyframes <= 500'000) return 2;
-  return keyframes <= 3'000'000 ? 1 : 0;
-}
-
 Result<MapShape> read_map_shape(const ShapeChoice& choice, client::Client& client, terminal::Console& console) {
   const terminal::Console::Aside aside(console);
   MapShape shape;
@@ -81,7 +76,7 @@ Result<MapShape> read_map_shape(const ShapeChoice& choice, client::Client& clien
   for (const auto& [number, session] : shape.chosen.sessions) keyframes += session.frames;
   if (keyframes == 0) return nothing_to_place(shape.chosen.mono_sessions, "draw", "drawn");
   client::SkeletonOptions options;
-  options.level = level_for(keyframes);
+  options.level = client::level_for(keyframes);
   options.candidates = true;
   if (!shape.chosen.all) options.sessions = shape.chosen.numbers();
   terminal::ProgressBar bar(console.err(), terminal::is_terminal());
@@ -136,12 +131,13 @@ std::string shape_text(const MapShape& shape) {
   return counted_text(points, "point") + " stand for " + counted_text(shape.keyframes(), "keyframe");
 }
 
-std::vector<Tear> tears_of(const MapShape& shape) {
-  return strains_of(shape, [](const client::Spring&, const Tear& strain) { return strain.sigmas > kTearSigmas; });
+std::vector<client::Tear> tears_of(const MapShape& shape) {
+  return strains_of(
+      shape, [](const client::Spring&, const client::Tear& strain) { return strain.sigmas > client::kTearSigmas; });
 }
 
-std::vector<Tear> strained_of(const MapShape& shape) {
-  std::vector<Tear> strained = strains_of(shape, [](const client::Spring& spring, const Tear& strain) {
+std::vector<client::Tear> strained_of(const MapShape& shape) {
+  std::vector<client::Tear> strained = strains_of(shape, [](const client::Spring& spring, const client::Tear& strain) {
     return spring.kind == client::EdgeKind::kLoop && strain.sigmas > 1;
   });
   if (strained.size() > kMaxStrained) strained.resize(kMaxStrained);

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "client/skeleton_relaxation.h"
+#include "client/tear.h"
 #include "proto/base/quantile.h"
 #include "tools/relmap/chosen_sessions.h"
-#include "tools/relmap/tear.h"
 
 namespace relmap::cli {
 
@@ -37,9 +37,6 @@ struct MapShape {
   std::unordered_map<FrameId, At> at;
 };
 
-// How much of a map with so many keyframes is asked for: SkeletonOptions::level.
-std::uint32_t level_for(std::uint64_t keyframes);
-
 // Reads the skeleton of the chosen sessions, with progress on stderr, and makes the frames of the choice its points.
 // EMPTY_MAP: the sessions have no frames. The reasons of read_chosen_sessions() and Client::skeleton().
 Result<MapShape> read_map_shape(const ShapeChoice& choice, client::Client& client, terminal::Console& console);
@@ -55,9 +52,9 @@ void add_points(client::Skeleton& skeleton, std::vector<FrameId> frames);
 std::string shape_text(const MapShape& shape);
 
 // The edges that the layout stretches by more than kTearSigmas, the worst first.
-std::vector<Tear> tears_of(const MapShape& shape);
+std::vector<client::Tear> tears_of(const MapShape& shape);
 // The loop closures that it stretches most, by more than one standard deviation; the worst first, at most ten.
-std::vector<Tear> strained_of(const MapShape& shape);
+std::vector<client::Tear> strained_of(const MapShape& shape);
 
 // For each part, of each of its points: the standard deviation of its position relative to the part's root, metres;
 // infinite where steps that nothing measured lie between.

@@ -54,13 +54,13 @@ MapShape shape_of(Skeleton skeleton) {
 }
 
 TEST(MapShape, HasEveryKeyframeOfASmallMapAndFewerPointsOfALargerOne) {
-  EXPECT_EQ(level_for(1), 3u);
-  EXPECT_EQ(level_for(50'000), 3u);
+  EXPECT_EQ(client::level_for(1), 3u);
+  EXPECT_EQ(client::level_for(50'000), 3u);
   std::uint32_t before = 3;
   for (std::uint64_t keyframes = 50'001; keyframes < 10'000'000; keyframes += keyframes / 3) {
-    EXPECT_LT(level_for(keyframes), 3u);
-    EXPECT_LE(level_for(keyframes), before);
-    before = level_for(keyframes);
+    EXPECT_LT(client::level_for(keyframes), 3u);
+    EXPECT_LE(client::level_for(keyframes), before);
+    before = client::level_for(keyframes);
   }
   EXPECT_EQ(before, 0u);
 }

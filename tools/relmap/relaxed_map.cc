@@ -10,36 +10,6 @@ namespace relmap::cli {
 
 namespace {
 
-client::RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
-  switch (kind) {
-    case client::EdgeKind::kLoop:
-      return client::RelaxationEdgeKind::kLoop;
-    case client::EdgeKind::kPrior:
-      return client::RelaxationEdgeKind::kPrior;
-    case client::EdgeKind::kOdometry:
-      break;
-  }
-  return client::RelaxationEdgeKind::kOdometry;
-}
-
-bool is_doubtful(const client::Edge& edge) { return edge.unmeasured || !edge.carried_by.empty(); }
-bool holds_nothing(const client::Edge& edge) { return edge.unmeasured && edge.source == MotionSource::kUnsensed; }
-
-std::vector<client::Spring> springs_of(const MapGraph& graph) {
-  std::vector<client::Spring> springs;
-  for (const client::Edge& edge : graph.edges) {
-    if (!in_graph(edge) || holds_nothing(edge)) continue;
-    client::Spring& spring = springs.emplace_back();
-    spring.edge = edge.id;
-    spring.kind = edge.kind;
-    spring.doubtful = is_doubtful(edge);
-    spring.relaxed = {edge.a, edge.b, edge.T_ab,
-                      edge.carried_by.empty() ? edge.covariance : client::carried_covariance(),
-                      relaxation_kind(edge.kind)};
-  }
-  return springs;
-}
-
 // One part for each component of the relaxation, with frames and root only.
 std::vector<MapPart> parts_of(const client::Relaxation& relaxation, std::optional<FrameId> root) {
   std::vector<MapPart> parts(static_cast<std::size_t>(relaxation.components));
@@ -121,7 +91,7 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the chosen sessions"};
   RelaxedMap map;
   map.graph = std::move(graph);
-  map.springs = springs_of(map.graph);
+  map.springs = client::springs_of(map.graph.edges);
   std::vector<client::RelaxationEdge> edges;
   edges.reserve(map.springs.size());
   client::MeasuredSets measured = client::choose_pulling(map.springs);
@@ -139,11 +109,11 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   for (const client::Spring& spring : map.springs) {
     if (spring.doubtful) continue;
     MapPart& part = *part_of.at(spring.relaxed.a);
-    const Tear strain = strain_of(spring, *part.find(spring.relaxed.a), *part.find(spring.relaxed.b));
-    if (strain.sigmas > kTearSigmas) part.tears.push_back(strain);
+    const client::Tear strain = client::strain_of(spring, *part.find(spring.relaxed.a), *part.find(spring.relaxed.b));
+    if (strain.sigmas > client::kTearSigmas) part.tears.push_back(strain);
   }
   for (const client::Edge& edge : map.graph.edges) {
-    if (!in_graph(edge) || !is_doubtful(edge)) continue;
+    if (!client::in_graph(edge) || !client::is_doubtful(edge)) continue;
     DoubtfulStep step = doubtful_step(edge);
     MapPart* const part = part_of.at(edge.a);
     MapPart* const other = part_of.at(edge.b);
@@ -153,7 +123,7 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     part->doubtful.push_back(step);
     if (part != other) other->doubtful.push_back(step);
   }
-  for (MapPart& part : map.parts) sort_worst_first(part.tears);
+  for (MapPart& part : map.parts) client::sort_worst_first(part.tears);
   for (const client::LabelledFrames& label : labels)
     for (const FrameId frame : label.frames)
       if (const auto part = part_of.find(frame); part != part_of.end())

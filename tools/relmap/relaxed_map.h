@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "client/relaxation.h"
+#include "client/tear.h"
 #include "tools/relmap/map_graph.h"
-#include "tools/relmap/tear.h"
 
 namespace relmap::cli {
 
@@ -55,7 +55,7 @@ struct MapPart {
   FrameId root;                     // the frame of reference of the poses; one of `frames`
   std::vector<PlacedFrame> frames;  // ascending
   std::vector<std::size_t> edges;   // indices into RelaxedMap::springs
-  std::vector<Tear> tears;          // the worst first
+  std::vector<client::Tear> tears;  // the worst first
   std::vector<DoubtfulStep> doubtful;
   struct Label {
     FrameId frame;

@@ -194,9 +194,9 @@ TEST(RelaxedMap, TearsAreListedInMetresWorstFirst) {
   edges.push_back(closure(at(0), at(10), {0, 0, 4}));
   const RelaxedMap map = relax_map(graph_of(edges), {}).or_throw();
   ASSERT_FALSE(map.parts[0].tears.empty());
-  const Tear& worst = map.parts[0].tears[0];
+  const client::Tear& worst = map.parts[0].tears[0];
   EXPECT_EQ(worst.edge, (EdgeId{at(10), 1}));
-  EXPECT_GT(worst.sigmas, kTearSigmas);
+  EXPECT_GT(worst.sigmas, client::kTearSigmas);
   EXPECT_THAT(worst.words(), HasSubstr("1:10/1 from 1:0 to 1:10: "));
   EXPECT_NEAR(worst.metres, map.parts[0].find(at(10))->t.z() - 4, 1e-6);
 }

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "client/relmap_client.h"
+#include "client/tear.h"
 #include "proto/base/quantile.h"
-#include "tools/relmap/tear.h"
 #include "tools/terminal/console.h"
 
 namespace relmap::cli {
@@ -26,9 +26,9 @@ struct MapReport {
   Status map_missing;
   bool laid_out = false;  // parts, tears and sigmas are known
   std::size_t parts = 0;
-  std::vector<Tear> tears;        // the worst first
-  std::string map_text;           // how much of the map the picture shows; empty: every keyframe
-  std::size_t mono_sessions = 0;  // which the picture does not show
+  std::vector<client::Tear> tears;  // the worst first
+  std::string map_text;             // how much of the map the picture shows; empty: every keyframe
+  std::size_t mono_sessions = 0;    // which the picture does not show
 
   std::vector<client::ClosureMatrixCell> matrix;
   Status matrix_missing;

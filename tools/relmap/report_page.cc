@@ -151,13 +151,13 @@ std::string map_part(const MapReport& report) {
   if (!report.map_text.empty()) html += paragraph_html(markup_text(report.map_text) + ".");
   if (report.tears.empty()) {
     html += paragraph_html("No tear: relaxing the map for this picture stretches no edge by more than " +
-                           fixed(kTearSigmas, 0) + " sigmas.");
+                           fixed(client::kTearSigmas, 0) + " sigmas.");
   } else {
     html += paragraph_html(counted_text(report.tears.size(), "edge") + " had to be stretched by more than " +
-                           fixed(kTearSigmas, 0) + " sigmas: measurements contradict each other there.");
+                           fixed(client::kTearSigmas, 0) + " sigmas: measurements contradict each other there.");
     Table table({"edge", "from", "to", ">metres", ">degrees", ">sigmas"});
     for (std::size_t i = 0; i < std::min(report.tears.size(), kMaxTears); ++i) {
-      const Tear& tear = report.tears[i];
+      const client::Tear& tear = report.tears[i];
       table.row({code_html(tear.name()), tear.a.to_string(), tear.b.to_string(), fixed(tear.metres, 3),
                  fixed(tear.degrees, 2), fixed(tear.sigmas, 1)});
     }

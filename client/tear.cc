@@ -1,13 +1,15 @@
-#include "tools/relmap/tear.h"
+#include "client/tear.h"
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "proto/base/number_text.h"
 #include "proto/geometry/covariance.h"
-#include "tools/relmap/degrees.h"
 
-namespace relmap::cli {
+namespace relmap::client {
+
+constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
 
 std::string Tear::name() const { return edge.valid() ? edge.to_string() : "motion"; }
 
@@ -16,7 +18,7 @@ std::string Tear::words() const {
          fixed(degrees, 2) + " degrees, " + fixed(sigmas, 1) + " sigmas";
 }
 
-Tear strain_of(const client::Spring& spring, const SE3& T_root_a, const SE3& T_root_b) {
+Tear strain_of(const Spring& spring, const SE3& T_root_a, const SE3& T_root_b) {
   const SE3 off = spring.relaxed.T_ab.inverse() * (T_root_a.inverse() * T_root_b);
   const Vector6 xi = off.log();
   const double sigmas = std::sqrt(std::max(0.0, mahalanobis_squared(xi, spring.relaxed.covariance)));
@@ -27,4 +29,4 @@ void sort_worst_first(std::vector<Tear>& tears) {
   std::stable_sort(tears.begin(), tears.end(), [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; });
 }
 
-}  // namespace relmap::cli
+}  // namespace relmap::client

@@ -6,7 +6,7 @@
 
 #include "client/springs.h"
 
-namespace relmap::cli {
+namespace relmap::client {
 
 // An edge that the relaxed poses contradict. From kTearSigmas standard deviations on it is called a tear.
 struct Tear {
@@ -26,7 +26,7 @@ inline constexpr char kNotConverged[] =
     "say";
 
 // By how much poses in one frame contradict a spring.
-Tear strain_of(const client::Spring& spring, const SE3& T_root_a, const SE3& T_root_b);
+Tear strain_of(const Spring& spring, const SE3& T_root_a, const SE3& T_root_b);
 void sort_worst_first(std::vector<Tear>& tears);
 
-}  // namespace relmap::cli
+}  // namespace relmap::client

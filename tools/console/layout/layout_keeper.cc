@@ -1,0 +1,308 @@
+#include "tools/console/layout/layout_keeper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "client/skeleton_relaxation.h"
+#include "tools/console/layout/layout_file.h"
+#include "tools/console/layout/layout_json.h"
+#include "tools/console/layout/make_layout.h"
+
+namespace relmap::console {
+namespace {
+
+constexpr std::chrono::milliseconds kRetry{1000}, kLeastPause{300}, kShowEvery{250};
+constexpr std::chrono::seconds kSaveEvery{30};
+constexpr int kCoarseIterations = 1;
+
+std::uint64_t now_ms() {
+  return static_cast<std::uint64_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+          .count());
+}
+
+}  // namespace
+
+LayoutKeeper::LayoutKeeper(KeeperOptions options)
+    : options_(std::move(options)), source_(options_.limits), thread_([this] { run(); }) {}
+
+LayoutKeeper::~LayoutKeeper() { stop(); }
+
+void LayoutKeeper::stop() {
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+KeeperState LayoutKeeper::state() const {
+  const MutexLock lock(mutex_);
+  return state_;
+}
+
+std::string LayoutKeeper::state_json(std::optional<std::uint64_t> after, std::chrono::milliseconds wait) {
+  KeeperState state;
+  {
+    const MutexLock lock(mutex_);
+    const std::uint64_t seen = changes_;
+    if (after)
+      static_cast<void>(changed_.wait_for(mutex_, wait, [&]() RELMAP_REQUIRES(mutex_) {
+        const std::uint64_t version = state_.layout ? state_.layout->version : 0;
+        return stopping_ || version != *after || changes_ != seen;
+      }));
+    state = state_;
+  }
+  return json_of(state);
+}
+
+Result<TileSource::TileBytes> LayoutKeeper::tile(const TileRequest& request) {
+  std::shared_ptr<const TileIndex> index, old;
+  {
+    const MutexLock lock(mutex_);
+    for (const auto& kept : kept_) {
+      if (kept->layout().version == request.version) index = kept;
+      if (kept->layout().version == request.from) old = kept;
+    }
+  }
+  if (!index || (request.from != 0 && !old))
+    return {Reason::VIEW_EXPIRED, "the layout of version " + std::to_string(index ? request.from : request.version) +
+                                      " is gone; ask for the newest one"};
+  return source_.tile(*index, old ? &old->layout() : nullptr, request, [this] { return connected(); });
+}
+
+Result<std::string> LayoutKeeper::places_json(std::string_view request) const {
+  const auto frames = frames_of_request(request, kMaxPlaces);
+  if (!frames.ok()) return frames.status();
+  const std::shared_ptr<const MapLayout> layout = state().layout;
+  if (!layout) return {Reason::VIEW_EXPIRED, "there is no layout yet"};
+  return json_of_places(*layout, *frames);
+}
+
+void LayoutKeeper::run() {
+  for (;;) {
+    Status status;
+    try {
+      status = round();
+    } catch (...) {
+      status = caught_status();
+    }
+    const bool failed = !status.ok(), ending = !going().ok();
+    if (failed && !ending) {
+      if (status.reason() == Reason::UNREACHABLE || status.reason() == Reason::DEADLINE) disconnect();
+      if (const Status before = state().error; before.to_string() != status.to_string())
+        tell("the layout is not kept up: " + status.to_string());
+    }
+    clear_progress();
+    const MutexLock lock(mutex_);
+    if (!ending && state_.error.to_string() != status.to_string()) {
+      state_.error = status;
+      changed();
+    }
+    if (changed_.wait_for(mutex_, failed ? std::max(kRetry, options_.poll) : options_.poll,
+                          [this]() RELMAP_REQUIRES(mutex_) { return stopping_; }))
+      break;
+  }
+  save();
+}
+
+Status LayoutKeeper::round() {
+  const auto client = connected();
+  if (!client.ok()) return client.status();
+  const auto status = (*client)->status();
+  if (!status.ok()) return status.status();
+  if (!(status->map == map_)) take_up(status->map);
+  if (status->frames == 0) {
+    const MutexLock lock(mutex_);
+    if (state_.empty.ok()) {
+      state_ = {};
+      state_.empty = {Reason::EMPTY_MAP, "the map has no keyframes yet"};
+      kept_.clear();
+      behind_known_ = false;
+      changed();
+    }
+    return {};
+  }
+  if (Status found = find_behind(**client, *status); !found.ok()) return found;
+  const KeeperState now = state();
+  if (now.layout && now.behind == 0 && !now.layout->coarse) return {};
+  if (Clock::now() < next_) return {};
+  return make(**client, *status);
+}
+
+Result<std::shared_ptr<client::Client>> LayoutKeeper::connected() {
+  {
+    const MutexLock lock(mutex_);
+    if (client_) return client_;
+  }
+  auto made = options_.connect();
+  if (!made.ok()) return made.status();
+  const MutexLock lock(mutex_);
+  if (!client_) client_ = *std::move(made);
+  return client_;
+}
+
+void LayoutKeeper::disconnect() {
+  const MutexLock lock(mutex_);
+  client_ = nullptr;
+}
+
+void LayoutKeeper::take_up(const MapIdentity& map) {
+  save();
+  map_ = map;
+  behind_known_ = false;
+  {
+    const MutexLock lock(mutex_);
+    if (state_.layout || !state_.empty.ok()) {
+      state_ = {};
+      kept_.clear();
+      changed();
+    }
+  }
+  if (options_.cache_folder.empty() || !map.known()) return;
+  auto loaded = load_layout(options_.cache_folder, map);
+  if (loaded.ok()) {
+    publish(*std::move(loaded));
+    unsaved_ = false;
+  } else if (loaded.reason() != Reason::NO_SUCH_FILE) {
+    tell("a layout on disk is not used, and will be made anew: " + loaded.status().to_string());
+  }
+}
+
+// A layout from disk is of another start of the daemon, whose versions mean nothing now; the commits of the stored map
+// outlast starts.
+Status LayoutKeeper::find_behind(client::Client& client, const client::DaemonStatus& status) {
+  const std::shared_ptr<const MapLayout> layout = state().layout;
+  if (!layout) return {};
+  if (!behind_known_ || boot_id_ != status.boot_id) {
+    std::uint64_t commit = 0, frames = 0, version = 0;
+    const auto first = client.skeleton({.level = 0, .candidates = true}, [&](const client::Skeleton& so_far) -> Status {
+      commit = so_far.commit_number;
+      frames = so_far.frames;
+      version = so_far.map_version;
+      return {Reason::VIEW_EXPIRED, "enough is known"};
+    });
+    if (version == 0 && !first.ok()) return first.status();
+    boot_id_ = status.boot_id;
+    behind_known_ = true;
+    const bool same = commit == layout->commit_number && frames == layout->frames;
+    const std::uint64_t commits = commit > layout->commit_number ? commit - layout->commit_number : 1;
+    map_version_ = same ? version : version - std::min(version, commits);
+  }
+  const MutexLock lock(mutex_);
+  state_.behind = status.map_version - std::min(status.map_version, map_version_);
+  return {};
+}
+
+Status LayoutKeeper::make(client::Client& client, const client::DaemonStatus& status) {
+  const bool none = !state().layout;
+  if (none && status.frames > options_.coarse_above)
+    if (Status made = make_at(0, true, client, status); !made.ok()) return made;
+  return make_at(client::level_for(status.frames), false, client, status);
+}
+
+Status LayoutKeeper::make_at(std::uint32_t level, bool coarse, client::Client& client,
+                             const client::DaemonStatus& status) {
+  const Clock::time_point begun = Clock::now();
+  show({"reading", 0, status.frames});
+  const auto skeleton =
+      client.skeleton({.level = level, .candidates = true}, [&](const client::Skeleton& so_far) -> Status {
+        show({"reading", so_far.frames_done, so_far.frames});
+        return going();
+      });
+  if (!skeleton.ok()) return skeleton.status();
+  client::SkeletonLayout how;
+  if (skeleton->points() == skeleton->frames) how.relaxation = {};  // a small map is worth the time
+  if (coarse) how.relaxation.max_iterations = kCoarseIterations;
+  const auto total = static_cast<std::uint64_t>(how.relaxation.max_iterations);
+  std::uint64_t most = 0;  // of the part that needs most
+  how.relaxation.proceed = [&](int iterations) {
+    most = std::max(most, static_cast<std::uint64_t>(iterations));
+    show({"relaxing", most, total});
+    return going();
+  };
+  const auto relaxed = client::relax_skeleton(*skeleton, how);
+  if (relaxed.reason() == Reason::EMPTY_MAP) {
+    const MutexLock lock(mutex_);
+    state_.empty = {Reason::EMPTY_MAP,
+                    "the map has no keyframes in metres yet: sessions of one camera have no scale, and are not drawn"};
+    changed();
+  }
+  if (!relaxed.ok()) return relaxed.reason() == Reason::EMPTY_MAP ? Status() : relaxed.status();
+  show({"drawing", 0, 0});
+  const std::shared_ptr<const MapLayout> before = state().layout;
+  MapLayout layout = make_layout(*skeleton, *relaxed, before.get());
+  layout.map = status.map;
+  layout.boot_id = status.boot_id;
+  layout.level = level;
+  layout.coarse = coarse;
+  layout.version = std::max(now_ms(), before ? before->version + 1 : 0);
+  const Clock::duration took = Clock::now() - begun;
+  layout.seconds = std::chrono::duration<double>(took).count();
+  next_ = Clock::now() + std::max<Clock::duration>(kLeastPause, 3 * took);
+  boot_id_ = status.boot_id;
+  map_version_ = layout.map_version;
+  behind_known_ = true;
+  publish(std::move(layout));
+  unsaved_ = !coarse;
+  if (Clock::now() - saved_ > kSaveEvery) save();
+  return {};
+}
+
+void LayoutKeeper::publish(MapLayout layout) {
+  auto index = std::make_shared<const TileIndex>(std::make_shared<const MapLayout>(std::move(layout)));
+  const MutexLock lock(mutex_);
+  kept_.insert(kept_.begin(), index);
+  if (kept_.size() > kVersionsKept) kept_.pop_back();
+  state_.layout = index->shared_layout();
+  state_.behind = 0;
+  state_.progress.reset();
+  state_.empty = {};
+  changed();
+}
+
+void LayoutKeeper::save() {
+  if (!unsaved_ || options_.cache_folder.empty()) return;
+  const std::shared_ptr<const MapLayout> layout = state().layout;
+  if (!layout || !layout->map.known()) return;
+  if (const Status saved = save_layout(options_.cache_folder, *layout); !saved.ok())
+    tell("the layout is not kept on disk: " + saved.to_string());
+  unsaved_ = false;
+  saved_ = Clock::now();
+}
+
+void LayoutKeeper::tell(const std::string& line) const {
+  if (options_.log) options_.log(line);
+}
+
+void LayoutKeeper::show(KeeperState::Progress progress) {
+  const Clock::time_point now = Clock::now();
+  const MutexLock lock(mutex_);
+  const bool other = !state_.progress || state_.progress->step != progress.step;
+  if (!other && now - shown_ < kShowEvery) return;
+  shown_ = now;
+  state_.progress = std::move(progress);
+  changed();
+}
+
+void LayoutKeeper::clear_progress() {
+  const MutexLock lock(mutex_);
+  if (!state_.progress) return;
+  state_.progress.reset();
+  changed();
+}
+
+Status LayoutKeeper::going() const {
+  const MutexLock lock(mutex_);
+  if (stopping_) return {Reason::SHUTTING_DOWN, "the console stops"};
+  return {};
+}
+
+void LayoutKeeper::changed() {
+  ++changes_;
+  changed_.notify_all();
+}
+
+}  // namespace relmap::console
