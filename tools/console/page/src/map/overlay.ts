@@ -41,7 +41,7 @@ export interface Marks {
   captions: Caption[];
   trails: Trail[];
   closures: LooseClosure[]; // newer than the tiles
-  torn: (Line & { text: string })[];
+  torn: (Line & { edge: string | null; text: string })[];
   frame: At | null; // selected
   closure: Line | null; // selected
   root: (At & { heading: number; text: string }) | null;
@@ -63,7 +63,8 @@ export class Overlay {
     this.context = canvas.getContext('2d')!;
   }
 
-  draw(camera: Camera, size: Size, pixel: number, marks: Marks, palette: Palette) {
+  // `drawn`: the torn closures that the lines beneath have.
+  draw(camera: Camera, size: Size, pixel: number, marks: Marks, palette: Palette, drawn: (edge: string) => boolean) {
     const { canvas, context } = this;
     const width = Math.max(1, Math.round(size.width * pixel));
     const height = Math.max(1, Math.round(size.height * pixel));
@@ -104,7 +105,7 @@ export class Overlay {
       const seen = clipped(...ends[0], ...ends[1], size.width, size.height);
       if (!seen) continue;
       // Tiles have only closures of which they have an end.
-      if (!near(...ends[0], 0) && !near(...ends[1], 0)) this.closure(camera, size, torn, css(palette.torn), 2.5, true);
+      if (!torn.edge || !drawn(torn.edge)) this.closure(camera, size, torn, css(palette.torn), 2.5, true);
       this.text(torn.text, [(seen[0] + seen[2]) / 2, (seen[1] + seen[3]) / 2], 9, palette.torn, palette, placement, true);
     }
     for (const caption of marks.captions) {

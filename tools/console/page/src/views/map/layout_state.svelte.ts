@@ -7,7 +7,6 @@ const leastMs = 250; // between questions, should the console not wait
 export class LayoutState {
   now = $state.raw<Layout | null>(null);
   problem = $state.raw<Problem | null>(null);
-  since = $state(0); // when this page first saw this version, ms
 
   private abort = new AbortController();
   private immediately = false;
@@ -26,7 +25,6 @@ export class LayoutState {
           this.immediately = false;
           const layout = await getJson<Layout>(`/map/layout${query}`, this.abort.signal);
           if (ended) return;
-          if (layout.version !== this.now?.version) this.since = Date.now();
           this.now = layout;
           this.problem = null;
           after = layout.version;

@@ -47,9 +47,9 @@ export function makeMarks(known: Known): Marks {
       })
     : [];
   const torn = layers.torn
-    ? known.torn.flatMap(({ a, b, sigmas }) => {
+    ? known.torn.flatMap(({ edge, a, b, sigmas }) => {
         const [from, to] = [place(a), place(b)];
-        return from && to ? [{ ax: from.x, ay: from.y, bx: to.x, by: to.y, text: `${sigmas.toFixed(1)} σ` }] : [];
+        return from && to ? [{ ax: from.x, ay: from.y, bx: to.x, by: to.y, edge, text: `${sigmas.toFixed(1)} σ` }] : [];
       })
     : [];
   const frame = known.frame ? place(known.frame) : null;

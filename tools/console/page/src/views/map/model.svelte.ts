@@ -11,8 +11,9 @@ import { sessions } from '../../lib/sessions.svelte';
 import { theme } from '../../lib/theme.svelte';
 import { around, cameraText, corners, fit, fromRelative, headingUp, parseCamera, relativeTo, type Camera } from '../../map/camera';
 import { inView, type InView } from '../../map/in_view';
-import { drawable, type FramePlace } from '../../map/layout';
+import { drawable, type FramePlace, type Torn } from '../../map/layout';
 import { palette } from '../../map/palette';
+import { noMarks } from '../../map/overlay';
 import type { Picked } from '../../map/pick';
 import type { Look } from '../../map/renderer';
 import { easeMs, type Stage } from '../../map/stage';
@@ -293,6 +294,11 @@ export class MapModel {
   private mark() {
     const { stage } = this;
     if (!stage) return;
+    if (stage.version === null) {
+      stage.marks = noMarks;
+      stage.redraw();
+      return;
+    }
     for (const { robot } of this.rows) {
       const place = this.places.get(this.headFrame(robot.session));
       if (place) this.heads.set(robot.session, place);
@@ -513,9 +519,15 @@ export class MapModel {
   nextTorn(step: 1 | -1) {
     const { torn } = this;
     if (!torn.length) return;
-    const now = torn.findIndex(({ edge }) => edge === this.edgeName);
+    const now = torn.findIndex((each) => this.isSelected(each));
     const next = now < 0 ? (step > 0 ? 0 : torn.length - 1) : (now + step + torn.length) % torn.length;
-    this.visit({ edge: torn[next]!.edge });
+    this.visitTorn(torn[next]!);
+  }
+  visitTorn({ edge, b }: Torn) {
+    this.visit(edge ? { edge } : { frame: b });
+  }
+  isSelected({ edge, b }: Torn): boolean {
+    return edge ? edge === this.edgeName : !this.edgeName && b === this.frame;
   }
 
   get drawable(): boolean {
