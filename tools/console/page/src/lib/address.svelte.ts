@@ -1,6 +1,10 @@
 // What the address of the page says: the view, and what is shown in it. Whoever opens a copied address sees the same.
 //
 //   #/review?session=6&edge=6:9291/1
+import { href, parseAddress } from './address_text';
+
+export { href };
+
 export class Address {
   view = $state('map');
   private parameters = $state.raw(new URLSearchParams());
@@ -11,9 +15,7 @@ export class Address {
   }
 
   private read() {
-    const match = /^#\/([a-z]*)(?:\?(.*))?$/.exec(location.hash);
-    this.view = match?.[1] || 'map';
-    this.parameters = new URLSearchParams(match?.[2] ?? '');
+    ({ view: this.view, parameters: this.parameters } = parseAddress(location.hash));
   }
 
   get(name: string): string | null {
@@ -43,13 +45,6 @@ export class Address {
     this.view = view;
     this.parameters = parameters;
   }
-}
-
-// For links: <a href={href('map', { root: '6:120' })}>
-export function href(view: string, parameters: Record<string, string> | URLSearchParams = {}): string {
-  // Colons, commas and slashes stay readable: frames are 6:120, closures 6:120/1.
-  const query = new URLSearchParams(parameters).toString().replace(/%3A/g, ':').replace(/%2F/g, '/').replace(/%2C/g, ',');
-  return `#/${view}${query ? '?' + query : ''}`;
 }
 
 export const address = new Address();

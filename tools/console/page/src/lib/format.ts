@@ -22,7 +22,7 @@ export function bytes(value: number | bigint): string {
 
 export function metres(value: number): string {
   if (!Number.isFinite(value)) return 'unknown';
-  if (Math.abs(value) < 0.995) return `${(value * 100).toFixed(value < 0.0995 ? 1 : 0)} cm`;
+  if (Math.abs(value) < 0.995) return `${(value * 100).toFixed(Math.abs(value) < 0.0995 ? 1 : 0)} cm`;
   if (Math.abs(value) < 9950) return `${value.toFixed(Math.abs(value) < 9.95 ? 1 : 0)} m`;
   return `${(value / 1000).toFixed(1)} km`;
 }
@@ -36,10 +36,11 @@ export function seconds(value: number): string {
   return `${(value / 86_400).toFixed(0)} days`;
 }
 
-// Of microseconds since 1970, UTC: "2026-11-30 21:04:05". Empty: not known.
+// Of microseconds since 1970, UTC: "2026-11-30 21:04:05". Empty: not known, or no time that has a date.
 export function time(us: bigint | number): string {
-  if (!us) return '';
-  return new Date(Number(us) / 1000).toISOString().replace('T', ' ').slice(0, 19);
+  const date = new Date(Number(us) / 1000);
+  if (!us || Number.isNaN(date.getTime())) return '';
+  return date.toISOString().replace('T', ' ').slice(0, 19);
 }
 
 // How long ago: "3 min ago".
@@ -49,12 +50,14 @@ export function ago(us: bigint | number, now = Date.now()): string {
   return passed < 1 ? 'just now' : `${seconds(passed)} ago`;
 }
 
-// A text that somebody else chose, harmless: control characters and those that change the direction of writing are
-// shown as their codes, and a long text is cut.
+// A text that somebody else chose, harmless: control characters, those that cannot be seen and those that change the
+// direction of writing are shown as their codes, and a long text is cut, never within a character.
 export function plain(text: string, most = 200): string {
-  const shown = text.slice(0, most).replace(
-    /[\u0000-\u001f\u007f-\u009f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]/g,
+  const long = text.length > most;
+  const cut = long && /[\ud800-\udbff]/.test(text[most - 1] ?? '') ? most - 1 : most;
+  const shown = text.slice(0, cut).replace(
+    /[\u0000-\u001f\u007f-\u009f\u00ad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]|[\u{e0000}-\u{e007f}]|\p{Surrogate}/gu,
     (letter) => `\\u${letter.codePointAt(0)!.toString(16).padStart(4, '0')}`,
   );
-  return text.length > most ? shown + '…' : shown;
+  return long ? shown + '…' : shown;
 }

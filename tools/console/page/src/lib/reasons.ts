@@ -1,4 +1,3 @@
-// Reasons of relmap by their names in the runbook.
 import { Reason } from '../proto/relmap/v1/reason_pb';
 
 // "DISK_FULL"; a number for a reason that this page does not know.
