@@ -7,6 +7,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 import * as esbuild from 'esbuild';
 import sveltePlugin from 'esbuild-svelte';
+import { runbookPage } from './runbook.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
 process.chdir(here);
@@ -32,7 +33,8 @@ const options = {
   plugins: [sveltePlugin({ compilerOptions: { css: 'external', runes: true, modernAst: true } })],
 };
 
-for (const file of ['index.html', 'icon.svg']) copyFileSync(join('src', file), join(out, file));
+for (const file of ['index.html', 'icon.svg', 'runbook.css']) copyFileSync(join('src', file), join(out, file));
+writeFileSync(join(out, 'runbook.html'), runbookPage(readFileSync('../../../docs/runbook.md', 'utf8')));
 writeFileSync(join(out, 'licenses.txt'), licenses());
 
 if (watching) {

@@ -1,5 +1,5 @@
 // One edit at a time, as a view shows it: while it runs, and if it fails, what was tried and why it failed.
-import { EditKeys } from './keys';
+import { EditKeys } from './edit_keys';
 import { problemOf, type Problem } from './rpc';
 
 export class Edit {

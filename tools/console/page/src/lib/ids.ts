@@ -14,9 +14,10 @@ export function frameText(frame: FrameId | Frame | undefined): string {
   return frame ? `${frame.session}:${frame.index}` : '';
 }
 
+// Null: the text is no frame, or has a number that no frame has.
 export function parseFrame(text: string | null): Frame | null {
-  const match = /^(\d{1,10}):(\d{1,10})$/.exec(text ?? '');
-  return match ? { session: Number(match[1]), index: Number(match[2]) } : null;
+  const [session, index] = numbers(/^(\d{1,10}):(\d{1,10})$/, text);
+  return session === undefined || index === undefined ? null : { session, index };
 }
 
 export function edgeText(edge: EdgeId | Edge | undefined): string {
@@ -26,11 +27,17 @@ export function edgeText(edge: EdgeId | Edge | undefined): string {
 }
 
 export function parseEdge(text: string | null): Edge | null {
-  const match = /^(\d{1,10}):(\d{1,10})\/(\d{1,10})$/.exec(text ?? '');
-  return match ? { session: Number(match[1]), index: Number(match[2]), ordinal: Number(match[3]) } : null;
+  const [session, index, ordinal] = numbers(/^(\d{1,10}):(\d{1,10})\/(\d{1,10})$/, text);
+  return session === undefined || index === undefined || ordinal === undefined ? null : { session, index, ordinal };
 }
 
 // As requests have it.
 export function edgeId(edge: Edge): { frame: Frame; ordinal: number } {
   return { frame: { session: edge.session, index: edge.index }, ordinal: edge.ordinal };
+}
+
+// What the groups match, each a number of 32 bits; empty: something else.
+function numbers(form: RegExp, text: string | null): number[] {
+  const found = (form.exec(text ?? '') ?? []).slice(1).map(Number);
+  return found.every((number) => number <= 0xffffffff) ? found : [];
 }

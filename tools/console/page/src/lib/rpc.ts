@@ -1,16 +1,14 @@
 // The daemon's services, called through the console, and what their failures say.
-import { Code, ConnectError, createClient } from '@connectrpc/connect';
-import { createGrpcWebTransport } from '@connectrpc/connect-web';
 import { Admin } from '../proto/relmap/v1/admin_pb';
 import { Map as MapService } from '../proto/relmap/v1/map_pb';
-import { ErrorSchema } from '../proto/relmap/v1/reason_pb';
+import { CallError, Code, makeClient } from './grpc_web';
 import { reasonText } from './reasons';
 
 export { reasonText };
 
-const transport = createGrpcWebTransport({ baseUrl: location.origin, useBinaryFormat: true, defaultTimeoutMs: 30_000 });
-export const map = createClient(MapService, transport);
-export const admin = createClient(Admin, transport);
+const kTimeoutMs = 30_000;
+export const map = makeClient(MapService, location.origin, kTimeoutMs);
+export const admin = makeClient(Admin, location.origin, kTimeoutMs);
 
 // Long work and streams without end have no time limit of their own.
 export const noTimeout = { timeoutMs: 0 } as const;
@@ -26,26 +24,31 @@ export interface Problem {
 export function problemOf(error: unknown): Problem {
   if (isAborted(error)) return { reason: 'CANCELLED', message: 'It was cancelled.' };
   if (error instanceof HttpError) return error.problem;
-  const failure = ConnectError.from(error);
-  const detail = failure.findDetails(ErrorSchema)[0];
+  if (!(error instanceof CallError)) return { reason: 'INTERNAL', message: `The page has a defect: ${String(error)}` };
+  const { code, detail, reason, message } = error;
   if (detail) return { reason: reasonText(detail.reason), message: detail.message, requestId: detail.requestId };
-  switch (failure.code) {
-    case Code.Unauthenticated:
+  if (reason) return { reason, message };
+  switch (code) {
+    case Code.unauthenticated:
       return { reason: 'UNAUTHENTICATED', message: 'You are not logged in, or your token has expired.' };
-    case Code.DeadlineExceeded:
-      return { reason: 'DEADLINE', message: 'The daemon did not answer in time.' };
-    case Code.Unavailable:
-    case Code.Unknown:
-      return { reason: 'UNREACHABLE', message: failure.rawMessage || 'The console does not answer.' };
+    case Code.notAllowed:
+      return { reason: 'NOT_ALLOWED', message };
+    case Code.unimplemented:
+      return { reason: 'UNIMPLEMENTED', message };
+    case Code.deadline:
+      return { reason: 'DEADLINE', message: message || 'The daemon did not answer in time.' };
+    case Code.unavailable:
+    case Code.unknown:
+      return { reason: 'UNREACHABLE', message: message || 'The console does not answer.' };
     default:
-      return { reason: Code[failure.code]?.toUpperCase() ?? 'UNKNOWN', message: failure.rawMessage };
+      return { reason: 'INTERNAL', message: message || `The call failed with status ${code} of gRPC.` };
   }
 }
 
 export function isAborted(error: unknown): boolean {
   return (
     (error instanceof DOMException && error.name === 'AbortError') ||
-    (error instanceof ConnectError && error.code === Code.Canceled)
+    (error instanceof CallError && error.code === Code.cancelled)
   );
 }
 

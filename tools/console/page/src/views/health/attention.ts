@@ -51,7 +51,7 @@ export function needsAttention(s: GetStatusReply, robots: RobotRow[]): Fact[] {
   unless('certificate', s.certificateReason, s.certificateMessage);
   for (const { robot, troubles } of robots)
     for (const { urgent, what, reason } of troubles.slice(0, 1))
-      say(`robot ${plain(robot.robot || robot.uuid.slice(0, 8), 40)}`, what, reason, { urgent, robot: robot.robot });
+      say(`robot ${plain(robot.robot || robot.uuid.slice(0, 8), 40)}`, what, reason, { urgent, robot: robot.robot || robot.uuid });
   for (const camera of s.doubtfulCameras)
     say(`session ${camera.session}`,
       `${camera.robot}, ${camera.name}: its camera's calibration is in doubt: ${counted(camera.contradicted, 'keyframe contradicts', 'keyframes contradict')} it ` +

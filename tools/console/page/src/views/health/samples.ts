@@ -53,11 +53,11 @@ export function grown(values: Values): Values {
   });
 }
 
-// The end of an axis that begins at 0: 1, 2 or 5 times a power of ten.
+// The end of an axis that begins at 0: a short number.
 export function niceTop(most: number): number {
   if (!(most > 0)) return 1;
   const power = 10 ** Math.floor(Math.log10(most));
-  return [1, 2, 5, 10].map((factor) => factor * power).find((top) => top >= most * 0.999)!;
+  return [1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10].map((factor) => factor * power).find((top) => top >= most * 0.999)!;
 }
 
 export function most(lines: Values[]): number {

@@ -1,6 +1,6 @@
 // The long work that this page has started. It lives as long as the page, whatever view is shown.
 import { plain } from '../../lib/format';
-import { newKey } from '../../lib/keys';
+import { newKey } from '../../lib/edit_keys';
 import { admin, isAborted, noTimeout, problemOf, type Problem } from '../../lib/rpc';
 import type { Finding, Progress, VerifySummary } from '../../proto/relmap/v1/admin_pb';
 import { begun, kMostFindings, outcomeText, type JobKind, type JobState } from './job';
