@@ -20,6 +20,9 @@ class Caller {
   // Edits are offered to operators. Whatever is offered, the daemon decides.
   canEdit = $derived(this.status.callerRole === 'operator');
 
+  // How often the daemon has come back after it did not answer: what could not be read then is worth asking for again.
+  returns = $state(0);
+
   private asking = false;
 
   async start() {
@@ -52,6 +55,7 @@ class Caller {
     try {
       this.about ??= await getJson<About>('/about');
       this.status = await map.getStatus({}, { timeoutMs: 5000 });
+      if (this.state === 'unreachable') ++this.returns;
       this.state = 'ready';
       this.problem = null;
     } catch (error) {

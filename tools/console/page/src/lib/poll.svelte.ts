@@ -1,6 +1,8 @@
 // Asks again and again while a view is open and seen, and keeps the last answer when a call fails.
 import { isAborted, problemOf, type Problem } from './rpc';
 
+const kSoonMs = 5000;
+
 export class Poll<T> {
   value = $state.raw<T | null>(null);
   problem = $state.raw<Problem | null>(null);
@@ -17,9 +19,12 @@ export class Poll<T> {
     void this.now();
     const seen = () => void this.now();
     const timer = setInterval(seen, this.everyMs);
+    // After a failure it asks sooner.
+    const soon = setInterval(() => this.problem && this.everyMs > kSoonMs && seen(), kSoonMs);
     document.addEventListener('visibilitychange', seen);
     return () => {
       clearInterval(timer);
+      clearInterval(soon);
       document.removeEventListener('visibilitychange', seen);
     };
   }
