@@ -398,7 +398,11 @@ export class MapModel {
     }
     if (this.session) {
       const session = sessions.byNumber.get(this.session);
-      if (!session) return sessions.known ? missing(`Session ${this.session}`) : 'wait';
+      if (!session && sessions.known) {
+        this.note = `The map has no session ${this.session}.`;
+        return 'all';
+      }
+      if (!session) return 'wait';
       const found = along(session).map((frame) => this.places.get(frame));
       if (found.some((place) => place === undefined)) return 'wait';
       const known = found.filter((place) => !!place);
