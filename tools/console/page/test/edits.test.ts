@@ -10,7 +10,7 @@ import {
 
 const done = (id: string): Done => ({
   id, name: '2:5/1', ends: '1:1 – 2:5', what: 'remove', note: '', when: 0, sequence: '70',
-  state: EdgeState.REMOVED, changed: 1, undo: ['restore'], undone: false,
+  state: EdgeState.REMOVED, changed: 1, undo: ['restore'], undone: false, byUndo: false,
 });
 
 test('each edit is undone as the table of the operations guide says', () => {
@@ -36,7 +36,7 @@ test('only what the state allows is offered', () => {
 test('the history takes back the newest edit that stands', () => {
   let list = withDone(withDone([], done('1')), done('2'));
   assert.equal(lastToUndo(list)!.id, '2');
-  list = withUndone(list, '2');
+  list = withDone(withUndone(list, '2'), { ...done('3'), byUndo: true });
   assert.equal(lastToUndo(list)!.id, '1');
   assert.equal(lastToUndo(withUndone(list, '1')), null);
   assert.deepEqual(readList(JSON.stringify(list)), list);

@@ -8,7 +8,7 @@ export interface Part {
   sessions: number[];
 }
 export interface Torn {
-  edge: string;
+  edge: string | null; // null: a stretch of motion, and no closure
   a: string;
   b: string;
   sigmas: number;
@@ -20,7 +20,7 @@ export interface World {
   size: number; // metres
 }
 export interface Layout {
-  version: number;
+  version: number; // when it was made, ms since 1970; 0: there is none
   map_version: string;
   map_uuid: string;
   coarse: boolean;
@@ -31,10 +31,12 @@ export interface Layout {
   zooms: number;
   time: { first_ms: number; last_ms: number };
   parts: Part[];
-  torn: Torn[];
+  torn: Torn[]; // the worst
+  torn_in_all: number;
   progress: { step: string; done: number; total: number } | null;
   behind: number;
   empty: { reason: string; message: string } | null;
+  error: { reason: string; message: string } | null; // why it is not kept up
 }
 export interface FramePlace {
   frame: string;
@@ -44,9 +46,14 @@ export interface FramePlace {
   heading: number;
 }
 
+// Of a torn closure or stretch of motion, for lists.
+export function tornName({ edge, a, b }: Torn): string {
+  return edge ?? `${a} – ${b}`;
+}
+
 // Whether there is something to draw.
 export function drawable(layout: Layout | null): layout is Layout {
-  return !!layout && !layout.empty && !!layout.world && layout.world.size > 0 && layout.parts.length > 0;
+  return !!layout && layout.version > 0 && !layout.empty && !!layout.world && layout.world.size > 0 && layout.parts.length > 0;
 }
 
 // A box around all parts.

@@ -3,7 +3,7 @@
 import { toScreen, type Camera, type Size } from './camera';
 import { metres, plain } from '../lib/format';
 import { css, sessionColour, type Palette } from './palette';
-import { Placement, scaleBar } from './placement';
+import { clipped, Placement, scaleBar } from './placement';
 
 interface At {
   x: number; // metres
@@ -41,7 +41,7 @@ export interface Marks {
   captions: Caption[];
   trails: Trail[];
   closures: LooseClosure[]; // newer than the tiles
-  torn: (Line & { text: string })[];
+  torn: (Line & { edge: string | null; text: string })[];
   frame: At | null; // selected
   closure: Line | null; // selected
   root: (At & { heading: number; text: string }) | null;
@@ -63,7 +63,8 @@ export class Overlay {
     this.context = canvas.getContext('2d')!;
   }
 
-  draw(camera: Camera, size: Size, pixel: number, marks: Marks, palette: Palette) {
+  // `drawn`: the torn closures that the lines beneath have.
+  draw(camera: Camera, size: Size, pixel: number, marks: Marks, palette: Palette, drawn: (edge: string) => boolean) {
     const { canvas, context } = this;
     const width = Math.max(1, Math.round(size.width * pixel));
     const height = Math.max(1, Math.round(size.height * pixel));
@@ -78,9 +79,9 @@ export class Overlay {
     context.lineJoin = context.lineCap = 'round';
 
     this.trails(camera, size, pixel, marks.trails, palette);
-    for (const closure of marks.closures) this.closure(camera, size, closure, palette[closure.state], 2, true);
+    for (const closure of marks.closures) this.closure(camera, size, closure, css(palette[closure.state]), 2, true);
     if (marks.closure) {
-      this.closure(camera, size, marks.closure, palette.selected, 1.5, false);
+      this.closure(camera, size, marks.closure, css(palette.selected, 0.22), 16, false);
       const { ax, ay, bx, by } = marks.closure;
       for (const [x, y] of [toScreen(camera, size, ax, ay), toScreen(camera, size, bx, by)])
         this.ring(x, y, 8, palette.selected, palette.ground);
@@ -100,8 +101,12 @@ export class Overlay {
     for (const { robot, at } of robots) this.robot(camera, robot, at, palette);
     for (const { robot, at } of robots) this.text(plain(robot.name, 30), at, 13, palette.text, palette, placement, true);
     for (const torn of marks.torn) {
-      const at = toScreen(camera, size, (torn.ax + torn.bx) / 2, (torn.ay + torn.by) / 2);
-      if (near(...at, 20)) this.text(torn.text, at, 9, palette.torn, palette, placement, true);
+      const ends = [toScreen(camera, size, torn.ax, torn.ay), toScreen(camera, size, torn.bx, torn.by)] as const;
+      const seen = clipped(...ends[0], ...ends[1], size.width, size.height);
+      if (!seen) continue;
+      // Tiles have only closures of which they have an end.
+      if (!torn.edge || !drawn(torn.edge)) this.closure(camera, size, torn, css(palette.torn), 2.5, true);
+      this.text(torn.text, [(seen[0] + seen[2]) / 2, (seen[1] + seen[3]) / 2], 9, palette.torn, palette, placement, true);
     }
     for (const caption of marks.captions) {
       const at = toScreen(camera, size, caption.x, caption.y);
@@ -140,9 +145,9 @@ export class Overlay {
     context.setTransform(pixel, 0, 0, pixel, 0, 0);
   }
 
-  private closure(camera: Camera, size: Size, { ax, ay, bx, by }: Line, colour: Palette['text'], width: number, dashed: boolean) {
+  private closure(camera: Camera, size: Size, { ax, ay, bx, by }: Line, colour: string, width: number, dashed: boolean) {
     const { context } = this;
-    context.strokeStyle = css(colour);
+    context.strokeStyle = colour;
     context.lineWidth = width;
     context.setLineDash(dashed ? [8, 3] : []);
     context.beginPath();

@@ -1,5 +1,5 @@
 // The colours of the map. They differ for people who are colour-blind, too: the scale rises steadily in lightness (it is
-// cividis, cut where it would not stand out from the ground), and what has a state has a pattern or a width of its own.
+// viridis, cut where it would not stand out from the ground), and what has a state has a pattern or a width of its own.
 export type Rgb = [number, number, number];
 
 export type ColourBy = 'session' | 'time' | 'age' | 'sd' | 'source';
@@ -41,7 +41,7 @@ const light: Palette = {
   text: rgb('#16202b'),
   dim: rgb('#8b96a3'),
   sessions: ['#0072b2', '#b8480a', '#00856a', '#a3498c', '#7a6a00', '#332288', '#2f8fb8', '#882255', '#5d8a1d', '#5c4a3a'].map(rgb),
-  scale: ['#00224e', '#2a3f6d', '#575d6d', '#7d7c78', '#a59c74', '#c9b23f'].map(rgb),
+  scale: ['#440154', '#46327e', '#365c8d', '#277f8e', '#1a9a80', '#4db052'].map(rgb),
   measured: rgb('#0072b2'),
   guess: rgb('#a8480f'),
   carried: rgb('#a3338c'),
@@ -58,7 +58,7 @@ const dark: Palette = {
   text: rgb('#e7ecf2'),
   dim: rgb('#66758a'),
   sessions: ['#5cb3f0', '#f09060', '#3fc9a0', '#e58cc8', '#e0d060', '#a79cf5', '#8fdcf5', '#f2a0a8', '#a8cf58', '#c9b09a'].map(rgb),
-  scale: ['#3f5a8f', '#5f7090', '#808488', '#a59c74', '#cfb958', '#fee838'].map(rgb),
+  scale: ['#5a5fc0', '#3f7fc0', '#28a09c', '#4ac16d', '#a0da39', '#fde725'].map(rgb),
   measured: rgb('#5cb3f0'),
   guess: rgb('#f0a060'),
   carried: rgb('#ee8ed8'),

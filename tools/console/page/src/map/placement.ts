@@ -77,3 +77,19 @@ export function scaleBar(mpp: number, most: number): { metres: number; pixels: n
   const metres = [5, 2, 1].map((step) => step * power).find((length) => length <= longest) ?? power;
   return { metres, pixels: metres / mpp };
 }
+
+// The part of a segment that lies within the picture; null: none does.
+export function clipped(
+  ax: number, ay: number, bx: number, by: number, width: number, height: number,
+): [number, number, number, number] | null {
+  let from = 0;
+  let to = 1;
+  const dx = bx - ax;
+  const dy = by - ay;
+  for (const [way, room] of [[-dx, ax], [dx, width - ax], [-dy, ay], [dy, height - ay]] as const) {
+    if (way === 0 && room < 0) return null;
+    if (way < 0) from = Math.max(from, room / way);
+    if (way > 0) to = Math.min(to, room / way);
+  }
+  return from > to ? null : [ax + from * dx, ay + from * dy, ax + to * dx, ay + to * dy];
+}

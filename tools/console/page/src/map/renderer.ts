@@ -151,7 +151,9 @@ export class Renderer {
     gl.bindTexture(gl.TEXTURE_2D, this.scale);
 
     this.closures(camera, size, pixel, items, look, 0);
-    this.lines(camera, size, pixel, items, look);
+    // Chosen sessions lie over the faint ones.
+    if (look.chosen.size) this.lines(camera, size, pixel, items, look, 1);
+    this.lines(camera, size, pixel, items, look, 0);
     this.closures(camera, size, pixel, items, look, 1);
     gl.bindVertexArray(null);
   }
@@ -192,11 +194,12 @@ export class Renderer {
     else gl.uniform4f(at.u_only, -1e9, -1e9, 1e9, 1e9);
   }
 
-  private lines(camera: Camera, size: Size, pixel: number, items: readonly Item[], look: Look) {
+  private lines(camera: Camera, size: Size, pixel: number, items: readonly Item[], look: Look, faint: 0 | 1) {
     const { gl } = this;
     // Lines are finer from far away, where there are many.
     const width = Math.max(1.5, Math.min(3, 2.4 - 0.55 * Math.log10(camera.mpp / 0.05)));
     this.use(this.line, camera, size, pixel, look);
+    gl.uniform1i(this.line.at.u_faint!, faint);
     gl.uniform1f(this.line.at.u_width!, width * pixel);
     gl.uniform1f(this.line.at.u_check!, 2 ** Math.round(Math.log2(5 * camera.mpp)));
     for (const item of items) {
@@ -209,10 +212,11 @@ export class Renderer {
     const near = camera.mpp < 0.06;
     if (near || camera.mpp < 2) {
       this.use(this.dot, camera, size, pixel, look);
+      gl.uniform1i(this.dot.at.u_faint!, faint);
       gl.uniform3f(this.dot.at.u_sizes!, near ? (width + 2.5) * pixel : 0, (near ? 11 : 8) * pixel, 0);
       this.dots(camera, items, () => 1);
     }
-    if (!look.layers.headings) return;
+    if (!look.layers.headings || faint) return;
     this.use(this.dot, camera, size, pixel, look);
     gl.uniform3f(this.dot.at.u_sizes!, 0, 0, 11 * pixel);
     this.dots(camera, items, (item) => spacing(item.batch, camera.mpp));

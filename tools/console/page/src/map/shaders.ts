@@ -16,6 +16,7 @@ uniform float u_until;  // seconds since the first frame
 uniform highp sampler2D u_sessions;
 uniform sampler2D u_scale;
 uniform int u_colour;
+uniform int u_faint;    // 1: only sessions that were not chosen, 0: only the others
 uniform vec2 u_range;   // seconds: from first to last frame, to the end of what is shown
 uniform vec3 u_ground, u_dim, u_measured, u_guess, u_carried;
 
@@ -27,6 +28,7 @@ vec4 session(uint number) {
   int slot = int(number) & 4095;
   return texelFetch(u_sessions, ivec2(slot & 63, slot >> 6), 0);
 }
+bool left(uint number) { return (session(number).a < 0.5) != (u_faint == 1); }
 vec3 scale(float share) { return texture(u_scale, vec2(clamp(share, 0.002, 0.998), 0.5)).rgb; }
 vec3 colourOf(uint number, float time, float sd, uint flags) {
   vec4 of_session = session(number);
@@ -58,7 +60,7 @@ flat out float v_length;
 flat out vec3 v_colour;
 flat out uint v_flags;
 void main() {
-  if ((a_flags & 16u) != 0u || a_time > u_until) { gl_Position = kNowhere; return; }
+  if ((a_flags & 16u) != 0u || a_time > u_until || left(a_session)) { gl_Position = kNowhere; return; }
   vec2 before = a_before * u_unit, here = a_this * u_unit;
   if (u_ease < 1.0) { before = mix(a_oldBefore, before, u_ease); here = mix(a_oldThis, here, u_ease); }
   vec2 from = pixelsOf(before), to = pixelsOf(here);
@@ -119,7 +121,7 @@ void main() {
   bool arrow = u_sizes.z > 0.0;
   float size = arrow ? u_sizes.z : end ? u_sizes.y : u_sizes.x;
   vec2 from = pixelsOf(before), to = pixelsOf(here);
-  if ((a_flags & 4u) != 0u || size <= 0.0 || a_time > u_until || any(lessThan(here, u_only.xy)) ||
+  if ((a_flags & 4u) != 0u || size <= 0.0 || a_time > u_until || left(a_session) || any(lessThan(here, u_only.xy)) ||
       any(greaterThan(here, u_only.zw)) || (arrow && ((a_flags & 16u) != 0u || gl_InstanceID % u_every != 0))) {
     gl_Position = kNowhere;
     return;

@@ -214,7 +214,9 @@ export class Stage {
     this.choose(begin);
     const pixel = Math.min(2, window.devicePixelRatio || 1);
     this.renderer.draw(this.camera, this.size, pixel, this.drawn.map(({ item }) => item), this.look);
-    this.overlay.draw(this.camera, this.size, pixel, this.marks, this.look.palette);
+    const tiles = this.tiles;
+    const drawn = (edge: string) => tiles.some((tile) => tornOf(tile).has(edge));
+    this.overlay.draw(this.camera, this.size, pixel, this.marks, this.look.palette, drawn);
     const { counters } = this;
     counters.frames++;
     counters.drawCalls = this.renderer.drawCalls;
@@ -401,6 +403,19 @@ export class Stage {
     const { x, y } = this.at(event);
     this.goto(zoomAt(this.camera, this.size, x, y, 2), 200, true);
   };
+}
+
+const tornIn = new WeakMap<Tile, Set<string>>();
+function tornOf(tile: Tile): Set<string> {
+  let torn = tornIn.get(tile);
+  if (!torn) {
+    const { closures } = tile;
+    torn = new Set();
+    for (let i = 0; i < closures.count; i++)
+      if (closures.flags[i]! & closureTorn) torn.add(`${closures.session[i]}:${closures.index[i]}/${closures.ordinal[i]}`);
+    tornIn.set(tile, torn);
+  }
+  return torn;
 }
 
 function smooth(share: number): number {

@@ -20,6 +20,7 @@ export interface Done {
   changed: number; // closures that it changed, this one included
   undo: What[]; // steps, in their order
   undone: boolean;
+  byUndo: boolean; // it took back another one
 }
 
 export function requestOf(what: What): { state: EdgeState; decided: boolean; alone: boolean } {
@@ -116,9 +117,9 @@ export function withUndone(list: Done[], id: string): Done[] {
   return list.map((done) => (done.id === id ? { ...done, undone: true } : done));
 }
 
-// The edit that "undo" takes back.
+// The edit that "undo" takes back: going back, not to and fro.
 export function lastToUndo(list: Done[]): Done | null {
-  return list.find((done) => !done.undone) ?? null;
+  return list.find((done) => !done.undone && !done.byUndo) ?? null;
 }
 
 // Others have changed the closure since: undoing is still asked for, but whoever does it should know. "" if not.

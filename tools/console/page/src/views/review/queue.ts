@@ -126,6 +126,7 @@ export interface Notice {
   author: string;
   note: string;
   timeUs: bigint;
+  sequence: string; // of the journal: all that one edit changed has the same
 }
 
 export interface Queue {
@@ -170,7 +171,8 @@ export function withEvents(queue: Queue, events: MapEvent[], filters: Filters): 
     if (rows === queue.rows) rows = [...rows];
     rows[index] = { ...rows[index]!, ...changes };
   };
-  for (const { event, author, note, timeUs } of events) {
+  for (const { event, author, note, timeUs, journalSequence } of events) {
+    const sequence = String(journalSequence);
     if (event.case === 'edgeChanged') {
       const edge = event.value;
       if (edge.kind !== EdgeKind.LOOP) continue;
@@ -182,12 +184,12 @@ export function withEvents(queue: Queue, events: MapEvent[], filters: Filters): 
         if (fresh === queue.fresh) fresh = new Set(fresh);
         fresh.add(name);
       }
-      notices.push({ name, state: edge.state, author, note, timeUs });
+      notices.push({ name, state: edge.state, author, note, timeUs, sequence });
     } else if (event.case === 'edgeRemoved') {
       const name = edgeText(event.value.edge);
       const index = at.get(name);
       if (index !== undefined) change(index, { gone: true, changedBy: author });
-      notices.push({ name, state: null, author, note, timeUs });
+      notices.push({ name, state: null, author, note, timeUs, sequence });
     }
   }
   return { queue: rows === queue.rows && fresh === queue.fresh ? queue : { ...queue, rows, fresh }, notices };
