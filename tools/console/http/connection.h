@@ -181,7 +181,7 @@ class Connection final : public OpenConnection,
     version_ = header.version();
     keep_alive_ = header.keep_alive();
     head_only_ = header.method() == web::verb::head;
-    accepts_gzip_ = accepts_gzip(view(header[web::field::accept_encoding]));
+    accepts_gzip_ = accepts(view(header[web::field::accept_encoding]), "gzip");
 
     Request request;
     Router::Match match;

@@ -33,22 +33,24 @@ std::optional<std::string> gzip(std::string_view bytes, Effort effort) {
   return out;
 }
 
-bool accepts_gzip(std::string_view header) {
+bool accepts(std::string_view header, std::string_view encoding) {
+  const std::string weighed = std::string(encoding) + ";q=";
   while (!header.empty()) {
     const std::size_t end = std::min(header.find(','), header.size());
     std::string one;
     for (const char c : header.substr(0, end))
       if (c != ' ') one += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     header.remove_prefix(std::min(end + 1, header.size()));
-    if (one == "gzip" || (one.starts_with("gzip;q=") && one.find_first_of("123456789") != std::string::npos))
-      return true;
+    if (one == encoding) return true;
+    if (one.starts_with(weighed) && one.find_first_of("123456789", weighed.size()) != std::string::npos) return true;
   }
   return false;
 }
 
 bool may_compress(std::string_view type) {
   return type.starts_with("text/") || type.starts_with("application/json") ||
-         type.starts_with("application/octet-stream") || type == "image/svg+xml";
+         type.starts_with("application/octet-stream") || type.starts_with("application/vnd.relmap.") ||
+         type == "image/svg+xml";
 }
 
 }  // namespace relmap::console

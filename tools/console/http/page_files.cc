@@ -1,5 +1,6 @@
 #include "tools/console/http/page_files.h"
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <utility>
@@ -13,20 +14,23 @@ namespace relmap::console {
 
 namespace {
 
+constexpr std::string_view kBrotli = ".br";
+
 std::uint32_t crc_of(std::string_view text) {
   return crc32c(ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
 struct Prepared {
-  Response plain, compressed;  // the latter with an empty body where it does not pay
+  Response plain, by_gzip, by_brotli;  // the latter two with an empty body where there is none, or it does not pay
 };
 
 // Not a lambda: closures of coroutines must outlive them, and a copy in the router does.
 struct ServeFile {
   std::shared_ptr<const Prepared> file;
   Awaitable<Response> operator()(const Request& request) const {
-    const bool compressed = !file->compressed.body.empty() && accepts_gzip(request.header("accept-encoding"));
-    co_return compressed ? file->compressed : file->plain;
+    const std::string_view accepted = request.header("accept-encoding");
+    if (!file->by_brotli.body.empty() && accepts(accepted, "br")) co_return file->by_brotli;
+    co_return !file->by_gzip.body.empty() && accepts(accepted, "gzip") ? file->by_gzip : file->plain;
   }
 };
 
@@ -52,6 +56,7 @@ std::string_view type_of(std::string_view name) {
 
 void add_page(std::span<const PageFile> files, Router& router) {
   for (const PageFile& file : files) {
+    if (file.name.ends_with(kBrotli)) continue;
     auto prepared = std::make_shared<Prepared>();
     Response& plain = prepared->plain;
     plain.type = type_of(file.name);
@@ -60,10 +65,19 @@ void add_page(std::span<const PageFile> files, Router& router) {
     const std::string mark = hex(crc_of(file.bytes)) + "-" + std::to_string(file.bytes.size());
     plain.etag = "\"" + mark + "\"";
     if (auto packed = may_compress(plain.type) ? gzip(file.bytes, Effort::kBest) : std::nullopt) {
-      prepared->compressed = plain;
-      prepared->compressed.body = std::move(*packed);
-      prepared->compressed.encoding = "gzip";
-      prepared->compressed.etag = "\"" + mark + "-gzip\"";
+      prepared->by_gzip = plain;
+      prepared->by_gzip.body = std::move(*packed);
+      prepared->by_gzip.encoding = "gzip";
+      prepared->by_gzip.etag = "\"" + mark + "-gzip\"";
+    }
+    const auto brotli = std::find_if(files.begin(), files.end(), [&](const PageFile& other) {
+      return other.name.ends_with(kBrotli) && other.name.substr(0, other.name.size() - kBrotli.size()) == file.name;
+    });
+    if (brotli != files.end()) {
+      prepared->by_brotli = plain;
+      prepared->by_brotli.body = brotli->bytes;
+      prepared->by_brotli.encoding = "br";
+      prepared->by_brotli.etag = "\"" + mark + "-br\"";
     }
     const ServeFile serve{std::move(prepared)};
     router.add({"GET", "/" + std::string(file.name), Access::kAnyone, serve});

@@ -96,9 +96,10 @@ TEST(Gzip, GivesTheSameBytesBackAndOnlyWhereItPays) {
 }
 
 TEST(Gzip, IsUsedForThoseWhoAcceptIt) {
-  for (const std::string yes : {"gzip", "deflate, gzip;q=0.5, br", "GZIP", "br,gzip"}) EXPECT_TRUE(accepts_gzip(yes)) << yes;
+  for (const std::string yes : {"gzip", "deflate, gzip;q=0.5, br", "GZIP", "br,gzip"})
+    EXPECT_TRUE(accepts(yes, "gzip")) << yes;
   for (const std::string no : {"", "br", "gzip;q=0", "gzip; q=0.0", "xgzip", "identity"})
-    EXPECT_FALSE(accepts_gzip(no)) << no;
+    EXPECT_FALSE(accepts(no, "gzip")) << no;
 }
 
 TEST(Page, IsPartOfTheProgram) {
