@@ -1,6 +1,7 @@
 # What `cmake --install build/release --prefix P [--component C]` installs. Components, each a package of debian/:
 #   server    relmapd, the vocabulary, its unit, user, folders and kernel settings, a sample of its configuration
 #   frontend  relmap-frontend and relmap-camera, who may open cameras, the unit of a robot
+#   console   relmap-console, its unit, user and a sample of its options
 #   tools     relmap, relmap-admin, relmap-vocab, relmap-sim
 #   python    the Python client
 #   dev       the C++ client: a static library, its headers, a CMake package, a pkg-config file; the .proto and .lcm files
@@ -50,6 +51,13 @@ install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmap-frontend.sysusers DESTINATIO
         RENAME relmap-frontend.conf COMPONENT frontend)
 relmap_install_documents(frontend docs/cameras.md docs/frontend.md)
 
+install(TARGETS relmap-console RUNTIME DESTINATION bin COMPONENT console)
+install(FILES ${CMAKE_SOURCE_DIR}/tools/ops/console.conf DESTINATION share/relmap COMPONENT console)
+relmap_install_text(console ${systemd}/relmap-console.service lib/systemd/system)
+install(FILES ${CMAKE_SOURCE_DIR}/${systemd}/relmap-console.sysusers DESTINATION lib/sysusers.d
+        RENAME relmap-console.conf COMPONENT console)
+relmap_install_documents(console docs/console.md)
+
 install(TARGETS relmap relmap-admin relmap-vocab relmap-sim RUNTIME DESTINATION bin COMPONENT tools)
 relmap_install_documents(tools README.md CHANGELOG.md LICENSES.md docs/glossary.md)
 
@@ -91,7 +99,7 @@ install(FILES ${CMAKE_SOURCE_DIR}/client/python/notebooks/points_world.py
         DESTINATION share/doc/python3-relmap/examples COMPONENT python)
 
 add_custom_target(relmap_installed DEPENDS relmapd relmap-frontend relmap-camera relmap-camera-1394 relmap relmap-admin
-                  relmap-vocab relmap-sim relmap_client_archive)
+                  relmap-vocab relmap-sim relmap-console relmap_client_archive)
 if(TARGET relmap_manuals)
   add_dependencies(relmap_installed relmap_manuals)
 endif()

@@ -53,10 +53,10 @@ class Installed : public ::testing::Test {
 };
 
 TEST_F(Installed, EachComponentHasItsPrograms) {
-  for (const char* component : {"server", "frontend", "tools"}) install(component);
+  for (const char* component : {"server", "frontend", "console", "tools"}) install(component);
   EXPECT_EQ(files("bin"),
-            (std::set<std::string>{"bin/relmap", "bin/relmap-admin", "bin/relmap-camera", "bin/relmap-frontend",
-                                   "bin/relmap-sim", "bin/relmap-vocab", "bin/relmapd"}));
+            (std::set<std::string>{"bin/relmap", "bin/relmap-admin", "bin/relmap-camera", "bin/relmap-console",
+                                   "bin/relmap-frontend", "bin/relmap-sim", "bin/relmap-vocab", "bin/relmapd"}));
   EXPECT_TRUE(files().contains("lib/relmap/relmap-camera-1394"));
   EXPECT_FALSE(fs::exists(fs::path(prefix_) / "include")) << "of component dev";
 
@@ -70,9 +70,10 @@ TEST_F(Installed, EachComponentHasItsPrograms) {
 }
 
 TEST_F(Installed, UnitsNameTheProgramsOfTheirPrefix) {
-  for (const char* component : {"server", "frontend"}) install(component);
-  for (const auto& [unit, program] : {std::pair("relmapd", "relmapd"), std::pair("relmap-frontend@", "relmap-frontend"),
-                                      std::pair("relmap-backup", "relmap-admin")}) {
+  for (const char* component : {"server", "frontend", "console"}) install(component);
+  for (const auto& [unit, program] :
+       {std::pair("relmapd", "relmapd"), std::pair("relmap-frontend@", "relmap-frontend"),
+        std::pair("relmap-backup", "relmap-admin"), std::pair("relmap-console", "relmap-console")}) {
     const std::string text = read_text(prefix_ + "/lib/systemd/system/" + unit + ".service");
     EXPECT_THAT(text, HasSubstr("\nExecStart=" + prefix_ + "/bin/" + program + " "));
     EXPECT_THAT(text, Not(HasSubstr("@prefix@")));
@@ -81,18 +82,19 @@ TEST_F(Installed, UnitsNameTheProgramsOfTheirPrefix) {
 }
 
 TEST_F(Installed, UnitsAreSoundAndClosed) {
-  for (const char* component : {"server", "frontend"}) install(component);
+  for (const char* component : {"server", "frontend", "console"}) install(component);
   const std::string units = prefix_ + "/lib/systemd/system/";
-  for (const std::string& unit :
-       {units + "relmapd.service", units + "relmap-frontend@.service", units + "relmap-backup.service"}) {
+  for (const std::string& unit : {units + "relmapd.service", units + "relmap-frontend@.service",
+                                  units + "relmap-backup.service", units + "relmap-console.service"}) {
     const Finished closed =
         run_program({"systemd-analyze", "security", "--offline=true", "--threshold=30", "--no-pager", unit});
     EXPECT_EQ(closed.exit_code, 0) << closed.standard_output << closed.standard_error;
     const Finished sound = run_program({"systemd-analyze", "verify", "--man=no", "--recursive-errors=no", unit});
     EXPECT_EQ(sound.exit_code, 0) << sound.standard_error;
   }
-  const Finished users = run_program({"systemd-sysusers", "--dry-run", prefix_ + "/lib/sysusers.d/relmapd.conf",
-                                      prefix_ + "/lib/sysusers.d/relmap-frontend.conf"});
+  const Finished users =
+      run_program({"systemd-sysusers", "--dry-run", prefix_ + "/lib/sysusers.d/relmapd.conf",
+                   prefix_ + "/lib/sysusers.d/relmap-frontend.conf", prefix_ + "/lib/sysusers.d/relmap-console.conf"});
   EXPECT_EQ(users.exit_code, 0) << users.standard_error;
 }
 

@@ -36,6 +36,7 @@ constexpr std::size_t kColumns = 80;
 const std::map<std::string, std::string> kPages = {{"relmap", "man1/relmap.1"},
                                                    {"relmap-admin", "man8/relmap-admin.8"},
                                                    {"relmap-camera", "man1/relmap-camera.1"},
+                                                   {"relmap-console", "man1/relmap-console.1"},
                                                    {"relmap-frontend", "man1/relmap-frontend.1"},
                                                    {"relmap-sim", "man1/relmap-sim.1"},
                                                    {"relmap-vocab", "man1/relmap-vocab.1"},

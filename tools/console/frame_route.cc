@@ -14,7 +14,7 @@ namespace relmap::console {
 namespace {
 
 constexpr char kGetFrame[] = "/relmap.v1.Map/GetFrame";
-constexpr std::chrono::seconds kPatience{30};
+constexpr std::chrono::seconds kAnswerPatience{30};
 
 std::string mark_of(std::uint32_t payload, const std::string& bytes) {
   const ByteSpan span(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
@@ -31,7 +31,7 @@ Awaitable<Response> picture_of(DaemonLink& link, const Request& request, bool wh
   question.set_picture(whole);
   CallOptions options;
   options.token = request.caller.token;
-  options.timeout = kPatience;
+  options.timeout = kAnswerPatience;
   const auto answer = co_await link.ask(kGetFrame, question.SerializeAsString(), std::move(options));
   if (!answer.ok()) co_return error_response(answer.status());
   v1::GetFrameReply reply;

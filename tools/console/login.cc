@@ -13,7 +13,7 @@ namespace {
 constexpr std::chrono::minutes kRemembered{1};
 constexpr std::chrono::seconds kAskedAgain{15};
 constexpr std::size_t kMaxAddresses = 10'000, kMaxTokens = 1000;
-constexpr std::chrono::seconds kPatience{10};
+constexpr std::chrono::seconds kJudgedWithin{10};
 constexpr char kGetStatus[] = "/relmap.v1.Map/GetStatus";
 
 // Over TLS, and behind a proxy that speaks TLS with browsers, the cookie is for TLS only.
@@ -122,7 +122,7 @@ Awaitable<Status> Login::authorise(std::string token) {
 Awaitable<Status> Login::ask_daemon(std::string token) {
   CallOptions options;
   options.token = std::move(token);
-  options.timeout = kPatience;
+  options.timeout = kJudgedWithin;
   const auto reply = co_await link_.ask(kGetStatus, "", std::move(options));
   co_return reply.status();
 }

@@ -29,7 +29,7 @@ constexpr std::chrono::milliseconds kLook{10};
 
 bool needs_daemon(const std::string& server) {
   std::error_code error;
-  if (!fs::is_directory(server, error)) return false;
+  if (!fs::exists(server + "/FORMAT", error)) return false;
   client::ClientOptions options;
   options.connect_timeout = std::chrono::milliseconds(2000);
   return client::Client::connect(server, options).reason() == Reason::UNREACHABLE;

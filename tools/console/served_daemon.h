@@ -33,7 +33,7 @@ class OwnDaemon {
   pid_t pid_;  // -1: it has ended
 };
 
-// Whether a daemon must be started to serve this: it is a data folder that none serves.
+// Whether a daemon must be started to serve this: it is the folder of a map that none serves.
 bool needs_daemon(const std::string& server);
 
 }  // namespace relmap::console

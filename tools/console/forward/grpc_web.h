@@ -41,7 +41,8 @@ std::string trailers_frame(const CallEnd& end);
 // What such a frame says; CORRUPT if it has no grpc-status. Details stay in base64.
 Result<CallEnd> read_trailers(std::string_view bytes);
 
-// The value of a grpc-timeout header: at most eight digits and one of H, M, S, m, u and n. Rounded up. nullopt: it is malformed.
+// The value of a grpc-timeout header: at most eight digits and one of H, M, S, m, u and n. Rounded up. nullopt: it is
+// malformed.
 std::optional<std::chrono::microseconds> timeout_of(std::string_view text);
 
 // Whether callers may have this method forwarded: "/relmap.v1.SERVICE/METHOD" or one of gRPC's health service.

@@ -26,7 +26,8 @@ TEST(GrpcWeb, FramesAreReadAsTheyWereWritten) {
       message = random_bytes(random, random() % 4 == 0 ? 70'000 : random() % 20);
       body += message_frame(message);
     }
-    const CallEnd end{static_cast<int>(random() % 17), random_bytes(random, random() % 30), random_bytes(random, random() % 30)};
+    const CallEnd end{static_cast<int>(random() % 17), random_bytes(random, random() % 30),
+                      random_bytes(random, random() % 30)};
     body += trailers_frame(end);
     const auto frames = frames_of(body);
     ASSERT_TRUE(frames.ok()) << frames.status().to_string();
@@ -69,7 +70,8 @@ TEST(GrpcWeb, ARequestIsOneMessage) {
 TEST(GrpcWeb, TrailersKeepTheirLinesApart) {
   const std::string frame = trailers_frame({7, "no\r\ngrpc-status:0", "\x01\x02"});
   const auto frames = frames_of(frame);
-  EXPECT_EQ(frames->at(0).bytes, "grpc-status:7\r\ngrpc-message:no%0D%0Agrpc-status%3A0\r\ngrpc-status-details-bin:AQI=\r\n");
+  EXPECT_EQ(frames->at(0).bytes,
+            "grpc-status:7\r\ngrpc-message:no%0d%0agrpc-status%3a0\r\ngrpc-status-details-bin:AQI=\r\n");
   EXPECT_EQ(read_trailers("grpc-message:x\r\n").reason(), Reason::CORRUPT);
   EXPECT_EQ(read_trailers("grpc-status:x\r\n").reason(), Reason::CORRUPT);
 }
@@ -89,10 +91,11 @@ TEST(GrpcWeb, TimeoutsHaveUnits) {
 TEST(GrpcWeb, OnlyMethodsOfTheDaemonAreForwarded) {
   EXPECT_TRUE(is_forwarded("relmap.v1.Map", "GetStatus"));
   EXPECT_TRUE(is_forwarded("grpc.health.v1.Health", "Check"));
-  for (const auto& [service, method] : {std::pair("relmap.v1.", "GetStatus"), std::pair("relmap.v2.Map", "GetStatus"),
-                                        std::pair("grpc.reflection.v1.ServerReflection", "ServerReflectionInfo"),
-                                        std::pair("relmap.v1.Map", ""), std::pair("relmap.v1.Map", "Get/Status"),
-                                        std::pair("relmap.v1.Map/x", "GetStatus"), std::pair("relmap.v1.Map", "Get\r\n")})
+  for (const auto& [service, method] :
+       {std::pair("relmap.v1.", "GetStatus"), std::pair("relmap.v2.Map", "GetStatus"),
+        std::pair("grpc.reflection.v1.ServerReflection", "ServerReflectionInfo"), std::pair("relmap.v1.Map", ""),
+        std::pair("relmap.v1.Map", "Get/Status"), std::pair("relmap.v1.Map/x", "GetStatus"),
+        std::pair("relmap.v1.Map", "Get\r\n")})
     EXPECT_FALSE(is_forwarded(service, method)) << service << "/" << method;
 }
 

@@ -37,8 +37,8 @@ TEST(Router, FindsRoutesByMethodAndParts) {
             (std::vector<std::string>{"relmap.v1.Map", "GetStatus"}));
   EXPECT_EQ(router.find("GET", "/relmap.v1.Map/GetStatus").reason(), Reason::UNSUPPORTED);
   EXPECT_EQ(router.find("DELETE", "/").reason(), Reason::UNSUPPORTED);
-  for (const std::string none : {"/frames//picture", "/frames/1:2/picture/", "/frames/1:2", "//", "/../etc/passwd",
-                                 "/frames/../../etc/passwd", "/index.html/.."})
+  for (const std::string none :
+       {"/frames//picture", "/frames/1:2/picture/", "//", "/../etc/passwd", "/frames/../../etc/passwd"})
     EXPECT_EQ(router.find("GET", none).reason(), Reason::NO_SUCH_FILE) << none;
   EXPECT_EQ(router.find("GET", "/frames/%2/picture").reason(), Reason::INVALID_ARGUMENT);
 }

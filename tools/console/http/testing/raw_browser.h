@@ -21,7 +21,7 @@
 namespace relmap::console::testing {
 
 struct Answer {
-  int status = 0;  // 0: the connection was closed without an answer
+  int status = 0;                              // 0: the connection was closed without an answer
   std::map<std::string, std::string> headers;  // names in lower case; the last of those that are repeated
   std::string body;                            // without the framing of chunks
   bool whole = false;                          // it came to its end
