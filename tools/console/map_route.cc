@@ -19,7 +19,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::chrono::seconds kLongestWait{25};
+constexpr double kLongestWait = 25;  // seconds
 constexpr milliseconds kConnectWithin{5000}, kAnswerWithin{60'000}, kSampleWithin{5000};
 constexpr double kFarthest = 1000;  // metres around a closure
 
@@ -77,6 +77,37 @@ Shown shown_of(const KeeperState& state) {
   return shown;
 }
 
+// Answers with the state of the layout, once it is newer than the one the caller has.
+struct TellState {
+  LayoutKeeper* keeper;
+  Awaitable<Response> operator()(const Request& request) const {
+    const auto after = parameter_of<std::uint64_t>(request, "after", 0);
+    const double seconds = std::clamp(parameter_of<double>(request, "wait", 0), 0.0, kLongestWait);
+    const Shown before = shown_of(keeper->state());
+    if (!request.parameter("after").empty() && seconds > 0 && before.version == after) {
+      const auto until = std::chrono::steady_clock::now() + milliseconds(static_cast<std::int64_t>(1000 * seconds));
+      co_await wait_until([kept = keeper, before] { return shown_of(kept->state()) != before; }, until);
+    }
+    co_return json(keeper->state_json());
+  }
+};
+
+struct TellSamples {
+  const HealthSamples* samples;
+  Awaitable<Response> operator()(const Request& request) const {
+    co_return json(samples->samples_json(parameter_of<std::int64_t>(request, "since", 0)));
+  }
+};
+
+// What takes more than some milliseconds: it is made on a thread for that.
+struct MakeAnswer {
+  Server* http;
+  std::function<Response(const Request&)> make;
+  Awaitable<Response> operator()(const Request& request) const {
+    co_return co_await http->on_worker([this, &request] { return make(request); });
+  }
+};
+
 }  // namespace
 
 MapRoutes::MapRoutes(std::string server, std::string authorities, std::string cache, const Login& login, Server& http)
@@ -109,19 +140,18 @@ Result<std::unique_ptr<client::Client>> MapRoutes::connect(const Caller& caller,
 }
 
 void MapRoutes::add_to(Router& router) {
-  const auto add = [&](const char* method, const char* pattern,
-                       Awaitable<Response> (MapRoutes::*answer)(const Request&),
+  const auto add = [&](const char* method, const char* pattern, Handler handler,
                        std::size_t body_limit = std::size_t{64} << 10) {
-    Route route{method, pattern, Access::kAuthorised,
-                [this, answer](const Request& request) { return (this->*answer)(request); }};
+    Route route{method, pattern, Access::kAuthorised, std::move(handler)};
     route.body_limit = body_limit;
     router.add(std::move(route));
   };
-  add("GET", "/map/layout", &MapRoutes::state);
-  add("GET", "/map/tiles/*/*/*/*", &MapRoutes::tile);
-  add("POST", "/map/places", &MapRoutes::places, std::size_t{1} << 20);
-  add("GET", "/map/local", &MapRoutes::around);
-  add("GET", "/health/samples", &MapRoutes::samples);
+  add("GET", "/map/layout", TellState{&keeper_});
+  add("GET", "/map/tiles/*/*/*/*", MakeAnswer{&http_, [this](const Request& request) { return tile(request); }});
+  add("POST", "/map/places", MakeAnswer{&http_, [this](const Request& request) { return places(request); }},
+      std::size_t{1} << 20);
+  add("GET", "/map/local", MakeAnswer{&http_, [this](const Request& request) { return around(request); }});
+  add("GET", "/health/samples", TellSamples{&samples_});
 }
 
 void MapRoutes::stop() {
@@ -129,71 +159,52 @@ void MapRoutes::stop() {
   samples_.stop();
 }
 
-Awaitable<Response> MapRoutes::state(const Request& request) {
-  const auto after = parameter_of<std::uint64_t>(request, "after", 0);
-  const auto wait = std::min<milliseconds>(
-      milliseconds(static_cast<std::int64_t>(1000 * std::clamp(parameter_of<double>(request, "wait", 0), 0.0, 60.0))),
-      kLongestWait);
-  if (!request.parameter("after").empty() && wait.count() > 0) {
-    const Shown before = shown_of(keeper_.state());
-    if (before.version == after)
-      co_await wait_until([&] { return shown_of(keeper_.state()) != before; }, std::chrono::steady_clock::now() + wait);
-  }
-  co_return json(keeper_.state_json());
-}
-
-Awaitable<Response> MapRoutes::tile(const Request& request) {
+Response MapRoutes::tile(const Request& request) {
   const auto version = number_in<std::uint64_t>(request.parts.at(0));
   const auto z = number_in<std::uint32_t>(request.parts.at(1)), x = number_in<std::uint32_t>(request.parts.at(2)),
              y = number_in<std::uint32_t>(request.parts.at(3));
   if (!version || !z || !x || !y)
-    co_return error_response({Reason::INVALID_ARGUMENT, "a tile is /map/tiles/VERSION/Z/X/Y"});
+    return error_response({Reason::INVALID_ARGUMENT, "a tile is /map/tiles/VERSION/Z/X/Y"});
   TileRequest wanted;
   wanted.version = *version;
   wanted.tile = {*z, *x, *y};
   wanted.from = parameter_of<std::uint64_t>(request, "from", 0);
   if (const std::string root = request.parameter("root"); !root.empty()) {
     wanted.root = FrameId::parse(root);
-    if (!wanted.root) co_return error_response({Reason::INVALID_ARGUMENT, "'" + root + "' is no frame: SESSION:INDEX"});
+    if (!wanted.root) return error_response({Reason::INVALID_ARGUMENT, "'" + root + "' is no frame: SESSION:INDEX"});
   }
-  auto tile = co_await http_.on_worker([&] { return keeper_.tile(wanted); });
-  if (!tile.ok()) co_return error_response(tile.status());
+  const auto made = keeper_.tile(wanted);
+  if (!made.ok()) return error_response(made.status());
   Response response;
   response.type = "application/vnd.relmap.tile";
-  if (!*tile)
-    response.status = 204;
+  if (*made)
+    response.body = **made;
   else
-    response.body = **tile;
-  // A layout of a version never changes. What its tiles have beyond their layout's points, from the daemon, may.
+    response.status = 204;
+  // The layout of a version never changes. What tiles have beyond its points, from the daemon, may.
   response.cache = "private, max-age=600";
-  co_return response;
+  return response;
 }
 
-Awaitable<Response> MapRoutes::places(const Request& request) {
-  auto places = co_await http_.on_worker([&] { return keeper_.places_json(request.body); });
-  co_return places.ok() ? json(std::move(*places)) : error_response(places.status());
+Response MapRoutes::places(const Request& request) {
+  auto found = keeper_.places_json(request.body);
+  return found.ok() ? json(std::move(*found)) : error_response(found.status());
 }
 
-Awaitable<Response> MapRoutes::around(const Request& request) {
+Response MapRoutes::around(const Request& request) const {
   LocalRequest wanted;
   const auto edge = EdgeId::parse(request.parameter("edge"));
   if (!edge)
-    co_return error_response(
+    return error_response(
         {Reason::INVALID_ARGUMENT, "'" + request.parameter("edge") + "' is no closure: SESSION:INDEX/ORDINAL"});
   wanted.edge = *edge;
   wanted.metres = std::min(parameter_of<double>(request, "metres", wanted.metres), kFarthest);
   if (request.query.contains("goes")) wanted.goes_with = edges_in(request.parameter("goes"));
   // With the caller's own credentials, since what a removal would do is told to operators only.
-  auto laid = co_await http_.on_worker([&]() -> Result<LocalLayout> {
-    auto client = connect(request.caller, kAnswerWithin);
-    if (!client.ok()) return client.status();
-    return local_layout(wanted, **client);
-  });
-  co_return laid.ok() ? json(json_of(*laid)) : error_response(laid.status());
-}
-
-Awaitable<Response> MapRoutes::samples(const Request& request) {
-  co_return json(samples_.samples_json(parameter_of<std::int64_t>(request, "since", 0)));
+  const auto client = connect(request.caller, kAnswerWithin);
+  if (!client.ok()) return error_response(client.status());
+  const auto laid = local_layout(wanted, **client);
+  return laid.ok() ? json(json_of(*laid)) : error_response(laid.status());
 }
 
 }  // namespace relmap::console

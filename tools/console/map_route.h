@@ -1,6 +1,7 @@
 // The map for drawing: /map/layout, tiles, places, small layouts, and the samples of health.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -19,17 +20,16 @@ class MapRoutes {
   // outlive it.
   MapRoutes(std::string server, std::string authorities, std::string cache, const Login& login, Server& http);
 
+  // The routes use this object.
   void add_to(Router& router);
-  // Those who wait for a newer layout are answered, and nothing is kept up any more.
+  // Nothing is kept up any more.
   void stop();
 
  private:
   Result<std::unique_ptr<client::Client>> connect(const Caller& caller, std::chrono::milliseconds deadline) const;
-  Awaitable<Response> state(const Request& request);
-  Awaitable<Response> tile(const Request& request);
-  Awaitable<Response> places(const Request& request);
-  Awaitable<Response> around(const Request& request);
-  Awaitable<Response> samples(const Request& request);
+  Response tile(const Request& request);
+  Response places(const Request& request);
+  Response around(const Request& request) const;
 
   const std::string server_, authorities_;
   Server& http_;

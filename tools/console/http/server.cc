@@ -177,7 +177,16 @@ Server::~Server() { stop(); }
 std::uint16_t Server::port() const { return impl_->port; }
 bool Server::is_local() const { return impl_->local; }
 bool Server::uses_tls() const { return impl_->tls != nullptr; }
-asio::any_io_executor Server::worker() { return impl_->workers.get_executor(); }
+
+namespace {
+
+Awaitable<Response> answer_of(std::function<Response()> work) { co_return work(); }
+
+}  // namespace
+
+Awaitable<Response> Server::on_worker(std::function<Response()> work) {
+  co_return co_await asio::co_spawn(impl_->workers, answer_of(std::move(work)), asio::use_awaitable);
+}
 
 void Server::serve(Router router, Gate gate) {
   impl_->router = std::move(router);

@@ -62,21 +62,14 @@ class Server {
   // Serves nothing any more; returns when no handler runs. Handlers that wait are not resumed.
   void stop();
 
-  // Runs `work` on a thread for what takes long, and resumes the handler with what it returns. An exception of `work`
-  // is thrown by it.
-  template <typename Work>
-  Awaitable<std::invoke_result_t<Work>> on_worker(Work work) {
-    co_return co_await boost::asio::co_spawn(worker(), run<Work>(std::move(work)), boost::asio::use_awaitable);
-  }
+  // Runs `work` on a thread for what takes long, and resumes the handler with its answer. An exception of `work` is
+  // thrown by it.
+  Awaitable<Response> on_worker(std::function<Response()> work);
 
  private:
   struct Impl;
   explicit Server(std::unique_ptr<Impl> impl);
   boost::asio::any_io_executor worker();
-  template <typename Work>
-  static Awaitable<std::invoke_result_t<Work>> run(Work work) {
-    co_return work();
-  }
   std::unique_ptr<Impl> impl_;
 };
 
