@@ -4,6 +4,7 @@
 #include <charconv>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <iostream>
 #include <optional>
 #include <string_view>
@@ -86,7 +87,9 @@ struct TellState {
     const Shown before = shown_of(keeper->state());
     if (!request.parameter("after").empty() && seconds > 0 && before.version == after) {
       const auto until = std::chrono::steady_clock::now() + milliseconds(static_cast<std::int64_t>(1000 * seconds));
-      co_await wait_until([kept = keeper, before] { return shown_of(kept->state()) != before; }, until);
+      // Has a name, since GCC 12 destroys what a temporary closure in such an expression holds twice (its bug 99576).
+      const std::function<bool()> newer = [kept = keeper, before] { return shown_of(kept->state()) != before; };
+      co_await wait_until(newer, until);
     }
     co_return json(keeper->state_json());
   }
