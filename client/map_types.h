@@ -505,6 +505,8 @@ struct DaemonStatus {
   std::string version, boot_id, data_folder, lcm_url;
   std::string commit;     // of the source that the daemon was built from; empty: not known
   std::string log_level;  // trace, debug, info, warning or error
+  // Of who asks: the name in the credentials, and reader, robot or operator.
+  std::string caller_name, caller_role;
   MapIdentity map;        // not known() if the daemon does not report it
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;

@@ -25,6 +25,8 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   if (const auto uuid = Uuid::parse(m.map_uuid())) s.map = {*uuid, m.map_epoch()};
   s.data_folder = m.data_folder();
   s.lcm_url = m.lcm_url();
+  s.caller_name = m.caller_name();
+  s.caller_role = m.caller_role();
   s.pid = m.pid();
   s.uptime_us = m.uptime_us();
   s.deterministic = m.deterministic();

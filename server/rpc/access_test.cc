@@ -173,6 +173,20 @@ TEST_F(AccessTest, EachRoleMayCallWhatIsForItAndNothingElse) {
   }
 }
 
+TEST_F(AccessTest, StatusTellsCallersWhoTheyAre) {
+  start();
+  const auto told = [&](const std::shared_ptr<grpc::Channel>& by) {
+    grpc::ClientContext context;
+    v1::GetStatusReply reply;
+    const grpc::Status status = v1::Map::NewStub(by)->GetStatus(&context, {}, &reply);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return reply.caller_name() + " " + reply.caller_role();
+  };
+  EXPECT_EQ(told(channel(fleet_.certificate(Role::kRobot, "cart"))), "cart robot");
+  EXPECT_EQ(told(channel(fleet_.token(Role::kReader, "ann"))), "ann reader");
+  EXPECT_EQ(told(open(socket(), grpc::InsecureChannelCredentials())), "local operator");
+}
+
 TEST_F(AccessTest, AnEditIsOfTheCallerWhomTheCredentialsName) {
   const auto boss = fleet_.certificate(Role::kOperator, "boss");
   const auto ann = fleet_.token(Role::kOperator, "ann");

@@ -307,6 +307,7 @@ Status Call::admit_caller(std::size_t bytes) {
   if (!caller.ok()) return caller.status();
   caller_ = std::move(*caller);
   request_.caller = caller_.name;
+  request_.role = access::role_name(caller_.role);
   known_peer_ = context_->peer();
   gateway_.connections_.call_begins(known_peer_);
   if (Status may = check_role(caller_); !may.ok()) return may;

@@ -10,6 +10,7 @@ struct RequestContext {
   std::string request_id;   // the caller's x-request-id, or one that the daemon made
   std::string traceparent;  // as the caller gave it (W3C Trace Context); empty: none
   std::string caller = {};  // the name in the caller's credentials; empty: the call is not admitted yet
+  std::string role = {};    // and the role there: reader, robot or operator
 
   // The 32 hexadecimal digits that name the trace; empty: none.
   std::string_view trace_id() const;

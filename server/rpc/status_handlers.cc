@@ -9,6 +9,7 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/log_level.h"
 #include "server/rpc/messages.h"
+#include "server/rpc/request_context.h"
 
 namespace relmap::rpc {
 
@@ -203,6 +204,10 @@ Result<v1::GetStatusReply> get_status(const v1::GetStatusRequest&, const Deadlin
   }
   if (health) put_health(health(), reply);
   reply.set_log_level(log_level());
+  if (const RequestContext* const request = current_request()) {
+    reply.set_caller_name(request->caller);
+    reply.set_caller_role(request->role);
+  }
   put_methods(metrics, reply);
   return reply;
 }

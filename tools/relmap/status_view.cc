@@ -150,6 +150,7 @@ void print_status(const StatusMoment& now, bool all, terminal::Console& console)
                      (s.deterministic ? ", deterministic" : "")},
       {"data", s.data_folder},
       {"log level", s.log_level},
+      {"you", s.caller_role.empty() ? "not told by this daemon" : s.caller_name + ", " + s.caller_role},
       {"storage", s.storage.ok() ? "OK" : std::string(reason_name(s.storage.reason())) + ", see above"},
       {"lcm",
        s.lcm.ok() ? (s.lcm_url.empty() ? "off" : s.lcm_url) : std::string(reason_name(s.lcm.reason())) + ", see above"},

@@ -70,6 +70,7 @@ class DaemonStatus:
         version, commit: of relmapd.
         boot_id: new at every start.
         pid, uptime_us, data_folder, log_level, deterministic: of the process.
+        caller_name, caller_role: of who asks: the name in the credentials, and reader, robot or operator.
         storage, lcm, access, certificate, connections: conditions of its parts.
         components: conditions of storage, worker and intake.
         map_uuid, map_epoch: which map it serves.
@@ -94,6 +95,8 @@ class DaemonStatus:
     uptime_us: int
     data_folder: str
     log_level: str
+    caller_name: str
+    caller_role: str
     deterministic: bool
     storage: Condition
     lcm: Condition
@@ -229,6 +232,8 @@ def read_status(m: status_pb2.GetStatusReply) -> DaemonStatus:
         uptime_us=m.uptime_us,
         data_folder=m.data_folder,
         log_level=m.log_level,
+        caller_name=m.caller_name,
+        caller_role=m.caller_role,
         deterministic=m.deterministic,
         storage=Condition(Reason(m.storage_reason), m.storage_message),
         lcm=Condition(Reason(m.lcm_reason), m.lcm_message),
