@@ -110,25 +110,25 @@ TEST(MapShape, ContradictionsAreTearsOfTheClosure) {
 
 TEST(MapShape, ATornClosureIsListedOnce) {
   const auto strain = [](std::uint32_t index, double sigmas) {
-    Tear tear;
+    client::Tear tear;
     tear.edge = {point_at(index), 1};
     tear.a = point_at(0);
     tear.b = point_at(index);
     tear.sigmas = sigmas;
     return tear;
   };
-  Tear motion = strain(5, 8);
+  client::Tear motion = strain(5, 8);
   motion.edge = {};
-  const std::vector<Tear> tears{strain(1, 20), strain(2, 9), motion},
+  const std::vector<client::Tear> tears{strain(1, 20), strain(2, 9), motion},
       closures{strain(1, 20), strain(2, 9), strain(3, 2)};
-  EXPECT_THAT(tear_lines(tears, closures, 8),
+  EXPECT_THAT(client::tear_lines(tears, closures, 8),
               ElementsAre(HasSubstr("tear: 1:1/1 from "), HasSubstr("tear: 1:2/1 from "),
                           HasSubstr("tear: motion from "), HasSubstr("stretched closure: 1:3/1 from ")));
-  EXPECT_THAT(tear_lines(tears, closures, 1),
+  EXPECT_THAT(client::tear_lines(tears, closures, 1),
               ElementsAre(HasSubstr("tear: 1:1/1 from "), "3 tears in all", HasSubstr("stretched closure: 1:2/1 from "),
                           HasSubstr("stretched closure: 1:3/1 from ")))
       << "what the list of tears leaves out is not lost";
-  EXPECT_THAT(tear_lines({}, {strain(3, 2)}, 8),
+  EXPECT_THAT(client::tear_lines({}, {strain(3, 2)}, 8),
               ElementsAre("no tear: the picture stretches no edge by more than 6 sigmas",
                           HasSubstr("stretched closure: 1:3/1 from ")));
 }
