@@ -5,7 +5,7 @@ import { EdgeState } from '../src/proto/relmap/v1/graph_pb';
 import { EditEffectSchema } from '../src/proto/relmap/v1/map_pb';
 import { Reason } from '../src/proto/relmap/v1/reason_pb';
 import {
-  conflictOf, lastToUndo, possible, readList, requestOf, undoOf, withDone, withUndone, type Done,
+  conflictOf, isOld, lastToUndo, possible, readList, requestOf, undoOf, withDone, withUndone, type Done,
 } from '../src/views/review/edits';
 
 const done = (id: string): Done => ({
@@ -42,6 +42,14 @@ test('the history takes back the newest edit that stands', () => {
   assert.deepEqual(readList(JSON.stringify(list)), list);
   assert.deepEqual(readList('{"x":'), []);
   assert.deepEqual(readList('[null, {"name": 3}]'), []);
+});
+
+test('what this tab did itself is no news', () => {
+  const list = [done('1')]; // of 2:5/1, in record 70
+  assert.equal(isOld(list, { name: '2:5/1', sequence: '69' }), true);
+  assert.equal(isOld(list, { name: '2:9/1', sequence: '70' }), true); // went with it
+  assert.equal(isOld(list, { name: '2:9/1', sequence: '69' }), false);
+  assert.equal(isOld(list, { name: '2:5/1', sequence: '71' }), false);
 });
 
 test('somebody else’s later edit is told before undoing', () => {

@@ -127,9 +127,9 @@ export function routeRequest(
   };
 }
 
-// The parameters with which the map shows this route.
+// The parameters of the map for this route: it goes to the start, and has the ends.
 export function mapParameters(first: Parameters<typeof frameText>[0], last: Parameters<typeof frameText>[0], how: How): Record<string, string> {
-  const parameters: Record<string, string> = { route: '1', from: frameText(first), to: frameText(last) };
+  const parameters: Record<string, string> = { frame: frameText(first), from: frameText(first), to: frameText(last) };
   for (const [name, value] of Object.entries(writeHow(how))) if (value && name !== 'alternatives') parameters[name] = value;
   return parameters;
 }

@@ -122,6 +122,15 @@ export function lastToUndo(list: Done[]): Done | null {
   return list.find((done) => !done.undone && !done.byUndo) ?? null;
 }
 
+// Whether an event tells of one of these edits, or of what happened to a closure before the last of them.
+export function isOld(list: Done[], event: { name: string; sequence: string }): boolean {
+  const at = BigInt(event.sequence || 0);
+  return list.some(({ name, sequence }) => {
+    const done = BigInt(sequence || 0);
+    return done === at || (name === event.name && done > at);
+  });
+}
+
 // Others have changed the closure since: undoing is still asked for, but whoever does it should know. "" if not.
 export function conflictOf(
   done: Done,
