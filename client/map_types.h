@@ -507,7 +507,7 @@ struct DaemonStatus {
   std::string log_level;  // trace, debug, info, warning or error
   // Of who asks: the name in the credentials, and reader, robot or operator.
   std::string caller_name, caller_role;
-  MapIdentity map;        // not known() if the daemon does not report it
+  MapIdentity map;  // not known() if the daemon does not report it
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;
   bool deterministic = false;

@@ -317,7 +317,8 @@ TEST_F(Operator, ListsTheMostSuspiciousClosuresAndSeesThemOnASheet) {
   EXPECT_THAT(relmap({"edges", "--loops", "--near", "1:5", "--within", "1"}).standard_output, HasSubstr(ids[0]));
   EXPECT_THAT(relmap({"edges", "--loops", "--session", "1,1"}).standard_output, HasSubstr(ids[3]));
   EXPECT_THAT(relmap({"edges", "--loops", "--until", "1970-01-02"}).standard_output, Not(HasSubstr(ids[0])));
-  EXPECT_THAT(relmap({"edges", "--loops", "--since", "tomorrow"}).standard_error, HasSubstr("is no time; write 2026-11-30"));
+  EXPECT_THAT(relmap({"edges", "--loops", "--since", "tomorrow"}).standard_error,
+              HasSubstr("is no time; write 2026-11-30"));
   EXPECT_THAT(relmap({"edges", "--session", "1,nobody"}).standard_error, HasSubstr("NO_SUCH_SESSION"));
 
   const Finished drawn = relmap({"edges", "--by", "suspicion", "--limit", "2", "--out", folder_ / "sheet.svg"});

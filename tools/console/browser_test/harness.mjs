@@ -131,7 +131,7 @@ export async function goTo(page, title) {
 
 export async function shot(page, name) {
   mkdirSync(shots, { recursive: true });
-  await page.screenshot({ path: join(shots, `${name}.png`) });
+  await page.screenshot({ path: join(shots, `${name}.jpg`), type: 'jpeg', quality: 82 });
 }
 
 // Fails on what keeps people with a keyboard, a screen reader or weak eyes out.
