@@ -52,11 +52,12 @@ test('a reader sees everything, and is offered no edit; a revoked token asks for
   const console = await startConsole(t, `127.0.0.1:${port}`, ['--credentials', join(credentials, 'ca.crt')]);
   const page = await open(t, console.value);
   await shot(page, 'login');
-  await page.getByLabel('Token').fill('not a token');
+  await page.getByLabel("Token", { exact: true }).fill('not a token');
   await page.getByRole('button', { name: 'Log in' }).click();
   await page.getByText('The login failed.').waitFor();
-  const token = /[0-9a-f]{64}/.exec(readFileSync(join(credentials, 'reader.pem'), 'utf8'))[0];
-  await page.getByLabel('Token').fill(token);
+  const [, body] = /BEGIN RELMAP TOKEN-----([^-]*)-----/.exec(readFileSync(join(credentials, 'reader.pem'), 'utf8'));
+  const token = Buffer.from(body, 'base64').toString();
+  await page.getByLabel("Token", { exact: true }).fill(token);
   await page.getByRole('button', { name: 'Log in' }).click();
   await page.getByText('dashboard (reader)').waitFor();
   await page.waitForFunction(() => window.relmapMap?.complete && window.relmapMap.vertices > 0);
