@@ -174,6 +174,8 @@ TEST_F(AccessTest, EachRoleMayCallWhatIsForItAndNothingElse) {
 }
 
 TEST_F(AccessTest, StatusTellsCallersWhoTheyAre) {
+  const auto cart = fleet_.certificate(Role::kRobot, "cart");
+  const auto ann = fleet_.token(Role::kReader, "ann");
   start();
   const auto told = [&](const std::shared_ptr<grpc::Channel>& by) {
     grpc::ClientContext context;
@@ -182,8 +184,8 @@ TEST_F(AccessTest, StatusTellsCallersWhoTheyAre) {
     EXPECT_TRUE(status.ok()) << status.error_message();
     return reply.caller_name() + " " + reply.caller_role();
   };
-  EXPECT_EQ(told(channel(fleet_.certificate(Role::kRobot, "cart"))), "cart robot");
-  EXPECT_EQ(told(channel(fleet_.token(Role::kReader, "ann"))), "ann reader");
+  EXPECT_EQ(told(channel(cart)), "cart robot");
+  EXPECT_EQ(told(channel(ann)), "ann reader");
   EXPECT_EQ(told(open(socket(), grpc::InsecureChannelCredentials())), "local operator");
 }
 
