@@ -16,15 +16,17 @@ namespace relmap::testing {
 inline const std::filesystem::path kSourceTree = RELMAP_SOURCE_DIR;
 
 // All files below the named folders of the source tree that have one of these extensions, as paths relative to the
-// tree.
+// tree; without what npm installs there, which others wrote.
 inline std::vector<std::string> files_in(std::initializer_list<const char*> folders,
                                          std::initializer_list<const char*> endings) {
   std::vector<std::string> files;
   for (const char* folder : folders)
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(kSourceTree / folder))
-      if (entry.is_regular_file() &&
-          std::find(endings.begin(), endings.end(), entry.path().extension()) != endings.end())
-        files.push_back(std::filesystem::relative(entry.path(), kSourceTree).string());
+    for (std::filesystem::recursive_directory_iterator entry(kSourceTree / folder), end; entry != end; ++entry) {
+      if (entry->path().filename() == "node_modules") entry.disable_recursion_pending();
+      if (entry->is_regular_file() &&
+          std::find(endings.begin(), endings.end(), entry->path().extension()) != endings.end())
+        files.push_back(std::filesystem::relative(entry->path(), kSourceTree).string());
+    }
   return files;
 }
 

@@ -1,6 +1,7 @@
 #include "tools/console/forward_route.h"
 
 #include <array>
+#include <functional>
 #include <utility>
 
 #include "tools/console/forward/grpc_web.h"
@@ -48,8 +49,10 @@ Awaitable<std::optional<Response>> forward(DaemonLink& link, Request& request, R
   Response head;
   head.type = kType;
   stream.begin(std::move(head));
+  // Has a name, since GCC 12 destroys what a temporary closure in such an expression holds twice (its bug 99576).
+  const std::function<bool()> gone = [&stream] { return stream.gone(); };
   for (;;) {
-    const std::optional<std::string> next = co_await call.next([&stream] { return stream.gone(); });
+    const std::optional<std::string> next = co_await call.next(gone);
     if (!next) break;
     co_await stream.write(message_frame(*next));
   }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import uuid
 from typing import Any, Callable, Iterator
 
@@ -27,7 +28,8 @@ CALLS: dict[str, Callable[[Any, Any], Any]] = {
     "skeleton": lambda c, s: c.skeleton(3, sessions=s).frames_total,
     "draw_map": lambda c, s: c.draw_map(sessions=[s]).svg,
     "closure_matrix": lambda c, s: tuple(c.closure_matrix([s])),
-    "verify": lambda c, s: c.verify([s]),
+    # Its journal is trimmed by commits meanwhile.
+    "verify": lambda c, s: dataclasses.replace(c.verify([s]), journal_records=0),
     "watch": lambda c, s: next(e for e in c.watch(sessions=s, oldest=True) if isinstance(e, events.FramesAdded)),
     "localise, camera": lambda c, s: _reason(lambda: c.localise(np.zeros((384, 512), np.uint8), camera=s)),
     "match_image, camera": lambda c, s: _reason(lambda: c.match_image(relmap.View(left=_GREY, camera=s))),
