@@ -20,9 +20,9 @@ namespace {
 constexpr std::size_t kMaxWordsWidth = 48;  // of the words that a value may be, in the line of the option's name
 
 // The programs that have a page, and its section.
-const std::map<std::string, int> kPages = {{"relmap", 1},          {"relmap-admin", 8}, {"relmap-camera", 1},
-                                           {"relmap-frontend", 1}, {"relmap-sim", 1},   {"relmap-vocab", 1},
-                                           {"relmapd", 8}};
+const std::map<std::string, int> kPages = {{"relmap", 1},         {"relmap-admin", 8},    {"relmap-camera", 1},
+                                           {"relmap-console", 1}, {"relmap-frontend", 1}, {"relmap-sim", 1},
+                                           {"relmap-vocab", 1},   {"relmapd", 8}};
 
 std::string upper(std::string text) {
   for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
