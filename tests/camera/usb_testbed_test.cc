@@ -429,22 +429,24 @@ TEST_F(UsbTestbedTest, FramesAreShortLongTornAndShiftedAsAsked) {
   EXPECT_EQ(frame_bytes / 2, stream.came[0].size);
   EXPECT_TRUE(stream.came[1].number);
 
+  // The first transfer from `seen` on that is as asked. On a busy machine several come before they are looked at.
   std::size_t seen = stream.came.size();
+  const auto comes = [&](auto as_asked) {
+    return stream.handle_events(seconds(60), [&] {
+      while (seen < stream.came.size() && !as_asked(stream.came[seen])) ++seen;
+      return seen < stream.came.size();
+    });
+  };
   camera->fail([](CameraFaults& faults) { faults.torn_frames = 1; });
-  ASSERT_TRUE(stream.handle_events(seconds(60), [&] { return !stream.came.back().number; }));
-  EXPECT_EQ(frame_bytes, stream.came.back().size);
-  seen = stream.came.size();
-  ASSERT_TRUE(stream.wait_for(seen + 1));
-  EXPECT_TRUE(stream.came[seen].number);
+  ASSERT_TRUE(comes([](const auto& transfer) { return !transfer.number; }));
+  EXPECT_EQ(frame_bytes, stream.came[seen].size);
+  ASSERT_TRUE(stream.wait_for(seen + 2));
+  EXPECT_TRUE(stream.came[seen + 1].number);
 
   // Babble: a packet of 512 bytes where there is room for less; its rest comes as a transfer of its own.
   camera->fail([](CameraFaults& faults) { faults.long_frames = 1; });
   seen = stream.came.size();
-  const auto babbled = [&] {
-    while (seen < stream.came.size() && stream.came[seen].status != LIBUSB_TRANSFER_OVERFLOW) ++seen;
-    return seen < stream.came.size();
-  };
-  ASSERT_TRUE(stream.handle_events(seconds(60), babbled));
+  ASSERT_TRUE(comes([](const auto& transfer) { return transfer.status == LIBUSB_TRANSFER_OVERFLOW; }));
   ASSERT_TRUE(stream.wait_for(seen + 3));
   EXPECT_LT(stream.came[seen + 1].size, 1000u);
   EXPECT_TRUE(stream.came[seen + 2].number);
@@ -452,9 +454,9 @@ TEST_F(UsbTestbedTest, FramesAreShortLongTornAndShiftedAsAsked) {
   // The end of the frame after it is short, and what follows begins anew.
   camera->fail([](CameraFaults& faults) { faults.shifted_frames = 1; });
   seen = stream.came.size();
-  ASSERT_TRUE(stream.handle_events(seconds(60), [&] { return stream.came.back().size < frame_bytes; }));
-  ASSERT_TRUE(stream.wait_for(stream.came.size() + 1));
-  EXPECT_TRUE(stream.came.back().number);
+  ASSERT_TRUE(comes([&](const auto& transfer) { return transfer.size < frame_bytes; }));
+  ASSERT_TRUE(stream.wait_for(seen + 2));
+  EXPECT_TRUE(stream.came[seen + 1].number);
 }
 
 TEST_F(UsbTestbedTest, ASilenceSkipsTheFramesOfItsTime) {
