@@ -76,7 +76,8 @@ export function startDaemon(test, folder, args = []) {
 
 // value: the address to open, with the key where one is needed.
 export function startConsole(test, server, args = []) {
-  return start(test, 'relmap-console', [server, '--listen', '127.0.0.1:0', '--cache', temporaryFolder(test), ...args],
+  const cache = args.includes('--cache') ? [] : ['--cache', temporaryFolder(test)];
+  return start(test, 'relmap-console', [server, '--listen', '127.0.0.1:0', ...cache, ...args],
     (line) => /(https?:\/\/\S+)/.exec(line)?.[1]);
 }
 
