@@ -52,7 +52,7 @@ Result<std::unique_ptr<Console>> Console::start(const ConsoleOptions& options) {
 
 Console::~Console() {
   if (map_) map_->stop();
-  server_->stop();
+  if (server_) server_->stop();  // not there if the start failed
   link_.reset();
   server_.reset();  // with the coroutines that still wait, which use the login
 }
