@@ -65,8 +65,10 @@ class ConsoleLayout : public ::testing::Test {
   static json wait_for(LayoutKeeper& keeper, const std::function<bool(const json&)>& wanted) {
     const auto until = std::chrono::steady_clock::now() + kPatience;
     json state = json::parse(keeper.state_json());
-    while (!wanted(state) && std::chrono::steady_clock::now() < until)
-      state = json::parse(keeper.state_json(state["version"].get<std::uint64_t>(), std::chrono::milliseconds(200)));
+    while (!wanted(state) && std::chrono::steady_clock::now() < until) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      state = json::parse(keeper.state_json());
+    }
     EXPECT_TRUE(wanted(state)) << state.dump();
     return state;
   }

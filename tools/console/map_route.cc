@@ -6,12 +6,13 @@
 #include <cstdint>
 #include <functional>
 #include <iostream>
-#include <optional>
+#include <memory>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "client/relmap_client.h"
+#include "proto/base/read_number.h"
 #include "tools/console/layout/local_layout.h"
 
 namespace relmap::console {
@@ -24,22 +25,26 @@ constexpr double kLongestWait = 25;  // seconds
 constexpr milliseconds kConnectWithin{5000}, kAnswerWithin{60'000}, kSampleWithin{5000};
 constexpr double kFarthest = 1000;  // metres around a closure
 
-template <typename Number>
-std::optional<Number> number_in(std::string_view text) {
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+Status no_number(const std::string& name, const std::string& text) {
+  return {Reason::INVALID_ARGUMENT, "'" + name + "' is no number that can be: " + text};
+}
+
+// The number that a parameter gives, or 0 if it is not there.
+std::uint64_t number_of(const Request& request, const std::string& name) {
+  const std::string text = request.parameter(name);
+  std::uint64_t number = 0;
+  if (!text.empty() && !read_number(text, number)) throw StatusError(no_number(name, text));
   return number;
 }
 
-// The number that a parameter gives, or `otherwise` if it is not there.
-template <typename Number>
-Number parameter_of(const Request& request, const std::string& name, Number otherwise) {
+// The same with a fraction; `otherwise` if it is not there.
+double decimal_of(const Request& request, const std::string& name, double otherwise) {
   const std::string text = request.parameter(name);
   if (text.empty()) return otherwise;
-  const auto number = number_in<Number>(text);
-  if (!number) throw StatusError({Reason::INVALID_ARGUMENT, "'" + name + "' is no number that can be: " + text});
-  return *number;
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) throw StatusError(no_number(name, text));
+  return number;
 }
 
 Response json(std::string text) {
@@ -61,34 +66,17 @@ std::vector<EdgeId> edges_in(std::string_view text) {
   return edges;
 }
 
-// What a layout says of itself changes when one of these does.
-struct Shown {
-  std::uint64_t version = 0, done = 0;
-  std::string step;
-  Reason error = Reason::OK, empty = Reason::OK;
-  bool operator==(const Shown&) const = default;
-};
-
-Shown shown_of(const KeeperState& state) {
-  Shown shown;
-  if (state.layout) shown.version = state.layout->version;
-  if (state.progress) shown.step = state.progress->step, shown.done = state.progress->done;
-  shown.error = state.error.reason();
-  shown.empty = state.empty.reason();
-  return shown;
-}
-
 // Answers with the state of the layout, once it is newer than the one the caller has.
 struct TellState {
   LayoutKeeper* keeper;
   Awaitable<Response> operator()(const Request& request) const {
-    const auto after = parameter_of<std::uint64_t>(request, "after", 0);
-    const double seconds = std::clamp(parameter_of<double>(request, "wait", 0), 0.0, kLongestWait);
-    const Shown before = shown_of(keeper->state());
-    if (!request.parameter("after").empty() && seconds > 0 && before.version == after) {
+    const std::uint64_t after = number_of(request, "after"), seen = keeper->changes();
+    const double seconds = std::clamp(decimal_of(request, "wait", 0), 0.0, kLongestWait);
+    const std::shared_ptr<const MapLayout> layout = keeper->state().layout;
+    if (!request.parameter("after").empty() && seconds > 0 && (layout ? layout->version : 0) == after) {
       const auto until = std::chrono::steady_clock::now() + milliseconds(static_cast<std::int64_t>(1000 * seconds));
       // Has a name, since GCC 12 destroys what a temporary closure in such an expression holds twice (its bug 99576).
-      const std::function<bool()> newer = [kept = keeper, before] { return shown_of(kept->state()) != before; };
+      const std::function<bool()> newer = [kept = keeper, seen] { return kept->changes() != seen; };
       co_await wait_until(newer, until);
     }
     co_return json(keeper->state_json());
@@ -98,7 +86,7 @@ struct TellState {
 struct TellSamples {
   const HealthSamples* samples;
   Awaitable<Response> operator()(const Request& request) const {
-    co_return json(samples->samples_json(parameter_of<std::int64_t>(request, "since", 0)));
+    co_return json(samples->samples_json(static_cast<std::int64_t>(number_of(request, "since"))));
   }
 };
 
@@ -163,15 +151,11 @@ void MapRoutes::stop() {
 }
 
 Response MapRoutes::tile(const Request& request) {
-  const auto version = number_in<std::uint64_t>(request.parts.at(0));
-  const auto z = number_in<std::uint32_t>(request.parts.at(1)), x = number_in<std::uint32_t>(request.parts.at(2)),
-             y = number_in<std::uint32_t>(request.parts.at(3));
-  if (!version || !z || !x || !y)
-    return error_response({Reason::INVALID_ARGUMENT, "a tile is /map/tiles/VERSION/Z/X/Y"});
   TileRequest wanted;
-  wanted.version = *version;
-  wanted.tile = {*z, *x, *y};
-  wanted.from = parameter_of<std::uint64_t>(request, "from", 0);
+  if (!read_number(request.parts.at(0), wanted.version) || !read_number(request.parts.at(1), wanted.tile.zoom) ||
+      !read_number(request.parts.at(2), wanted.tile.x) || !read_number(request.parts.at(3), wanted.tile.y))
+    return error_response({Reason::INVALID_ARGUMENT, "a tile is /map/tiles/VERSION/Z/X/Y"});
+  wanted.from = number_of(request, "from");
   if (const std::string root = request.parameter("root"); !root.empty()) {
     wanted.root = FrameId::parse(root);
     if (!wanted.root) return error_response({Reason::INVALID_ARGUMENT, "'" + root + "' is no frame: SESSION:INDEX"});
@@ -201,7 +185,7 @@ Response MapRoutes::around(const Request& request) const {
     return error_response(
         {Reason::INVALID_ARGUMENT, "'" + request.parameter("edge") + "' is no closure: SESSION:INDEX/ORDINAL"});
   wanted.edge = *edge;
-  wanted.metres = std::min(parameter_of<double>(request, "metres", wanted.metres), kFarthest);
+  wanted.metres = std::min(decimal_of(request, "metres", wanted.metres), kFarthest);
   if (request.query.contains("goes")) wanted.goes_with = edges_in(request.parameter("goes"));
   // With the caller's own credentials, since what a removal would do is told to operators only.
   const auto client = connect(request.caller, kAnswerWithin);

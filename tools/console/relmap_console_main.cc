@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -11,11 +10,13 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "client/relmap_client.h"
 #include "proto/access/credentials.h"
+#include "proto/base/read_number.h"
 #include "proto/base/version.h"
 #include "server/service/service_manager.h"
 #include "tools/console/console.h"
@@ -126,9 +127,7 @@ Status parse_listen(const std::string& text, console::ServerOptions& options) {
   const std::size_t colon = text.rfind(':');
   const Status bad{Reason::INVALID_ARGUMENT, "--listen " + text + " is no HOST:PORT"};
   if (colon == std::string::npos || colon == 0) return bad;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, options.port);
-  if (error != std::errc{} || stop != end) return bad;
+  if (!read_number(std::string_view(text).substr(colon + 1), options.port)) return bad;
   options.host = text.substr(0, colon);
   if (options.host.size() > 2 && options.host.front() == '[' && options.host.back() == ']')
     options.host = options.host.substr(1, options.host.size() - 2);

@@ -1,17 +1,13 @@
 // Serves browsers over HTTP/1.1, with or without TLS (Boost.Beast).
 #pragma once
 
-#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "proto/base/status.h"
@@ -69,7 +65,6 @@ class Server {
  private:
   struct Impl;
   explicit Server(std::unique_ptr<Impl> impl);
-  boost::asio::any_io_executor worker();
   std::unique_ptr<Impl> impl_;
 };
 

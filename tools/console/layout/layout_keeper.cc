@@ -43,20 +43,12 @@ KeeperState LayoutKeeper::state() const {
   return state_;
 }
 
-std::string LayoutKeeper::state_json(std::optional<std::uint64_t> after, std::chrono::milliseconds wait) {
-  KeeperState state;
-  {
-    const MutexLock lock(mutex_);
-    const std::uint64_t seen = changes_;
-    if (after)
-      static_cast<void>(changed_.wait_for(mutex_, wait, [&]() RELMAP_REQUIRES(mutex_) {
-        const std::uint64_t version = state_.layout ? state_.layout->version : 0;
-        return stopping_ || version != *after || changes_ != seen;
-      }));
-    state = state_;
-  }
-  return json_of(state);
+std::uint64_t LayoutKeeper::changes() const {
+  const MutexLock lock(mutex_);
+  return changes_;
 }
+
+std::string LayoutKeeper::state_json() const { return json_of(state()); }
 
 Result<TileSource::TileBytes> LayoutKeeper::tile(const TileRequest& request) {
   std::shared_ptr<const TileIndex> index, old;

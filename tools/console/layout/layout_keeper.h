@@ -61,9 +61,10 @@ class LayoutKeeper {
   Result<std::shared_ptr<client::Client>> client() { return connected(); }
 
   KeeperState state() const;
-  // The answer to /map/layout. With `after` it waits, no longer than `wait`, until the layout is not of this version,
-  // or its progress or an error has changed.
-  std::string state_json(std::optional<std::uint64_t> after = {}, std::chrono::milliseconds wait = {});
+  // Grows whenever the layout, its progress, an error or what `empty` says has changed.
+  std::uint64_t changes() const;
+  // The answer to /map/layout.
+  std::string state_json() const;
   // The answer to /map/tiles; null: nothing is there. VIEW_EXPIRED: the layout of this version, or of `from`, is gone.
   // The reasons of TileSource::tile().
   Result<TileSource::TileBytes> tile(const TileRequest& request);
