@@ -159,6 +159,12 @@ struct Unmeasured {
   double distance_m = 0;                          // of all stretches: the part of the length that is a guess
 };
 
+// A relative pose as the robot itself or a closure's verification measured it, before anything was refined.
+struct Measurement {
+  SE3 T_ab;
+  Matrix6 covariance = Matrix6::Identity();
+};
+
 struct Edge {
   EdgeId id;
   FrameId a, b;  // older, newer
@@ -186,6 +192,7 @@ struct Edge {
   std::optional<CarriedStretch> carried = {};  // of a closure which shows that
   std::optional<Suspicion> suspicion = {};     // of a closure; absent: the daemon does not judge it
   std::int64_t time_us = 0;                    // when its newer end was taken, UTC; 0: the daemon does not tell
+  std::optional<Measurement> measured = {};    // what T_ab was at first; absent: the daemon does not tell
 };
 
 struct Frame {

@@ -200,6 +200,11 @@ Result<Edge> read_edge(const v1::Edge& message) {
   if (message.has_carried()) edge.carried = read_carried(message.carried());
   if (message.has_suspicion()) edge.suspicion = read_suspicion(message.suspicion());
   edge.time_us = message.time_us();
+  if (message.has_measured()) {
+    const auto measured = from_wire(message.measured().a_from_b());
+    if (!measured.ok()) return ill_formed("edge", measured.status());
+    edge.measured = {*measured, read_covariance(message.measured().covariance())};
+  }
   if (!message.has_uniqueness()) return edge;
   const v1::Uniqueness& found = message.uniqueness();
   Uniqueness& uniqueness = edge.uniqueness.emplace();

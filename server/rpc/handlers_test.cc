@@ -881,6 +881,18 @@ TEST_F(Handlers, AnEdgeTellsWhetherItIsMeasured) {
   EXPECT_TRUE(edge_message(step, 0).unmeasured());
 }
 
+TEST_F(Handlers, AnEdgeTellsWhatWasMeasuredAndWhatItIsNow) {
+  storage::Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
+  step.prior_T_ab = step.T_ab * SE3::exp((Vector6() << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03).finished());
+  step.prior_covariance = 4 * Matrix6::Identity();
+  const v1::Edge message = edge_message(step, 0);
+  const auto was = from_wire(message.measured().a_from_b()), is = from_wire(message.a_from_b());
+  ASSERT_TRUE(was.ok() && is.ok());
+  EXPECT_LT((was->t - step.prior_T_ab.t).norm() + (was->R - step.prior_T_ab.R).norm(), 1e-9);
+  EXPECT_LT((is->t - step.T_ab.t).norm() + (is->R - step.T_ab.R).norm(), 1e-9);
+  EXPECT_EQ(message.measured().covariance().upper(0), 4);
+}
+
 TEST_F(Handlers, AMonoSessionHasNeitherEdgesNorATrajectory) {
   v1::ListEdgesRequest edges;
   edges.set_page_size(5000);

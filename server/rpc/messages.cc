@@ -122,6 +122,8 @@ v1::Edge edge_message(const storage::Edge& edge, std::int64_t time_us) {
   }
   tell_suspicion(edge, message);
   message.set_time_us(time_us);
+  *message.mutable_measured()->mutable_a_from_b() = to_wire(edge.prior_T_ab);
+  *message.mutable_measured()->mutable_covariance() = to_wire(edge.prior_covariance);
   return message;
 }
 

@@ -197,6 +197,19 @@ class UnmeasuredStretch:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Measurement(Record):
+    """A relative pose as the robot itself or a closure's verification measured it, before anything was refined.
+
+    Attributes:
+        T_ab: 4 x 4, relative pose of b in a, metres.
+        cov: 6 x 6, covariance of T_ab exp(xi).
+    """
+
+    T_ab: Array
+    cov: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Edge(Record):
     """An edge of the map: a step of a robot's motion, or a loop closure.
 
@@ -221,6 +234,7 @@ class Edge(Record):
         carried: of a closure which shows that.
         suspicion: of a closure: what speaks against it.
         time_us: when its newer end was taken, microseconds UTC; 0: the daemon does not tell.
+        measured: what T_ab was before anything was refined; None: the daemon does not tell.
     """
 
     id: EdgeId
@@ -250,6 +264,7 @@ class Edge(Record):
     carried: Optional[CarriedStretch]
     suspicion: Optional[Suspicion]
     time_us: int
+    measured: Optional[Measurement] = None
 
     @property
     def T(self) -> Array:
@@ -544,6 +559,10 @@ def _read_suspicion(message: graph_pb2.Suspicion) -> Suspicion:
     return Suspicion(message.value, doubts, message.remark)
 
 
+def _read_measurement(message: graph_pb2.Measurement) -> Measurement:
+    return Measurement(read_transform(message.a_from_b), read_covariance(message.covariance))
+
+
 @reads_reply
 def read_edge(message: graph_pb2.Edge) -> Edge:
     """The edge of a message."""
@@ -575,6 +594,7 @@ def read_edge(message: graph_pb2.Edge) -> Edge:
         carried=read_carried(message.carried) if message.HasField("carried") else None,
         suspicion=_read_suspicion(message.suspicion) if message.HasField("suspicion") else None,
         time_us=message.time_us,
+        measured=_read_measurement(message.measured) if message.HasField("measured") else None,
     )
 
 

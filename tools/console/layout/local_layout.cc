@@ -21,6 +21,15 @@ bool is_closure(const client::Edge& edge) { return edge.id.ordinal > 0; }
 Vector2 from_above(const SE3& T_root_frame) { return {T_root_frame.t.x(), T_root_frame.t.z()}; }
 double heading_from_above(const SE3& T_root_frame) { return std::atan2(T_root_frame.R(2, 2), T_root_frame.R(0, 2)); }
 
+// The edge as it was measured: refinement has shared out over the edges around a closure what it contradicts.
+client::Edge as_measured(client::Edge edge, const std::set<EdgeId>& gone) {
+  std::erase_if(edge.carried_by, [&](EdgeId closure) { return gone.contains(closure); });
+  if (!edge.measured) return edge;
+  edge.T_ab = edge.measured->T_ab;
+  edge.covariance = edge.measured->covariance;
+  return edge;
+}
+
 struct Poses {
   std::vector<SE3> T_root_frame;  // by frame; of a part that is not joined with the root in its own coordinates
   std::vector<bool> with_root;
@@ -113,12 +122,13 @@ Result<LocalLayout> lay_out_locally(const client::Edge& closure, std::vector<cli
   LocalLayout out;
   out.edge = closure.id;
   out.root = closure.a;
+  const bool refined = client::in_graph(closure);  // and the edges around it with it
   std::vector<client::Edge> rest;
   for (client::Edge& edge : edges) {
     if (is_closure(edge))
       out.closures.push_back({edge.id, position(edge.a), position(edge.b), client::in_graph(edge),
                               gone.contains(edge.id), edge.suspicion ? edge.suspicion->value : 0});
-    if (!is_closure(edge) || !gone.contains(edge.id)) rest.push_back(edge);
+    if (!is_closure(edge) || !gone.contains(edge.id)) rest.push_back(refined ? as_measured(edge, gone) : edge);
     if (edge.id != closure.id) continue;
     edge.state = client::EdgeState::kAccepted;  // as it would be in force
     edge.carries = true;
@@ -128,7 +138,7 @@ Result<LocalLayout> lay_out_locally(const client::Edge& closure, std::vector<cli
   const auto without = relaxed(frames, out.root, rest);
   if (!without.ok()) return without.status();
   const std::size_t a = position(closure.a), b = position(closure.b);
-  client::Edge supposed = closure;
+  client::Edge supposed = as_measured(closure, gone);
   supposed.state = client::EdgeState::kAccepted;
   supposed.carries = true;
   const client::Spring spring = client::springs_of(std::vector{supposed}).front();

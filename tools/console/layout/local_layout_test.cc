@@ -4,6 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "client/relaxation.h"
+#include "client/springs.h"
+
 namespace relmap::console {
 namespace {
 
@@ -73,6 +76,39 @@ TEST(LocalLayout, ShowsWhatAWrongClosureBends) {
   EXPECT_LT(at({1, 23}).norm(), 1e-9);
   EXPECT_NEAR(at({1, 30}).y(), 7, 0.2);
   EXPECT_NEAR(at({2, 23}).x(), 1, 0.2);
+}
+
+// Once refined, every edge agrees with the wrong closure, and only what was measured still contradicts it.
+TEST(LocalLayout, WithoutAClosureInForceIsMadeOfWhatWasMeasured) {
+  const Street street(true);
+  std::vector<client::Edge> edges = street.edges;
+  edges.push_back(wrong_closure());
+  std::vector<client::RelaxationEdge> pulling;
+  for (const client::Spring& spring : client::springs_of(edges)) pulling.push_back(spring.relaxed);
+  const auto refined = client::relax(street.frames, pulling).or_throw();
+  const auto pose = [&](FrameId frame) {
+    return refined.poses[static_cast<std::size_t>(
+                             std::lower_bound(street.frames.begin(), street.frames.end(), frame) - street.frames.begin())]
+        .T_component_frame;
+  };
+  for (client::Edge& edge : edges) {
+    edge.measured = {edge.T_ab, edge.covariance};
+    edge.T_ab = pose(edge.a).inverse() * pose(edge.b);
+  }
+  client::Edge closure = edges.back();
+  const LocalLayout raw = lay_out_locally(wrong_closure(), street.edges, street.frames, {}).or_throw();
+  const LocalLayout layout = lay_out_locally(closure, edges, street.frames, {}).or_throw();
+  EXPECT_NEAR(distance(layout, layout.without, {1, 20}, {2, 20}), 1, 0.05);
+  EXPECT_NEAR(layout.metres, raw.metres, 1e-6);
+  EXPECT_GT(layout.sigmas, 6);
+  for (std::size_t k = 0; k < layout.frames.size(); ++k)
+    EXPECT_LT((layout.without.at[k] - raw.without.at[k]).norm(), 1e-6);
+
+  // One that is not in force has refined nothing: without it the map is as it is.
+  closure.state = client::EdgeState::kCandidate;
+  edges.back() = closure;
+  const LocalLayout candidate = lay_out_locally(closure, edges, street.frames, {}).or_throw();
+  EXPECT_GT(distance(candidate, candidate.without, {1, 20}, {2, 20}), 1.2);
 }
 
 TEST(LocalLayout, LeavesOutWhatGoesWithIt) {

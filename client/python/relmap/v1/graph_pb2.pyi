@@ -58,7 +58,7 @@ class Doubt(_message.Message):
     def __init__(self, kind: _Optional[_Union[DoubtKind, str]] = ..., weight: _Optional[float] = ..., message: _Optional[str] = ...) -> None: ...
 
 class Edge(_message.Message):
-    __slots__ = ["a", "a_from_b", "b", "bound", "carried", "carried_by", "carries", "consistent_with", "covariance", "driven_s", "history", "id", "inliers", "kind", "prior_active", "probability", "reason", "source", "spread", "standing_s", "state", "support", "suspicion", "time_us", "uniqueness", "unmeasured", "verification"]
+    __slots__ = ["a", "a_from_b", "b", "bound", "carried", "carried_by", "carries", "consistent_with", "covariance", "driven_s", "history", "id", "inliers", "kind", "measured", "prior_active", "probability", "reason", "source", "spread", "standing_s", "state", "support", "suspicion", "time_us", "uniqueness", "unmeasured", "verification"]
     A_FIELD_NUMBER: _ClassVar[int]
     A_FROM_B_FIELD_NUMBER: _ClassVar[int]
     BOUND_FIELD_NUMBER: _ClassVar[int]
@@ -73,6 +73,7 @@ class Edge(_message.Message):
     ID_FIELD_NUMBER: _ClassVar[int]
     INLIERS_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
+    MEASURED_FIELD_NUMBER: _ClassVar[int]
     PRIOR_ACTIVE_FIELD_NUMBER: _ClassVar[int]
     PROBABILITY_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
@@ -100,6 +101,7 @@ class Edge(_message.Message):
     id: _common_pb2.EdgeId
     inliers: int
     kind: EdgeKind
+    measured: Measurement
     prior_active: bool
     probability: float
     reason: _reason_pb2.Reason
@@ -113,7 +115,7 @@ class Edge(_message.Message):
     uniqueness: Uniqueness
     unmeasured: bool
     verification: _common_pb2.Verification
-    def __init__(self, id: _Optional[_Union[_common_pb2.EdgeId, _Mapping]] = ..., a: _Optional[_Union[_common_pb2.FrameId, _Mapping]] = ..., b: _Optional[_Union[_common_pb2.FrameId, _Mapping]] = ..., kind: _Optional[_Union[EdgeKind, str]] = ..., state: _Optional[_Union[EdgeState, str]] = ..., reason: _Optional[_Union[_reason_pb2.Reason, str]] = ..., carries: bool = ..., a_from_b: _Optional[_Union[_common_pb2.Transform, _Mapping]] = ..., covariance: _Optional[_Union[_common_pb2.Covariance, _Mapping]] = ..., support: _Optional[int] = ..., prior_active: bool = ..., source: _Optional[_Union[MotionSource, str]] = ..., driven_s: _Optional[float] = ..., standing_s: _Optional[float] = ..., verification: _Optional[_Union[_common_pb2.Verification, str]] = ..., inliers: _Optional[int] = ..., bound: _Optional[int] = ..., probability: _Optional[float] = ..., spread: _Optional[float] = ..., consistent_with: _Optional[_Iterable[_Union[_common_pb2.EdgeId, _Mapping]]] = ..., history: _Optional[_Iterable[_Union[EdgeEvent, _Mapping]]] = ..., uniqueness: _Optional[_Union[Uniqueness, _Mapping]] = ..., carried_by: _Optional[_Iterable[_Union[_common_pb2.EdgeId, _Mapping]]] = ..., carried: _Optional[_Union[CarriedStretch, _Mapping]] = ..., unmeasured: bool = ..., suspicion: _Optional[_Union[Suspicion, _Mapping]] = ..., time_us: _Optional[int] = ...) -> None: ...
+    def __init__(self, id: _Optional[_Union[_common_pb2.EdgeId, _Mapping]] = ..., a: _Optional[_Union[_common_pb2.FrameId, _Mapping]] = ..., b: _Optional[_Union[_common_pb2.FrameId, _Mapping]] = ..., kind: _Optional[_Union[EdgeKind, str]] = ..., state: _Optional[_Union[EdgeState, str]] = ..., reason: _Optional[_Union[_reason_pb2.Reason, str]] = ..., carries: bool = ..., a_from_b: _Optional[_Union[_common_pb2.Transform, _Mapping]] = ..., covariance: _Optional[_Union[_common_pb2.Covariance, _Mapping]] = ..., support: _Optional[int] = ..., prior_active: bool = ..., source: _Optional[_Union[MotionSource, str]] = ..., driven_s: _Optional[float] = ..., standing_s: _Optional[float] = ..., verification: _Optional[_Union[_common_pb2.Verification, str]] = ..., inliers: _Optional[int] = ..., bound: _Optional[int] = ..., probability: _Optional[float] = ..., spread: _Optional[float] = ..., consistent_with: _Optional[_Iterable[_Union[_common_pb2.EdgeId, _Mapping]]] = ..., history: _Optional[_Iterable[_Union[EdgeEvent, _Mapping]]] = ..., uniqueness: _Optional[_Union[Uniqueness, _Mapping]] = ..., carried_by: _Optional[_Iterable[_Union[_common_pb2.EdgeId, _Mapping]]] = ..., carried: _Optional[_Union[CarriedStretch, _Mapping]] = ..., unmeasured: bool = ..., suspicion: _Optional[_Union[Suspicion, _Mapping]] = ..., time_us: _Optional[int] = ..., measured: _Optional[_Union[Measurement, _Mapping]] = ...) -> None: ...
 
 class EdgeEvent(_message.Message):
     __slots__ = ["author", "cause", "journal_sequence", "note", "reason", "state", "time_us"]
@@ -202,6 +204,14 @@ class Landmark(_message.Message):
     observers: int
     point: _common_pb2.Vector3
     def __init__(self, id: _Optional[_Union[_common_pb2.LandmarkId, _Mapping]] = ..., point: _Optional[_Union[_common_pb2.Vector3, _Mapping]] = ..., observers: _Optional[int] = ...) -> None: ...
+
+class Measurement(_message.Message):
+    __slots__ = ["a_from_b", "covariance"]
+    A_FROM_B_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    a_from_b: _common_pb2.Transform
+    covariance: _common_pb2.Covariance
+    def __init__(self, a_from_b: _Optional[_Union[_common_pb2.Transform, _Mapping]] = ..., covariance: _Optional[_Union[_common_pb2.Covariance, _Mapping]] = ...) -> None: ...
 
 class Observation(_message.Message):
     __slots__ = ["closure", "landmark", "level", "u_left", "u_right", "v"]
