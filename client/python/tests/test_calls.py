@@ -218,6 +218,9 @@ def test_lists_are_tables(client: relmap.Client) -> None:
     assert client.edges(session=1, states=[relmap.EdgeState.REMOVED]).to_pandas().empty
     assert [label.label for label in client.labels()] == ["fountain <b>&", "kitchen"]
     worst = client.edges(order=relmap.EdgeOrder.SUSPICION)
+    measured = [e.measured for e in worst]
+    assert all(m is not None and m.T_ab.shape == (4, 4) and m.cov.shape == (6, 6) for m in measured)
+    assert any(m is not None and not np.allclose(m.T_ab, e.T_ab) for m, e in zip(measured, worst)), "nothing is refined"
     doubts = [e.suspicion.value for e in worst if e.suspicion]
     assert doubts == sorted(doubts, reverse=True) and len(doubts) == len(worst)
 
