@@ -28,6 +28,10 @@ Result<std::unique_ptr<Console>> Console::start(const ConsoleOptions& options) {
   if (!link.ok()) return link.status();
   auto server = Server::listen(options.http);
   if (!server.ok()) return server.status();
+  if (!(*server)->is_local() && !(*server)->uses_tls() && !options.insecure)
+    return Status(Reason::BAD_CONFIG,
+                  "other machines are served over TLS only: give --tls-certificate, or --insecure if nobody who is not "
+                  "trusted hears this network");
   console->server_ = std::move(*server);
   console->link_ = std::move(*link);
   console->login_ = std::make_unique<Login>(*console->link_, console->server_->port());
