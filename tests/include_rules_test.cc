@@ -114,7 +114,7 @@ const std::map<std::string, Part> kParts = {
     {"tools/console/forward", {{"proto", "client"}, {"boost", "grpc"}}},
     {"tools/console",
      {{"proto", "proto/access", "proto/wire", "client", "tools/console/http", "tools/console/forward",
-       "tools/console/layout"},
+       "tools/console/layout", "tools/terminal"},
       {"boost", "protobuf", "grpc"}}},
     {"tools/terminal", {{"proto"}, {"eigen", "cli11"}}},
     {"tools/g2o", {{"proto"}, {"eigen"}}},

@@ -17,12 +17,14 @@ struct ConsoleOptions {
   std::string authorities;  // PEM, of those that may have issued the daemon's certificate; empty: no TLS to the daemon
   std::string version;      // told to browsers
   std::string cache;        // folder of what is kept from one run to the next; empty: there is none
+  bool insecure = false;    // serve other machines without TLS
   ServerOptions http;
 };
 
 class Console {
  public:
-  // Serves when this returns. As Server::listen() and DaemonLink::open().
+  // Serves when this returns. As Server::listen() and DaemonLink::open(). BAD_CONFIG: other machines would be served
+  // without TLS.
   static Result<std::unique_ptr<Console>> start(const ConsoleOptions& options);
   // Ends all calls and connections.
   ~Console();

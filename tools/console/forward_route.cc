@@ -20,7 +20,7 @@ bool is_grpc_web(std::string_view type) {
   return name == kType || name == "application/grpc-web";
 }
 
-Awaitable<std::optional<Response>> forward(DaemonLink& link, Request& request, ResponseStream& stream) {
+Awaitable<std::optional<Response>> forward(DaemonLink& link, Login& login, Request& request, ResponseStream& stream) {
   if (!is_forwarded(request.parts.at(0), request.parts.at(1)))
     co_return error_response({Reason::NO_SUCH_FILE, "only methods of relmap.v1 and of gRPC's health are forwarded"});
   if (!is_grpc_web(request.header("content-type"))) {
@@ -34,6 +34,7 @@ Awaitable<std::optional<Response>> forward(DaemonLink& link, Request& request, R
     response.status = 400;
     co_return response;
   }
+  if (Status admitted = co_await login.admit(request.caller); !admitted.ok()) co_return error_response(admitted);
   CallOptions options;
   options.token = request.caller.token;
   for (const std::string_view name : kPassedOn)
@@ -45,28 +46,31 @@ Awaitable<std::optional<Response>> forward(DaemonLink& link, Request& request, R
   }
   std::string asked(*message);
   request.body = std::string();  // a stream may last for hours
-  ForwardedCall call = co_await link.call(request.path, std::move(asked), std::move(options));
+  Result<ForwardedCall> call = co_await link.call(request.path, std::move(asked), std::move(options));
+  if (!call.ok()) co_return error_response(call.status());
   Response head;
   head.type = kType;
   stream.begin(std::move(head));
   // Has a name, since GCC 12 destroys what a temporary closure in such an expression holds twice (its bug 99576).
   const std::function<bool()> gone = [&stream] { return stream.gone(); };
   for (;;) {
-    const std::optional<std::string> next = co_await call.next(gone);
+    const std::optional<std::string> next = co_await call->next(gone);
     if (!next) break;
     co_await stream.write(message_frame(*next));
   }
-  co_await stream.write(trailers_frame(call.end()));
+  co_await stream.write(trailers_frame(call->end()));
   co_return std::nullopt;
 }
 
 }  // namespace
 
-void add_forwarding(DaemonLink& link, Router& router) {
+void add_forwarding(DaemonLink& link, Login& login, Router& router) {
   Route route;
   route.method = "POST";
   route.pattern = "/*/*";
-  route.stream = [&link](Request& request, ResponseStream& stream) { return forward(link, request, stream); };
+  route.stream = [&link, &login](Request& request, ResponseStream& stream) {
+    return forward(link, login, request, stream);
+  };
   route.body_limit = kMaxMessage + kFrameHead;
   router.add(std::move(route));
 }

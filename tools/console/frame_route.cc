@@ -21,7 +21,7 @@ std::string mark_of(std::uint32_t payload, const std::string& bytes) {
   return "\"" + hex(payload) + "-" + hex(crc32c(span)) + "\"";
 }
 
-Awaitable<Response> picture_of(DaemonLink& link, const Request& request, bool whole) {
+Awaitable<Response> picture_of(DaemonLink& link, Login& login, const Request& request, bool whole) {
   const auto id = FrameId::parse(request.parts.at(0));
   if (!id || !id->valid())
     co_return error_response({Reason::INVALID_ARGUMENT, "'" + request.parts.at(0) + "' is no frame: SESSION:INDEX"});
@@ -29,6 +29,7 @@ Awaitable<Response> picture_of(DaemonLink& link, const Request& request, bool wh
   *question.mutable_frame() = to_wire(*id);
   question.set_thumbnail(!whole);
   question.set_picture(whole);
+  if (Status admitted = co_await login.admit(request.caller); !admitted.ok()) co_return error_response(admitted);
   CallOptions options;
   options.token = request.caller.token;
   options.timeout = kAnswerPatience;
@@ -56,10 +57,10 @@ Awaitable<Response> picture_of(DaemonLink& link, const Request& request, bool wh
 
 }  // namespace
 
-void add_frames(DaemonLink& link, Router& router) {
+void add_frames(DaemonLink& link, Login& login, Router& router) {
   for (const bool whole : {false, true})
     router.add({"GET", std::string("/frames/*/") + (whole ? "picture" : "thumbnail"), Access::kCaller,
-                [&link, whole](const Request& request) { return picture_of(link, request, whole); }});
+                [&link, &login, whole](const Request& request) { return picture_of(link, login, request, whole); }});
 }
 
 }  // namespace relmap::console

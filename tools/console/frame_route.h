@@ -3,10 +3,11 @@
 
 #include "tools/console/forward/daemon_link.h"
 #include "tools/console/http/router.h"
+#include "tools/console/login.h"
 
 namespace relmap::console {
 
-// `link` must outlive the routes.
-void add_frames(DaemonLink& link, Router& router);
+// `link` and `login` must outlive the routes.
+void add_frames(DaemonLink& link, Login& login, Router& router);
 
 }  // namespace relmap::console

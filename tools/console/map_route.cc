@@ -85,8 +85,10 @@ struct TellState {
 
 struct TellSamples {
   const HealthSamples* samples;
+  const Login* login;
   Awaitable<Response> operator()(const Request& request) const {
-    co_return json(samples->samples_json(static_cast<std::int64_t>(number_of(request, "since"))));
+    const auto since = static_cast<std::int64_t>(number_of(request, "since"));
+    co_return json(samples->samples_json(since, login->is_operator(request.caller)));
   }
 };
 
@@ -101,21 +103,18 @@ struct MakeAnswer {
 
 }  // namespace
 
-MapRoutes::MapRoutes(std::string server, std::string authorities, std::string cache, const Login& login, Server& http)
+MapRoutes::MapRoutes(std::string server, std::string authorities, std::string cache, const DaemonLink& link,
+                     Login& login, Server& http)
     : server_(std::move(server)),
       authorities_(std::move(authorities)),
+      link_(link),
+      login_(login),
       http_(http),
-      keeper_({.connect = [this, &login]() -> Result<std::unique_ptr<client::Client>> {
-                 const auto caller = login.last_let_in();
-                 if (!caller.ok()) return caller.status();
-                 return connect(*caller, kAnswerWithin);
-               },
+      keeper_({.connect = [this] { return connect_for_all(kAnswerWithin); },
                .cache_folder = std::move(cache),
                .log = [](const std::string& line) { std::cerr << line << std::endl; }}),
-      samples_({.client = [this, &login]() -> Result<std::shared_ptr<client::Client>> {
-        const auto caller = login.last_let_in();
-        if (!caller.ok()) return caller.status();
-        auto client = connect(*caller, kSampleWithin);
+      samples_({.client = [this]() -> Result<std::shared_ptr<client::Client>> {
+        auto client = connect_for_all(kSampleWithin);
         if (!client.ok()) return client.status();
         return std::shared_ptr<client::Client>(std::move(*client));
       }}) {}
@@ -127,7 +126,22 @@ Result<std::unique_ptr<client::Client>> MapRoutes::connect(const Caller& caller,
   options.deadline = deadline;
   options.token = caller.token;
   options.authorities = authorities_;
-  return client::Client::connect(server_, std::move(options));
+  auto client = client::Client::connect(server_, std::move(options));
+  // What the folder names may have become another kind of address meanwhile.
+  if (const auto where = link_.where(); where.reason() == Reason::NEEDS_RESTART) return where.status();
+  return client;
+}
+
+Result<std::unique_ptr<client::Client>> MapRoutes::connect_for_all(milliseconds deadline) const {
+  const auto caller = login_.last_let_in();
+  if (!caller.ok()) return caller.status();
+  auto client = connect(*caller, deadline);
+  if (!client.ok() || caller->token.empty()) return client;
+  const Status judged = (*client)->status().status();
+  if (judged.ok()) return client;
+  if (judged.reason() == Reason::UNAUTHENTICATED || judged.reason() == Reason::NOT_ALLOWED)
+    login_.refused(caller->token);
+  return judged;
 }
 
 void MapRoutes::add_to(Router& router) {
@@ -142,7 +156,7 @@ void MapRoutes::add_to(Router& router) {
   add("POST", "/map/places", MakeAnswer{&http_, [this](const Request& request) { return places(request); }},
       std::size_t{1} << 20);
   add("GET", "/map/local", MakeAnswer{&http_, [this](const Request& request) { return around(request); }});
-  add("GET", "/health/samples", TellSamples{&samples_});
+  add("GET", "/health/samples", TellSamples{&samples_, &login_});
 }
 
 void MapRoutes::stop() {

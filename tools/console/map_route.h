@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "tools/console/forward/daemon_link.h"
 #include "tools/console/http/router.h"
 #include "tools/console/http/server.h"
 #include "tools/console/layout/health_samples.h"
@@ -16,9 +17,10 @@ namespace relmap::console {
 // What the console keeps of the map and its daemon. Thread-safe.
 class MapRoutes {
  public:
-  // `server` and `authorities` as of ConsoleOptions; `cache`: folder for layouts, or empty. `login` and `http` must
-  // outlive it.
-  MapRoutes(std::string server, std::string authorities, std::string cache, const Login& login, Server& http);
+  // `server` and `authorities` as of ConsoleOptions; `cache`: folder for layouts, or empty. `link`, `login` and `http`
+  // must outlive it.
+  MapRoutes(std::string server, std::string authorities, std::string cache, const DaemonLink& link, Login& login,
+            Server& http);
 
   // The routes use this object.
   void add_to(Router& router);
@@ -27,11 +29,15 @@ class MapRoutes {
 
  private:
   Result<std::unique_ptr<client::Client>> connect(const Caller& caller, std::chrono::milliseconds deadline) const;
+  // With the console's own credentials. A token that the daemon refuses is not used again.
+  Result<std::unique_ptr<client::Client>> connect_for_all(std::chrono::milliseconds deadline) const;
   Response tile(const Request& request);
   Response places(const Request& request);
   Response around(const Request& request) const;
 
   const std::string server_, authorities_;
+  const DaemonLink& link_;
+  Login& login_;
   Server& http_;
   LayoutKeeper keeper_;
   HealthSamples samples_;

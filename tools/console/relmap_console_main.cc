@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -20,6 +21,7 @@
 #include "proto/base/version.h"
 #include "server/service/service_manager.h"
 #include "tools/console/console.h"
+#include "tools/console/open_browser.h"
 #include "tools/console/served_daemon.h"
 #include "tools/terminal/command_line.h"
 #include "tools/terminal/interrupt.h"
@@ -37,6 +39,7 @@ The address to open is printed to standard output. How a browser logs in follows
   its Unix socket     with the key in the printed address, which is new at every start
   TLS                 with a token of the daemon (relmap-admin credentials new FOLDER NAME --token), and as its owner
   TCP without TLS     not at all: that daemon lets everyone in
+A login ends when the browser logs out, after 12 hours in which it asked for nothing, and with the console.
 
 Other machines reach the console only over TLS (--tls-certificate), or through a proxy that serves TLS (--host).
 
@@ -48,12 +51,13 @@ Examples:
 Exit codes:
   0  stopped by a signal
   1  failed; the first word on stderr is the reason
-  2  wrong usage, or files that cannot be used (BAD_CONFIG, NO_SUCH_FILE)
+  2  wrong usage, or files or an address that cannot be used (BAD_CONFIG, NO_SUCH_FILE)
   3  no daemon serves the folder, and none could be started
   4  PORT_IN_USE: another process listens at the address of --listen)";
 
 constexpr std::uint16_t kUsualPort = 8086, kPortsToTry = 32;
 constexpr std::chrono::milliseconds kLook{50};
+constexpr std::chrono::seconds kBrowserReadsWithin{60};  // the page of --open; it may have to start first
 
 int exit_code(const Status& status) {
   switch (status.reason()) {
@@ -158,6 +162,7 @@ Result<console::ConsoleOptions> options_of(const CommandLine& line) {
   options.server = line.server;
   options.version = version();
   options.cache = made_folder(cache_folder(line));
+  options.insecure = line.insecure;
   options.http.port = kUsualPort;
   if (line.listen)
     if (Status sound = parse_listen(*line.listen, options.http); !sound.ok()) return sound;
@@ -187,24 +192,24 @@ Result<std::unique_ptr<console::Console>> start(console::ConsoleOptions& options
   }
 }
 
+// The address to open. A console that listens at all addresses has none of its own: it is known by the first --host, or
+// by the machine's name.
 std::string address_of(const console::Console& console, const console::ConsoleOptions& options) {
   const console::Server& server = console.server();
-  std::string host = options.http.host;
-  if (host == "0.0.0.0" || host == "::") host = "localhost";
+  std::string host = options.http.host, port = std::to_string(server.port());
+  boost::system::error_code error;
+  const auto address = boost::asio::ip::make_address(host, error);
+  if (!error && address.is_unspecified()) {
+    char machine[256] = {};
+    host = gethostname(machine, sizeof machine - 1) == 0 && console::parse_host(machine).ok() ? machine : "localhost";
+    if (!options.http.proxied.empty()) {
+      host = options.http.proxied.front().name;
+      if (const std::string& own = options.http.proxied.front().port; !own.empty()) port = own;
+    }
+  }
   if (host.find(':') != std::string::npos) host = "[" + host + "]";
-  std::string address = (server.uses_tls() ? "https://" : "http://") + host + ":" + std::to_string(server.port()) + "/";
-  if (console.login().kind() == console::Login::Kind::kKey) address += "#key=" + console.login().key();
-  return address;
-}
-
-void open_browser(const std::string& address) {
-  std::string program = "xdg-open", argument = address;
-  char* const argv[] = {program.data(), argument.data(), nullptr};
-  const pid_t child = fork();
-  if (child != 0) return;
-  if (fork() != 0) _exit(0);  // nobody waits for the browser
-  execvp(argv[0], argv);
-  _exit(1);
+  const std::string key = console.login().kind() == console::Login::Kind::kKey ? "#key=" + console.login().key() : "";
+  return (server.uses_tls() ? "https://" : "http://") + host + ":" + port + "/" + key;
 }
 
 int run(const CommandLine& line) {
@@ -227,15 +232,19 @@ int run(const CommandLine& line) {
   auto console = start(*options, !line.listen);
   if (!console.ok()) return fail(console.status());
   const console::Server& server = (*console)->server();
-  if (!server.is_local() && !server.uses_tls() && !line.insecure)
-    return fail({Reason::BAD_CONFIG,
-                 "other machines are served over TLS only: give --tls-certificate, or --insecure if "
-                 "nobody who is not trusted hears this network"});
   if (!line.listen && server.port() != kUsualPort)
     tell("port " + std::to_string(kUsualPort) + " is taken: using " + std::to_string(server.port()));
   const std::string address = address_of(**console, *options);
   std::cout << address << std::endl;
-  if (line.open) open_browser(address);
+  std::unique_ptr<console::OpenedBrowser> browser;
+  if (line.open) {
+    auto opened = console::OpenedBrowser::open(address);
+    if (opened.ok())
+      browser = std::move(*opened);
+    else
+      tell(opened.status().to_string());
+  }
+  const auto opened_until = std::chrono::steady_clock::now() + kBrowserReadsWithin;
   manager.serves([&] {
     return service::ServiceManager::State{true, "serving browsers at port " + std::to_string(server.port())};
   });
@@ -246,6 +255,7 @@ int run(const CommandLine& line) {
         code = fail({Reason::UNREACHABLE, "the daemon that the console had started ended with " + *end});
         break;
       }
+    if (browser && std::chrono::steady_clock::now() > opened_until) browser.reset();
     std::this_thread::sleep_for(kLook);
   }
   manager.stops();

@@ -1,17 +1,9 @@
 #include "tools/relmap-admin/drill_daemon.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <cerrno>
+#include <algorithm>
 #include <chrono>
-#include <cstring>
-#include <filesystem>
+#include <csignal>
 #include <fstream>
-#include <optional>
 #include <thread>
 #include <vector>
 
@@ -21,8 +13,6 @@
 namespace relmap::admin {
 
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kLook{50};
 
@@ -48,58 +38,26 @@ Reason reason_in(const std::string& line) {
   return Reason::INTERNAL;
 }
 
-pid_t run(const std::vector<std::string>& arguments, const std::string& log) {
-  std::vector<char*> argv;
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-  const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  const int none = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-  const pid_t parent = ::getpid();
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent) ::_exit(1);
-    ::setpgid(0, 0);  // Ctrl-C at the terminal is the drill's, which then stops it
-    ::dup2(none, STDIN_FILENO);
-    ::dup2(none, STDOUT_FILENO);
-    ::dup2(file < 0 ? none : file, STDERR_FILENO);
-    ::execv(argv[0], argv.data());
-    ::_exit(1);
-  }
-  if (file >= 0) ::close(file);
-  if (none >= 0) ::close(none);
-  return child;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<DrillDaemon>> DrillDaemon::start(const std::string& map, const std::string& log,
                                                         const std::string& vocabulary,
                                                         const std::function<Status()>& going) {
-  std::error_code error;
-  const std::string program = (fs::read_symlink("/proc/self/exe", error).parent_path() / "relmapd").string();
-  if (::access(program.c_str(), X_OK) != 0)
-    return Status(Reason::NO_SUCH_FILE,
-                  "there is no " + program + ": the drill starts the relmapd beside this program");
-  std::vector<std::string> arguments{program, "--data", map, "--listen", "none", "--lcm", "none"};
+  std::vector<std::string> arguments{"--data", map, "--listen", "none", "--lcm", "none"};
   if (!vocabulary.empty()) arguments.insert(arguments.end(), {"--vocabulary", vocabulary});
-  const pid_t pid = run(arguments, log);
-  if (pid < 0) return Status(Reason::INTERNAL, program + ": " + std::strerror(errno));
-  std::unique_ptr<DrillDaemon> daemon(new DrillDaemon(pid, log));
+  auto child = terminal::ChildDaemon::start(arguments, log, SIGKILL);
+  if (child.reason() == Reason::NO_SUCH_FILE)
+    return Status(Reason::NO_SUCH_FILE,
+                  "there is no " + child.status().message() + ": the drill starts the relmapd beside this program");
+  if (!child.ok()) return child.status();
+  std::unique_ptr<DrillDaemon> daemon(new DrillDaemon(*std::move(child), log));
   if (Status serves = daemon->wait_until_it_serves(map, going); !serves.ok()) return serves;
   const auto status = daemon->client().status();
   if (!status.ok()) return status.status();
   if (status->version != version())
-    return Status(Reason::UNSUPPORTED,
-                  program + " is of release " + status->version + ", this program of " + std::string(version()));
+    return Status(Reason::UNSUPPORTED, "the relmapd beside this program is of release " + status->version +
+                                           ", this program of " + std::string(version()));
   return daemon;
-}
-
-DrillDaemon::~DrillDaemon() {
-  if (pid_ < 0) return;
-  client_.reset();
-  ::kill(pid_, SIGKILL);
-  (void)::waitpid(pid_, nullptr, 0);
 }
 
 Status DrillDaemon::wait_until_it_serves(const std::string& map, const std::function<Status()>& going) {
@@ -107,7 +65,7 @@ Status DrillDaemon::wait_until_it_serves(const std::string& map, const std::func
     if (const auto end = ended()) return end->ok() ? Status(Reason::INTERNAL, "relmapd ended before it served") : *end;
     if (Status go = going(); !go.ok()) return go;
     const auto where = client::resolve_server(map);
-    if (!where.ok() || where->pid != pid_) continue;
+    if (!where.ok() || where->pid != child_.pid()) continue;
     auto client = client::Client::connect(map);
     if (!client.ok()) return client.status();
     client_ = std::move(*client);
@@ -116,19 +74,16 @@ Status DrillDaemon::wait_until_it_serves(const std::string& map, const std::func
 }
 
 std::optional<Status> DrillDaemon::ended() {
-  int status = 0;
-  if (::waitpid(pid_, &status, WNOHANG) != pid_) return {};
-  pid_ = -1;
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return Status();
-  const std::string how = WIFEXITED(status) ? "exit code " + std::to_string(WEXITSTATUS(status))
-                                            : "signal " + std::to_string(WTERMSIG(status));
+  const auto end = child_.ended();
+  if (!end) return {};
+  if (end->ok()) return Status();
   const std::string line = last_line(log_);
-  return Status(reason_in(line), "relmapd ended with " + how + ": " + line);
+  return Status(reason_in(line), "relmapd ended with " + end->words() + ": " + line);
 }
 
 Status DrillDaemon::stop() {
   client_.reset();
-  ::kill(pid_, SIGTERM);
+  child_.ask_to_end();
   for (;;) {
     if (const auto end = ended()) return *end;
     std::this_thread::sleep_for(kLook);

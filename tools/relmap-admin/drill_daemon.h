@@ -1,16 +1,18 @@
 // A relmapd that a drill starts on a restored map, and stops.
 #pragma once
 
-#include <sys/types.h>
-
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "client/relmap_client.h"
+#include "tools/terminal/child_daemon.h"
 
 namespace relmap::admin {
 
+// It is killed with this object, unless it was stopped.
 class DrillDaemon {
  public:
   // Starts the relmapd beside this program on the data folder `map`, at its socket only and without LCM, and returns
@@ -20,21 +22,17 @@ class DrillDaemon {
   static Result<std::unique_ptr<DrillDaemon>> start(const std::string& map, const std::string& log,
                                                     const std::string& vocabulary,
                                                     const std::function<Status()>& going);
-  ~DrillDaemon();  // kills it, unless it was stopped
-  DrillDaemon(const DrillDaemon&) = delete;
-  DrillDaemon& operator=(const DrillDaemon&) = delete;
-
   client::Client& client() { return *client_; }
   // Ends it in order, and returns how it ended.
   Status stop();
 
  private:
-  DrillDaemon(pid_t pid, std::string log) : pid_(pid), log_(std::move(log)) {}
+  DrillDaemon(terminal::ChildDaemon child, std::string log) : child_(std::move(child)), log_(std::move(log)) {}
   Status wait_until_it_serves(const std::string& map, const std::function<Status()>& going);
   // Its end, with the exit code in its words; nullopt while it runs.
   std::optional<Status> ended();
 
-  pid_t pid_;  // -1: it has ended
+  terminal::ChildDaemon child_;
   const std::string log_;
   std::unique_ptr<client::Client> client_;
 };

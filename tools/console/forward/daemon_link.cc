@@ -69,14 +69,15 @@ struct RunningCalls {
   std::set<std::shared_ptr<ForwardedCall::Reactor>> reactors RELMAP_GUARDED_BY(mutex);
   // Set when a call could not reach the daemon: it may have been started again, at another address.
   std::atomic<bool> unreachable{false};
+  std::function<void(const std::string& token)> refused;  // set before the first call
 };
 
 // gRPC's end of a call. It lives until gRPC lets go of it, and holds the call open while nothing is being read, since a
 // read begins on another thread than gRPC's.
 class ForwardedCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
-  Reactor(std::shared_ptr<Shared> shared, std::shared_ptr<RunningCalls> running)
-      : shared_(std::move(shared)), running_(std::move(running)) {}
+  Reactor(std::shared_ptr<Shared> shared, std::shared_ptr<RunningCalls> running, std::string token)
+      : shared_(std::move(shared)), running_(std::move(running)), token_(std::move(token)) {}
 
   static void start(const std::shared_ptr<Reactor>& reactor, grpc::GenericStub& stub, const std::string& method,
                     std::string_view message) {
@@ -135,6 +136,8 @@ class ForwardedCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBu
 
   void OnDone(const grpc::Status& status) override {
     if (status.error_code() == grpc::StatusCode::UNAVAILABLE) running_->unreachable = true;
+    const bool refused = status.error_code() == grpc::StatusCode::UNAUTHENTICATED && !token_.empty();
+    if (refused && running_->refused) running_->refused(token_);
     asio::post(shared_->executor, [shared = shared_, status] {
       shared->end = {static_cast<int>(status.error_code()), status.error_message(), status.error_details()};
       shared->ended = status;
@@ -154,6 +157,7 @@ class ForwardedCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBu
  private:
   std::shared_ptr<Shared> shared_;
   const std::shared_ptr<RunningCalls> running_;
+  const std::string token_;
   grpc::ByteBuffer request_, reply_;
   Mutex mutex_;
   bool held_ RELMAP_GUARDED_BY(mutex_) = true, reading_ RELMAP_GUARDED_BY(mutex_) = false,
@@ -197,7 +201,8 @@ Status ForwardedCall::status() const {
 }
 
 struct DaemonLink::Impl {
-  Impl(std::string s, std::string a) : server(std::move(s)), authorities(std::move(a)) {}
+  Impl(std::string s, std::string a, bool by_socket)
+      : server(std::move(s)), authorities(std::move(a)), socket(by_socket) {}
 
   void connect(const client::ServerAddress& found) RELMAP_REQUIRES(mutex) {
     where = found;
@@ -205,17 +210,32 @@ struct DaemonLink::Impl {
         client::open_channel_for_tokens(found, authorities, client::usual_channel_arguments()));
   }
 
+  Result<client::ServerAddress> resolve() const {
+    auto found = client::resolve_server(server);
+    if (found.ok() && found->is_socket() != socket)
+      return Status(Reason::NEEDS_RESTART,
+                    "the daemon of " + server + " now answers " +
+                        (socket ? "by TCP only, and had a Unix socket" : "by a Unix socket, and did not") +
+                        " when the console started, which decides whom it lets in: start the console again");
+    return found;
+  }
+
   // A daemon that was started again may answer elsewhere.
-  std::shared_ptr<grpc::GenericStub> now() {
+  Result<std::shared_ptr<grpc::GenericStub>> now() {
     const MutexLock lock(mutex);
     if (!where.boot_id.empty() && running->unreachable.exchange(false)) {
-      const auto found = client::resolve_server(server);
+      const auto found = resolve();
+      if (found.reason() == Reason::NEEDS_RESTART) {
+        running->unreachable = true;
+        return found.status();
+      }
       if (found.ok() && (found->address != where.address || found->boot_id != where.boot_id)) connect(*found);
     }
     return stub;
   }
 
   const std::string server, authorities;
+  const bool socket;
   Mutex mutex;
   client::ServerAddress where RELMAP_GUARDED_BY(mutex);
   std::shared_ptr<grpc::GenericStub> stub RELMAP_GUARDED_BY(mutex);
@@ -227,7 +247,7 @@ DaemonLink::DaemonLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Result<std::unique_ptr<DaemonLink>> DaemonLink::open(const std::string& server, const std::string& authorities) {
   const auto where = client::resolve_server(server);
   if (!where.ok()) return where.status();
-  auto impl = std::make_unique<Impl>(server, authorities);
+  auto impl = std::make_unique<Impl>(server, authorities, where->is_socket());
   {
     const MutexLock lock(impl->mutex);
     impl->connect(*where);
@@ -249,16 +269,20 @@ DaemonLink::~DaemonLink() {
   while (!running.reactors.empty()) running.changed.wait(running.mutex);
 }
 
-bool DaemonLink::is_socket() const {
-  const MutexLock lock(impl_->mutex);
-  return impl_->where.is_socket();
+bool DaemonLink::is_socket() const { return impl_->socket; }
+bool DaemonLink::uses_tls() const { return !is_socket() && !impl_->authorities.empty(); }
+Result<client::ServerAddress> DaemonLink::where() const { return impl_->resolve(); }
+
+void DaemonLink::on_refusal(std::function<void(const std::string& token)> told) {
+  impl_->running->refused = std::move(told);
 }
 
-bool DaemonLink::uses_tls() const { return !is_socket() && !impl_->authorities.empty(); }
-
-boost::asio::awaitable<ForwardedCall> DaemonLink::call(std::string method, std::string message, CallOptions options) {
+boost::asio::awaitable<Result<ForwardedCall>> DaemonLink::call(std::string method, std::string message,
+                                                               CallOptions options) {
+  const Result<std::shared_ptr<grpc::GenericStub>> stub = impl_->now();
+  if (!stub.ok()) co_return stub.status();
   auto shared = std::make_shared<ForwardedCall::Shared>(co_await asio::this_coro::executor);
-  auto reactor = std::make_shared<ForwardedCall::Reactor>(shared, impl_->running);
+  auto reactor = std::make_shared<ForwardedCall::Reactor>(shared, impl_->running, options.token);
   if (!options.token.empty()) options.metadata.emplace_back("authorization", "Bearer " + options.token);
   for (const auto& [name, value] : options.metadata)
     if (is_header_value(value)) reactor->context.AddMetadata(name, value);
@@ -268,20 +292,20 @@ boost::asio::awaitable<ForwardedCall> DaemonLink::call(std::string method, std::
     reactor->context.set_deadline(std::chrono::system_clock::now() +
                                   std::min<std::chrono::microseconds>(*options.timeout, kLongest));
   }
-  const std::shared_ptr<grpc::GenericStub> stub = impl_->now();
-  ForwardedCall::Reactor::start(reactor, *stub, method, message);
+  ForwardedCall::Reactor::start(reactor, **stub, method, message);
   co_return ForwardedCall(std::move(shared), std::move(reactor));
 }
 
 boost::asio::awaitable<Result<std::string>> DaemonLink::ask(std::string method, std::string message,
                                                             CallOptions options) {
-  ForwardedCall call = co_await this->call(std::move(method), std::move(message), std::move(options));
-  std::optional<std::string> reply = co_await call.next();
+  Result<ForwardedCall> call = co_await this->call(std::move(method), std::move(message), std::move(options));
+  if (!call.ok()) co_return call.status();
+  std::optional<std::string> reply = co_await call->next();
   if (reply) {
-    const std::optional<std::string> more = co_await call.next();
+    const std::optional<std::string> more = co_await call->next();
     if (more) co_return Result<std::string>(Reason::INTERNAL, "the daemon answered twice");
   }
-  const Status status = call.status();
+  const Status status = call->status();
   if (!status.ok()) co_return status;
   if (!reply) co_return Result<std::string>(Reason::INTERNAL, "the daemon answered nothing");
   co_return std::move(*reply);

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/server_address.h"
 #include "proto/base/status.h"
 #include "tools/console/forward/grpc_web.h"
 
@@ -56,13 +57,20 @@ class DaemonLink {
   // Cancels all calls and waits until gRPC has let go of them. The executors of their coroutines must still exist.
   ~DaemonLink();
 
-  // Whether it is reached by its Unix socket, where it takes every caller for its operator.
+  // Whether it is reached by its Unix socket, where it takes every caller for its operator. It stays so.
   bool is_socket() const;
   bool uses_tls() const;
+  // Where it answers now. As client::resolve_server(). NEEDS_RESTART: by its socket, and it was not when the link was
+  // opened, or the other way round: who may do what there is decided otherwise.
+  Result<client::ServerAddress> where() const;
+
+  // `told` is called, by any thread, with the token of each call that the daemon ends as UNAUTHENTICATED. To be set
+  // before the first call.
+  void on_refusal(std::function<void(const std::string& token)> told);
 
   // Begins a call of "/relmap.v1.Map/GetStatus", for example, for the coroutine that calls this. `message`: the request
-  // as it is on the wire.
-  boost::asio::awaitable<ForwardedCall> call(std::string method, std::string message, CallOptions options);
+  // as it is on the wire. NEEDS_RESTART: as where().
+  boost::asio::awaitable<Result<ForwardedCall>> call(std::string method, std::string message, CallOptions options);
   // The reply of a unary call. Fails with the daemon's reason; UNREACHABLE if none answers.
   boost::asio::awaitable<Result<std::string>> ask(std::string method, std::string message, CallOptions options);
 

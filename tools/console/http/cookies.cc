@@ -18,17 +18,16 @@ std::string_view trimmed(std::string_view text) {
 
 }  // namespace
 
-std::optional<std::string> cookie_in(std::string_view header, std::string_view name) {
-  std::optional<std::string> found;
-  while (!header.empty()) {
+std::vector<std::string_view> cookies_in(std::string_view header, std::string_view name) {
+  std::vector<std::string_view> found;
+  while (!header.empty() && found.size() < kMaxSameCookies) {
     const std::size_t end = std::min(header.find_first_of(";,"), header.size());
     const std::string_view pair = trimmed(header.substr(0, end));
     header.remove_prefix(std::min(end + 1, header.size()));
     const std::size_t equals = pair.find('=');
     if (equals == std::string_view::npos || pair.substr(0, equals) != name) continue;
     const std::string_view value = pair.substr(equals + 1);
-    if (!is_cookie_value(value) || (found && *found != value)) return {};
-    found = value;
+    if (is_cookie_value(value) && std::find(found.begin(), found.end(), value) == found.end()) found.push_back(value);
   }
   return found;
 }

@@ -1,14 +1,16 @@
 // Cookies (RFC 6265).
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace relmap::console {
 
-// The value of the cookie in a Cookie header; nullopt: it is not there, or twice with different values.
-std::optional<std::string> cookie_in(std::string_view header, std::string_view name);
+// The values of the cookie in a Cookie header, each once, in their order, at most kMaxSameCookies. There can be
+// several: another server of the host, or an earlier console, may have set one of this name for another path.
+inline constexpr std::size_t kMaxSameCookies = 8;
+std::vector<std::string_view> cookies_in(std::string_view header, std::string_view name);
 
 // A Set-Cookie header: for this host only, not shown to scripts, not sent with requests of other sites; until the
 // browser is closed. An empty value takes the cookie away.

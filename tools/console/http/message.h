@@ -22,6 +22,8 @@ using Awaitable = boost::asio::awaitable<T>;
 // By what a caller's calls to the daemon are made. The console judges nobody: it passes this on.
 struct Caller {
   std::string token;  // of "authorization: Bearer TOKEN"; empty: the daemon asks for none
+  // The address of who shows this token itself, and has no session: if it is wrong, that counts as a failed login.
+  std::string from = {};
 };
 
 struct Request {

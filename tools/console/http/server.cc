@@ -140,7 +140,7 @@ Result<std::unique_ptr<Server>> Server::listen(const ServerOptions& options) {
     if (Status read = impl.tls->read(); !read.ok()) return read;
   }
   const auto failed = [&](const Error& error) {
-    return Status(Reason::PORT_IN_USE,
+    return Status(error == asio::error::address_in_use ? Reason::PORT_IN_USE : Reason::BAD_CONFIG,
                   "cannot listen on " + options.host + ":" + std::to_string(options.port) + ": " + error.message());
   };
   Error error;

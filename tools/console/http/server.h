@@ -44,7 +44,7 @@ class Server {
  public:
   static constexpr std::uint32_t kMaxHeader = 16 * 1024;
 
-  // Listens. PORT_IN_USE; BAD_CONFIG: the files of TLS cannot be used.
+  // Listens. PORT_IN_USE; BAD_CONFIG: the files of TLS cannot be used, or this machine has no such address.
   static Result<std::unique_ptr<Server>> listen(const ServerOptions& options);
   ~Server();
 

@@ -73,7 +73,7 @@ std::deque<HealthSample> HealthSamples::samples() const {
   return samples_;
 }
 
-std::string HealthSamples::samples_json(std::int64_t since_ms) const {
+std::string HealthSamples::samples_json(std::int64_t since_ms, bool with_disk) const {
   using Document = nlohmann::ordered_json;
   Document told = Document::array();
   for (const HealthSample& s : samples()) {
@@ -90,12 +90,12 @@ std::string HealthSamples::samples_json(std::int64_t since_ms) const {
                      {"memory_used", s.memory_used},
                      {"memory_budget", s.memory_budget},
                      {"resident_bytes", s.resident_bytes},
-                     {"disk_bytes", s.disk_bytes},
                      {"refused", s.refused},
                      {"accepted", s.accepted},
                      {"candidate", s.candidate},
                      {"quarantined", s.quarantined},
                      {"removed", s.removed}});
+    if (s.reachable && with_disk) sample["disk_bytes"] = s.disk_bytes;
     told.push_back(std::move(sample));
   }
   return Document{{"every_ms", options_.every.count()}, {"samples", std::move(told)}}.dump();

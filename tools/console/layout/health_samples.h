@@ -42,8 +42,9 @@ class HealthSamples {
   HealthSamples& operator=(const HealthSamples&) = delete;
 
   void stop();  // ends the thread; what it has stays
-  // The answer to /health/samples: those later than `since_ms`.
-  std::string samples_json(std::int64_t since_ms = 0) const;
+  // The answer to /health/samples: those later than `since_ms`; `with_disk`: with disk_bytes, which the daemon tells
+  // operators only.
+  std::string samples_json(std::int64_t since_ms = 0, bool with_disk = true) const;
   std::deque<HealthSample> samples() const;
 
  private:

@@ -83,7 +83,7 @@ void LayoutKeeper::run() {
     }
     const bool failed = !status.ok(), ending = !going().ok();
     if (failed && !ending) {
-      if (status.reason() == Reason::UNREACHABLE || status.reason() == Reason::DEADLINE) disconnect();
+      disconnect();  // it may have broken, or its token have been revoked
       if (const Status before = state().error; before.to_string() != status.to_string())
         tell("the layout is not kept up: " + status.to_string());
     }
