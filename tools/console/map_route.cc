@@ -112,12 +112,10 @@ MapRoutes::MapRoutes(std::string server, std::string authorities, std::string ca
                },
                .cache_folder = std::move(cache),
                .log = [](const std::string& line) { std::cerr << line << std::endl; }}),
-      samples_({.client = [this, &login]() -> Result<std::shared_ptr<client::Client>> {
+      samples_({.connect = [this, &login]() -> Result<std::unique_ptr<client::Client>> {
         const auto caller = login.last_let_in();
         if (!caller.ok()) return caller.status();
-        auto client = connect(*caller, kSampleWithin);
-        if (!client.ok()) return client.status();
-        return std::shared_ptr<client::Client>(std::move(*client));
+        return connect(*caller, kSampleWithin);
       }}) {}
 
 Result<std::unique_ptr<client::Client>> MapRoutes::connect(const Caller& caller,
