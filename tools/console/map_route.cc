@@ -47,6 +47,12 @@ double decimal_of(const Request& request, const std::string& name, double otherw
   return number;
 }
 
+// With which the console asks for itself.
+std::string token_of(const Login& login) {
+  const auto caller = login.last_let_in();
+  return caller.ok() ? caller->token : std::string();
+}
+
 Response json(std::string text) {
   Response response;
   response.body = std::move(text);
@@ -110,13 +116,15 @@ MapRoutes::MapRoutes(std::string server, std::string authorities, std::string ca
                  if (!caller.ok()) return caller.status();
                  return connect(*caller, kAnswerWithin);
                },
+               .credentials = [&login] { return token_of(login); },
                .cache_folder = std::move(cache),
                .log = [](const std::string& line) { std::cerr << line << std::endl; }}),
       samples_({.connect = [this, &login]() -> Result<std::unique_ptr<client::Client>> {
-        const auto caller = login.last_let_in();
-        if (!caller.ok()) return caller.status();
-        return connect(*caller, kSampleWithin);
-      }}) {}
+                  const auto caller = login.last_let_in();
+                  if (!caller.ok()) return caller.status();
+                  return connect(*caller, kSampleWithin);
+                },
+                .credentials = [&login] { return token_of(login); }}) {}
 
 Result<std::unique_ptr<client::Client>> MapRoutes::connect(const Caller& caller,
                                                            std::chrono::milliseconds deadline) const {

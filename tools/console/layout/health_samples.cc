@@ -6,7 +6,7 @@
 namespace relmap::console {
 
 HealthSamples::HealthSamples(HealthOptions options)
-    : options_(std::move(options)), client_(options_.connect), thread_([this] { run(); }) {}
+    : options_(std::move(options)), client_(options_.connect, options_.credentials), thread_([this] { run(); }) {}
 
 HealthSamples::~HealthSamples() { stop(); }
 

@@ -25,7 +25,8 @@ struct HealthSample {
 };
 
 struct HealthOptions {
-  KeptClient::Connect connect;  // called again after a sample could not be taken
+  KeptClient::Connect connect;               // called again after a sample could not be taken
+  KeptClient::Credentials credentials = {};  // that connect() shows
   std::chrono::milliseconds every{5000};
   std::size_t most = 720;       // samples
   std::size_t disk_every = 12;  // samples

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <thread>
 
 #include "tests/support/patience.h"
@@ -11,10 +12,12 @@
 namespace relmap::console {
 namespace {
 
-TEST(HealthSamples, KeepsItsConnectionUntilASampleFails) {
+TEST(HealthSamples, KeepsItsConnectionUntilASampleFailsOrOtherCredentialsHold) {
   testing::FakeMap daemon;
   HealthOptions options;
+  std::atomic<bool> anna_has_gone{false};
   options.connect = [&] { return daemon.connect("anna"); };
+  options.credentials = [&] { return anna_has_gone ? "" : "anna"; };
   options.every = std::chrono::milliseconds(10);
   options.most = 1000;
   HealthSamples health(options);
@@ -39,6 +42,12 @@ TEST(HealthSamples, KeepsItsConnectionUntilASampleFails) {
   EXPECT_GT(made, 2) << "a revoked token is not used on";
   daemon.change([](auto& state) { state.refused.clear(); });
   ASSERT_TRUE(takes(20, true));
+  const int works = daemon.connections();
+  ASSERT_TRUE(takes(20, true));
+  EXPECT_EQ(daemon.connections(), works);
+  anna_has_gone = true;
+  ASSERT_TRUE(takes(20, true));
+  EXPECT_EQ(daemon.connections(), works + 1) << "what she had shown is not used on";
 }
 
 }  // namespace

@@ -25,7 +25,10 @@ std::uint64_t now_ms() {
 }  // namespace
 
 LayoutKeeper::LayoutKeeper(KeeperOptions options)
-    : options_(std::move(options)), client_(options_.connect), source_(options_.limits), thread_([this] { run(); }) {}
+    : options_(std::move(options)),
+      client_(options_.connect, options_.credentials),
+      source_(options_.limits),
+      thread_([this] { run(); }) {}
 
 LayoutKeeper::~LayoutKeeper() { stop(); }
 

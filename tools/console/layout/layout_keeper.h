@@ -24,8 +24,9 @@
 namespace relmap::console {
 
 struct KeeperOptions {
-  KeptClient::Connect connect;    // with credentials that may read the map; called again after anything failed
-  std::string cache_folder = {};  // of layouts on disk; empty: none are kept there
+  KeptClient::Connect connect;  // with credentials that may read the map; called again after anything failed
+  KeptClient::Credentials credentials = {};               // that connect() shows
+  std::string cache_folder = {};                          // of layouts on disk; empty: none are kept there
   std::function<void(const std::string& line)> log = {};  // of what goes wrong; empty: nobody is told
   std::chrono::milliseconds poll{500};                    // between questions to the daemon
   std::uint64_t coarse_above = 50'000;                    // keyframes
