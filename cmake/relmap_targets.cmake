@@ -1,8 +1,9 @@
-# relmap_library(NAME [FOLDERS ...] LINK ... PRIVATE_LINK ... SOURCES extra... [THREAD_TESTS ...] TEST_LINK ...
-#                [TEST_FULL_TIMEOUT s])
+# relmap_library(NAME [FOLDERS ...] [EXCEPT ...] LINK ... PRIVATE_LINK ... SOURCES extra... [THREAD_TESTS ...]
+#                TEST_LINK ... [TEST_FULL_TIMEOUT s])
 #   A static library of all *.cc in the current folder, or in those of its subfolders that FOLDERS names, but *_test.cc,
-#   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, with label `ci`; those that THREAD_TESTS names, since
-#   they have threads, become NAME_threads_test, which is also built and run under ThreadSanitizer.
+#   *_fuzz.cc, *_main.cc and those that EXCEPT names. Its tests (*_test.cc) become NAME_test, with label `ci`; those that
+#   THREAD_TESTS names, since they have threads, become NAME_threads_test, which is also built and run under
+#   ThreadSanitizer.
 # relmap_program(NAME SOURCE LINK ...)  one program, into bin/.
 # relmap_fuzzer(NAME SOURCES ... LINK ... COVERS files...)
 #   With RELMAP_FUZZ a libFuzzer binary; otherwise a test that replays tests/corpus/NAME through it. COVERS names the
@@ -147,7 +148,7 @@ function(relmap_test name)
 endfunction()
 
 function(relmap_library name)
-  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "FOLDERS;LINK;PRIVATE_LINK;SOURCES;THREAD_TESTS;TEST_LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "EXCEPT;FOLDERS;LINK;PRIVATE_LINK;SOURCES;THREAD_TESTS;TEST_LINK" ${ARGN})
   set(patterns *.cc)
   if(arg_FOLDERS)
     list(TRANSFORM arg_FOLDERS APPEND /*.cc OUTPUT_VARIABLE patterns)
@@ -156,6 +157,9 @@ function(relmap_library name)
   file(GLOB sources CONFIGURE_DEPENDS ${patterns})
   set(tests ${sources})
   list(FILTER sources EXCLUDE REGEX "_(test|fuzz|main)\\.cc$")
+  foreach(file ${arg_EXCEPT})
+    list(REMOVE_ITEM sources ${CMAKE_CURRENT_SOURCE_DIR}/${file})
+  endforeach()
   list(FILTER tests INCLUDE REGEX "_test\\.cc$")
   add_library(${name} STATIC ${sources} ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC relmap_flags ${arg_LINK} PRIVATE ${arg_PRIVATE_LINK})

@@ -295,11 +295,7 @@ TEST_F(ConsoleLayout, SamplesHowTheDaemonDoes) {
   console::HealthOptions options;
   options.every = std::chrono::milliseconds(20);
   options.most = 5;
-  options.client = [this]() -> Result<std::shared_ptr<client::Client>> {
-    auto made = client::Client::connect(map_folder());
-    if (!made.ok()) return made.status();
-    return std::shared_ptr<client::Client>(*std::move(made));
-  };
+  options.connect = [this] { return client::Client::connect(map_folder()); };
   console::HealthSamples health(options);
   const auto until = std::chrono::steady_clock::now() + kPatience;
   while (health.samples().size() < 5 && std::chrono::steady_clock::now() < until)

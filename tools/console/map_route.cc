@@ -47,6 +47,12 @@ double decimal_of(const Request& request, const std::string& name, double otherw
   return number;
 }
 
+// With which the console asks for itself.
+std::string token_of(const Login& login) {
+  const auto caller = login.last_let_in();
+  return caller.ok() ? caller->token : std::string();
+}
+
 Response json(std::string text) {
   Response response;
   response.body = std::move(text);
@@ -111,13 +117,11 @@ MapRoutes::MapRoutes(std::string server, std::string authorities, std::string ca
       login_(login),
       http_(http),
       keeper_({.connect = [this] { return connect_for_all(kAnswerWithin); },
+               .credentials = [&login] { return token_of(login); },
                .cache_folder = std::move(cache),
                .log = [](const std::string& line) { std::cerr << line << std::endl; }}),
-      samples_({.client = [this]() -> Result<std::shared_ptr<client::Client>> {
-        auto client = connect_for_all(kSampleWithin);
-        if (!client.ok()) return client.status();
-        return std::shared_ptr<client::Client>(std::move(*client));
-      }}) {}
+      samples_({.connect = [this] { return connect_for_all(kSampleWithin); },
+                .credentials = [&login] { return token_of(login); }}) {}
 
 Result<std::unique_ptr<client::Client>> MapRoutes::connect(const Caller& caller,
                                                            std::chrono::milliseconds deadline) const {

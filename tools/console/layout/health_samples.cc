@@ -5,7 +5,8 @@
 
 namespace relmap::console {
 
-HealthSamples::HealthSamples(HealthOptions options) : options_(std::move(options)), thread_([this] { run(); }) {}
+HealthSamples::HealthSamples(HealthOptions options)
+    : options_(std::move(options)), client_(options_.connect, options_.credentials), thread_([this] { run(); }) {}
 
 HealthSamples::~HealthSamples() { stop(); }
 
@@ -35,10 +36,13 @@ HealthSample HealthSamples::take() {
   sample.time_ms =
       std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
           .count();
-  const auto client = options_.client();
+  const auto client = client_.get();
   if (!client.ok()) return sample;
   const auto status = (*client)->status();
-  if (!status.ok()) return sample;
+  if (!status.ok()) {
+    client_.drop();
+    return sample;
+  }
   const auto now = std::chrono::steady_clock::now();
   sample.reachable = true;
   if (boot_id_ == status->boot_id && status->ingest_keyframes >= ingested_) {

@@ -7,9 +7,8 @@
 #include <string>
 #include <thread>
 
-#include "client/relmap_client.h"
 #include "proto/base/mutex.h"
-#include "tools/console/layout/tile_source.h"
+#include "tools/console/layout/kept_client.h"
 
 namespace relmap::console {
 
@@ -26,8 +25,8 @@ struct HealthSample {
 };
 
 struct HealthOptions {
-  // LayoutKeeper::client(), or another. It is asked for anew for each sample.
-  ClientOf client;
+  KeptClient::Connect connect;               // called again after a sample could not be taken
+  KeptClient::Credentials credentials = {};  // that connect() shows
   std::chrono::milliseconds every{5000};
   std::size_t most = 720;       // samples
   std::size_t disk_every = 12;  // samples
@@ -58,6 +57,7 @@ class HealthSamples {
   std::deque<HealthSample> samples_ RELMAP_GUARDED_BY(mutex_);
 
   // Of the thread.
+  KeptClient client_;
   std::string boot_id_;
   std::uint64_t ingested_ = 0;
   std::chrono::steady_clock::time_point asked_{};

@@ -25,7 +25,10 @@ std::uint64_t now_ms() {
 }  // namespace
 
 LayoutKeeper::LayoutKeeper(KeeperOptions options)
-    : options_(std::move(options)), source_(options_.limits), thread_([this] { run(); }) {}
+    : options_(std::move(options)),
+      client_(options_.connect, options_.credentials),
+      source_(options_.limits),
+      thread_([this] { run(); }) {}
 
 LayoutKeeper::~LayoutKeeper() { stop(); }
 
@@ -62,7 +65,7 @@ Result<TileSource::TileBytes> LayoutKeeper::tile(const TileRequest& request) {
   if (!index || (request.from != 0 && !old))
     return {Reason::VIEW_EXPIRED, "the layout of version " + std::to_string(index ? request.from : request.version) +
                                       " is gone; ask for the newest one"};
-  return source_.tile(*index, old ? &old->layout() : nullptr, request, [this] { return connected(); });
+  return source_.tile(*index, old ? &old->layout() : nullptr, request, [this] { return client_.get(); });
 }
 
 Result<std::string> LayoutKeeper::places_json(std::string_view request) const {
@@ -83,7 +86,7 @@ void LayoutKeeper::run() {
     }
     const bool failed = !status.ok(), ending = !going().ok();
     if (failed && !ending) {
-      disconnect();  // it may have broken, or its token have been revoked
+      client_.drop();  // it may have broken, or its token have been revoked
       if (const Status before = state().error; before.to_string() != status.to_string())
         tell("the layout is not kept up: " + status.to_string());
     }
@@ -101,50 +104,30 @@ void LayoutKeeper::run() {
 }
 
 Status LayoutKeeper::round() {
-  const auto client = connected();
+  const auto client = client_.get();
   if (!client.ok()) return client.status();
   const auto status = (*client)->status();
   if (!status.ok()) return status.status();
   if (!(status->map == map_)) take_up(status->map);
   if (status->frames == 0) {
-    const MutexLock lock(mutex_);
-    if (state_.empty.ok()) {
-      state_ = {};
-      state_.empty = {Reason::EMPTY_MAP, "the map has no keyframes yet"};
-      kept_.clear();
-      behind_known_ = false;
-      changed();
-    }
+    behind_known_ = false;
+    show_nothing("the map has no keyframes yet");
     return {};
   }
   if (Status found = find_behind(**client, *status); !found.ok()) return found;
   const KeeperState now = state();
   if (now.layout && now.behind == 0 && !now.layout->coarse) return {};
+  const bool read = behind_known_ && boot_id_ == status->boot_id && status->map_version <= map_version_;
+  if (!now.layout && read) return {};  // there was nothing to draw, and nothing has changed
   if (Clock::now() < next_) return {};
   return make(**client, *status);
-}
-
-Result<std::shared_ptr<client::Client>> LayoutKeeper::connected() {
-  {
-    const MutexLock lock(mutex_);
-    if (client_) return client_;
-  }
-  auto made = options_.connect();
-  if (!made.ok()) return made.status();
-  const MutexLock lock(mutex_);
-  if (!client_) client_ = *std::move(made);
-  return client_;
-}
-
-void LayoutKeeper::disconnect() {
-  const MutexLock lock(mutex_);
-  client_ = nullptr;
 }
 
 void LayoutKeeper::take_up(const MapIdentity& map) {
   save();
   map_ = map;
   behind_known_ = false;
+  next_ = {};
   {
     const MutexLock lock(mutex_);
     if (state_.layout || !state_.empty.ok()) {
@@ -192,23 +175,64 @@ Status LayoutKeeper::find_behind(client::Client& client, const client::DaemonSta
 
 Status LayoutKeeper::make(client::Client& client, const client::DaemonStatus& status) {
   const bool none = !state().layout;
-  if (none && status.frames > options_.coarse_above)
+  if (none && status.frames > options_.coarse_above) {
     if (Status made = make_at(0, true, client, status); !made.ok()) return made;
+    if (!state().layout) return {};
+  }
   return make_at(client::level_for(status.frames), false, client, status);
 }
 
 Status LayoutKeeper::make_at(std::uint32_t level, bool coarse, client::Client& client,
                              const client::DaemonStatus& status) {
   const Clock::time_point begun = Clock::now();
-  show({"reading", 0, status.frames});
-  const auto skeleton =
-      client.skeleton({.level = level, .candidates = true}, [&](const client::Skeleton& so_far) -> Status {
-        show({"reading", so_far.frames_done, so_far.frames});
-        return going();
-      });
+  auto skeleton = read(level, client, status);
+  if (skeleton.reason() == Reason::WRONG_MAP) return {};  // the next round begins anew, with what answers now
   if (!skeleton.ok()) return skeleton.status();
+  const std::shared_ptr<const MapLayout> before = state().layout;
+  auto layout = lay_out(*skeleton, coarse, before.get());
+  const bool empty = layout.reason() == Reason::EMPTY_MAP;
+  if (!layout.ok() && !empty) return layout.status();
+  const Clock::duration took = Clock::now() - begun;
+  next_ = Clock::now() + std::max<Clock::duration>(kLeastPause, 3 * took);
+  boot_id_ = status.boot_id;
+  map_version_ = skeleton->map_version;
+  behind_before_ = 0;
+  behind_known_ = true;
+  if (empty) {
+    show_nothing("the map has no keyframes in metres yet: sessions of one camera have no scale, and are not drawn");
+    return {};
+  }
+  skeleton = client::Skeleton();  // the layout has what is needed of it
+  layout->map = status.map;
+  layout->boot_id = status.boot_id;
+  layout->level = level;
+  layout->coarse = coarse;
+  layout->version = std::max(now_ms(), before ? before->version + 1 : 0);
+  layout->seconds = std::chrono::duration<double>(took).count();
+  publish(*std::move(layout));
+  unsaved_ = !coarse;
+  if (Clock::now() - saved_ > kSaveEvery) save();
+  return {};
+}
+
+Result<client::Skeleton> LayoutKeeper::read(std::uint32_t level, client::Client& client,
+                                            const client::DaemonStatus& status) {
+  show({"reading", 0, status.frames});
+  auto skeleton = client.skeleton({.level = level, .candidates = true}, [&](const client::Skeleton& so_far) -> Status {
+    show({"reading", so_far.frames_done, so_far.frames});
+    return going();
+  });
+  if (!skeleton.ok()) return skeleton;
+  const auto now = client.status();
+  if (!now.ok()) return now.status();
+  if (now->boot_id != status.boot_id || !(now->map == status.map))
+    return Status(Reason::WRONG_MAP, "another daemon has come to the same address");
+  return skeleton;
+}
+
+Result<MapLayout> LayoutKeeper::lay_out(const client::Skeleton& skeleton, bool coarse, const MapLayout* before) {
   client::SkeletonLayout how;
-  if (skeleton->points() == skeleton->frames) how.relaxation = {};  // a small map is worth the time
+  if (skeleton.points() == skeleton.frames) how.relaxation = {};  // a small map is worth the time
   if (coarse) how.relaxation.max_iterations = kCoarseIterations;
   const auto total = static_cast<std::uint64_t>(how.relaxation.max_iterations);
   std::uint64_t most = 0;  // of the part that needs most
@@ -217,33 +241,10 @@ Status LayoutKeeper::make_at(std::uint32_t level, bool coarse, client::Client& c
     show({"relaxing", most, total});
     return going();
   };
-  const auto relaxed = client::relax_skeleton(*skeleton, how);
-  if (relaxed.reason() == Reason::EMPTY_MAP) {
-    const MutexLock lock(mutex_);
-    state_.empty = {Reason::EMPTY_MAP,
-                    "the map has no keyframes in metres yet: sessions of one camera have no scale, and are not drawn"};
-    changed();
-  }
-  if (!relaxed.ok()) return relaxed.reason() == Reason::EMPTY_MAP ? Status() : relaxed.status();
+  const auto relaxed = client::relax_skeleton(skeleton, how);
+  if (!relaxed.ok()) return relaxed.status();
   show({"drawing", 0, 0});
-  const std::shared_ptr<const MapLayout> before = state().layout;
-  MapLayout layout = make_layout(*skeleton, *relaxed, before.get());
-  layout.map = status.map;
-  layout.boot_id = status.boot_id;
-  layout.level = level;
-  layout.coarse = coarse;
-  layout.version = std::max(now_ms(), before ? before->version + 1 : 0);
-  const Clock::duration took = Clock::now() - begun;
-  layout.seconds = std::chrono::duration<double>(took).count();
-  next_ = Clock::now() + std::max<Clock::duration>(kLeastPause, 3 * took);
-  boot_id_ = status.boot_id;
-  map_version_ = layout.map_version;
-  behind_before_ = 0;
-  behind_known_ = true;
-  publish(std::move(layout));
-  unsaved_ = !coarse;
-  if (Clock::now() - saved_ > kSaveEvery) save();
-  return {};
+  return make_layout(skeleton, *relaxed, before);
 }
 
 void LayoutKeeper::publish(MapLayout layout) {
@@ -255,6 +256,15 @@ void LayoutKeeper::publish(MapLayout layout) {
   state_.behind = 0;
   state_.progress.reset();
   state_.empty = {};
+  changed();
+}
+
+void LayoutKeeper::show_nothing(const std::string& why) {
+  const MutexLock lock(mutex_);
+  if (!state_.layout && state_.empty.message() == why) return;
+  state_ = {};
+  state_.empty = {Reason::EMPTY_MAP, why};
+  kept_.clear();
   changed();
 }
 

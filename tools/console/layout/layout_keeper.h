@@ -17,14 +17,15 @@
 
 #include "client/relmap_client.h"
 #include "proto/base/mutex.h"
+#include "tools/console/layout/kept_client.h"
 #include "tools/console/layout/tile_index.h"
 #include "tools/console/layout/tile_source.h"
 
 namespace relmap::console {
 
 struct KeeperOptions {
-  // Makes a connection, with credentials that may read the map. Called again after one broke.
-  std::function<Result<std::unique_ptr<client::Client>>()> connect;
+  KeptClient::Connect connect;  // with credentials that may read the map; called again after anything failed
+  KeptClient::Credentials credentials = {};               // that connect() shows
   std::string cache_folder = {};                          // of layouts on disk; empty: none are kept there
   std::function<void(const std::string& line)> log = {};  // of what goes wrong; empty: nobody is told
   std::chrono::milliseconds poll{500};                    // between questions to the daemon
@@ -57,9 +58,6 @@ class LayoutKeeper {
   // Ends the thread, and all who wait. What is served stays served.
   void stop();
 
-  // The connection, for others who ask the daemon with the console's own credentials; it is made if there is none.
-  Result<std::shared_ptr<client::Client>> client() { return connected(); }
-
   KeeperState state() const;
   // Grows whenever the layout, its progress, an error or what `empty` says has changed.
   std::uint64_t changes() const;
@@ -79,13 +77,16 @@ class LayoutKeeper {
 
   void run();
   Status round();
-  Result<std::shared_ptr<client::Client>> connected();
-  void disconnect();
   void take_up(const MapIdentity& map);  // starts with what is on disk of it
   Status find_behind(client::Client& client, const client::DaemonStatus& status);
   Status make(client::Client& client, const client::DaemonStatus& status);
   Status make_at(std::uint32_t level, bool coarse, client::Client& client, const client::DaemonStatus& status);
+  // WRONG_MAP: another daemon has answered than the one of `status`.
+  Result<client::Skeleton> read(std::uint32_t level, client::Client& client, const client::DaemonStatus& status);
+  // EMPTY_MAP: nothing of the map is in metres.
+  Result<MapLayout> lay_out(const client::Skeleton& skeleton, bool coarse, const MapLayout* before);
   void publish(MapLayout layout);
+  void show_nothing(const std::string& why);
   void save();
   void tell(const std::string& line) const;
   void show(KeeperState::Progress progress);
@@ -94,6 +95,7 @@ class LayoutKeeper {
   void changed() RELMAP_REQUIRES(mutex_);
 
   const KeeperOptions options_;
+  KeptClient client_;
   TileSource source_;
 
   mutable Mutex mutex_;
@@ -102,12 +104,12 @@ class LayoutKeeper {
   std::uint64_t changes_ RELMAP_GUARDED_BY(mutex_) = 0;
   KeeperState state_ RELMAP_GUARDED_BY(mutex_);
   std::vector<std::shared_ptr<const TileIndex>> kept_ RELMAP_GUARDED_BY(mutex_);  // the newest first
-  std::shared_ptr<client::Client> client_ RELMAP_GUARDED_BY(mutex_);
 
   // Of the thread.
   MapIdentity map_;
-  std::string boot_id_;              // of the daemon that has the version below
-  std::uint64_t map_version_ = 0;    // which the layout shows, or that came after those in `behind_before_`
+  std::string boot_id_;  // of the daemon that has the version below
+  // Which the layout shows, or in which there was nothing to draw, or that came after those in `behind_before_`.
+  std::uint64_t map_version_ = 0;
   std::uint64_t behind_before_ = 0;  // versions that the layout was behind already when this daemon was met
   bool behind_known_ = false;        // these three are set
   Clock::time_point next_{};         // no layout is made before
