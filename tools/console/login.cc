@@ -73,7 +73,7 @@ Result<Caller> Login::last_let_in() const {
 
 Gate Login::gate() {
   return {[this](const Request& request) { return identify(request); },
-          [this](const Caller& caller) { return authorise(caller.token); }};
+          [this](const Caller& caller) { return authorise(caller.token); }, kind_ != Kind::kNone};
 }
 
 void Login::add_routes(Router& router) {

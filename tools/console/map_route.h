@@ -2,13 +2,16 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "tools/console/http/router.h"
 #include "tools/console/http/server.h"
 #include "tools/console/layout/health_samples.h"
 #include "tools/console/layout/layout_keeper.h"
+#include "tools/console/layout/single_flight.h"
 #include "tools/console/login.h"
 
 namespace relmap::console {
@@ -22,17 +25,19 @@ class MapRoutes {
 
   // The routes use this object.
   void add_to(Router& router);
-  // Nothing is kept up any more.
+  // Nothing is kept up any more, and nothing waits for the daemon: calls that run are cancelled.
   void stop();
 
  private:
   Result<std::unique_ptr<client::Client>> connect(const Caller& caller, std::chrono::milliseconds deadline) const;
-  Response tile(const Request& request);
-  Response places(const Request& request);
-  Response around(const Request& request) const;
+  Awaitable<Response> tile(const Request& request);
+  Awaitable<Response> places(const Request& request);
+  Awaitable<Response> around(const Request& request);
 
   const std::string server_, authorities_;
   Server& http_;
+  std::stop_source stop_;  // of calls to the daemon
+  SingleFlight<std::string, Response> around_;
   LayoutKeeper keeper_;
   HealthSamples samples_;
 };
