@@ -17,13 +17,13 @@ Finding read_finding(const v1::Finding& message) {
 }
 
 // Reads a stream to its end, or until `take` returns false.
-template <typename Reply, typename Take>
-Status read_all(grpc::ClientContext& context, grpc::ClientReader<Reply>& stream, Take take) {
+template <typename Impl, typename Reply, typename Take>
+Status read_all(const Impl& impl, grpc::ClientContext& context, grpc::ClientReader<Reply>& stream, Take take) {
   Reply reply;
   bool wanted = true;
   while (wanted && stream.Read(&reply)) wanted = take(reply);
   if (!wanted) context.TryCancel();
-  const Status end = status_of(stream.Finish());
+  const Status end = impl.end_of(stream.Finish());
   return wanted ? end : Status(Reason::DEADLINE, "interrupted");
 }
 
@@ -35,10 +35,10 @@ Result<VerifySummary> Client::verify(const std::vector<SessionNumber>& sessions,
   v1::VerifyRequest request;
   for (const SessionNumber session : sessions) request.add_sessions(session);
   grpc::ClientContext context;
-  impl_->begin(context, impl_->deadline());
+  const auto cancelled = impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->Verify(&context, request);
   VerifySummary summary;
-  const Status end = read_all(context, *stream, [&](const v1::VerifyReply& reply) {
+  const Status end = read_all(*impl_, context, *stream, [&](const v1::VerifyReply& reply) {
     impl_->tell(reply);
     for (const v1::Finding& finding : reply.findings()) on_finding(read_finding(finding));
     if (reply.has_summary()) {
@@ -57,10 +57,10 @@ Result<Backup> Client::backup(const std::string& folder, const OnProgress& on_pr
   request.set_folder(folder);
   if (Status texts = check_texts(request); !texts.ok()) return texts;
   grpc::ClientContext context;
-  impl_->begin(context, impl_->deadline());
+  const auto cancelled = impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->Backup(&context, request);
   Backup backup;
-  const Status end = read_all(context, *stream, [&](const v1::Progress& reply) {
+  const Status end = read_all(*impl_, context, *stream, [&](const v1::Progress& reply) {
     impl_->tell(reply);
     if (reply.has_backup())
       backup = {reply.backup().folder(), reply.backup().bytes(), reply.backup().durable_sequence()};
@@ -72,10 +72,10 @@ Result<Backup> Client::backup(const std::string& folder, const OnProgress& on_pr
 
 Result<Compaction> Client::compact(const OnProgress& on_progress) {
   grpc::ClientContext context;
-  impl_->begin(context, impl_->deadline());
+  const auto cancelled = impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->Compact(&context, v1::CompactRequest());
   Compaction compaction;
-  const Status end = read_all(context, *stream, [&](const v1::Progress& reply) {
+  const Status end = read_all(*impl_, context, *stream, [&](const v1::Progress& reply) {
     impl_->tell(reply);
     if (reply.has_compact()) compaction = {reply.compact().bytes_before(), reply.compact().bytes_after()};
     return on_progress(read_progress(reply));
@@ -149,9 +149,9 @@ Status Client::delete_session(SessionNumber session, const std::string& uuid, co
   request.set_uuid(uuid);
   if (Status texts = check_texts(request); !texts.ok()) return texts;
   grpc::ClientContext context;
-  impl_->begin(context, impl_->deadline());
+  const auto cancelled = impl_->begin(context, impl_->deadline());
   const auto stream = impl_->admin->DeleteSession(&context, request);
-  return read_all(context, *stream, [&](const v1::Progress& reply) {
+  return read_all(*impl_, context, *stream, [&](const v1::Progress& reply) {
     impl_->tell(reply);
     return on_progress(read_progress(reply));
   });

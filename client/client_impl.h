@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <utility>
 
@@ -30,11 +31,23 @@ struct Client::Impl {
 
   Clock::time_point deadline() const { return Clock::now() + options.deadline; }
 
-  // Gives the call its deadline, and what names it in the daemon's logs.
-  void begin(grpc::ClientContext& context, Clock::time_point until) const {
+  // Gives the call its deadline, and what names it in the daemon's logs. The call is cancelled if ClientOptions::stop
+  // says so while what this returns lives.
+  struct Cancel {
+    grpc::ClientContext* context;
+    void operator()() const { context->TryCancel(); }
+  };
+  [[nodiscard]] std::stop_callback<Cancel> begin(grpc::ClientContext& context, Clock::time_point until) const {
     context.set_deadline(until);
     name(context);
+    return std::stop_callback<Cancel>(options.stop, Cancel{&context});
   }
+  // How a call ended.
+  Status end_of(const grpc::Status& status) const {
+    if (!status.ok() && options.stop.stop_requested()) return stopped();
+    return status_of(status);
+  }
+  static Status stopped() { return {Reason::SHUTTING_DOWN, "the call was cancelled, since its program stops"}; }
   void name(grpc::ClientContext& context) const {
     if (!options.request_id.empty()) context.AddMetadata("x-request-id", options.request_id);
     if (!options.traceparent.empty()) context.AddMetadata("traceparent", options.traceparent);
@@ -52,8 +65,8 @@ struct Client::Impl {
   Status ask(Stub& stub, Method method, const Request& request, Reply& reply, Clock::time_point until) const {
     if (Status texts = check_texts(request); !texts.ok()) return texts;
     grpc::ClientContext context;
-    begin(context, until);
-    const Status status = status_of((stub.*method)(&context, request, &reply));
+    const auto cancelled = begin(context, until);
+    const Status status = end_of((stub.*method)(&context, request, &reply));
     if (status.ok()) tell(reply);
     return status;
   }
@@ -93,7 +106,7 @@ struct Client::Impl {
     const Clock::time_point until = deadline();
     for (int broken = 0;;) {
       grpc::ClientContext context;
-      begin(context, until);
+      const auto cancelled = begin(context, until);
       const auto stream = ((*map).*method)(&context, request);
       Reply reply;
       while (stream->Read(&reply)) {
@@ -106,7 +119,7 @@ struct Client::Impl {
         request.set_resume_token(reply.resume_token());
         broken = 0;
       }
-      const Status end = status_of(stream->Finish());
+      const Status end = end_of(stream->Finish());
       const bool resumable = end.reason() == Reason::UNREACHABLE && !request.resume_token().empty();
       if (!resumable || ++broken > kMaxResumptions) return end;
     }

@@ -32,6 +32,16 @@ std::string why_not(v1::Map::Stub& map) {
              : ": " + text.substr(at + sizeof kLast - 1);
 }
 
+// Waits for the connection, but no longer once `stop` says so.
+bool is_connected_by(std::chrono::system_clock::time_point until, grpc::Channel& channel, const std::stop_token& stop) {
+  constexpr std::chrono::milliseconds kLook{100};
+  for (;;) {
+    const auto now = std::chrono::system_clock::now();
+    if (channel.WaitForConnected(std::min(until, now + kLook))) return true;
+    if (now + kLook >= until || stop.stop_requested()) return false;
+  }
+}
+
 // gRPC would end the process over a header that is none.
 Status check_names(const ClientOptions& options) {
   for (const auto& [text, what] :
@@ -68,7 +78,8 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   if (!channel.ok()) return channel.status();
   auto impl = std::make_unique<Impl>(server, std::move(*channel), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";
-  if (!impl->channel->WaitForConnected(until)) {
+  if (!is_connected_by(until, *impl->channel, impl->options.stop)) {
+    if (impl->options.stop.stop_requested()) return Impl::stopped();
     const std::string why = why_not(*impl->map);
     return {Reason::UNREACHABLE, "nothing answers at " + where->address + named +
                                      other_causes(*where, impl->options.credentials, why) + why};
@@ -77,9 +88,9 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
 
   // After a crash the file `endpoint` remains, and another daemon may use its port by now.
   grpc::ClientContext context;
-  impl->begin(context, until);
+  const auto cancelled = impl->begin(context, until);
   v1::GetStatusReply reply;
-  if (Status status = status_of(impl->map->GetStatus(&context, {}, &reply)); !status.ok()) return status;
+  if (Status status = impl->end_of(impl->map->GetStatus(&context, {}, &reply)); !status.ok()) return status;
   if (reply.boot_id() == where->boot_id) return std::unique_ptr<Client>(new Client(std::move(impl)));
   // A daemon that has just started in its place writes the file anew.
   for (const auto enough = std::min(until, Impl::Clock::now() + kFileIsWrittenWithin);;) {
@@ -89,13 +100,19 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
       again.connect_timeout = std::chrono::duration_cast<std::chrono::milliseconds>(until - Impl::Clock::now());
       return connect(server, std::move(again));
     }
-    if (Impl::Clock::now() >= enough) break;
+    if (Impl::Clock::now() >= enough || impl->options.stop.stop_requested()) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   return {Reason::UNREACHABLE, "the daemon that served " + server + " is gone; another answers at " + where->address};
 }
 
 Result<std::unique_ptr<Client>> Client::connect_again() const { return connect(impl_->server, impl_->options); }
+
+std::unique_ptr<Client> Client::with_deadline(std::chrono::milliseconds deadline) const {
+  ClientOptions options = impl_->options;
+  options.deadline = deadline;
+  return std::unique_ptr<Client>(new Client(std::make_unique<Impl>(impl_->server, impl_->channel, std::move(options))));
+}
 
 Result<DaemonStatus> Client::status() {
   v1::GetStatusReply reply;

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,9 @@ struct ClientOptions {
   std::string request_id;
   // The trace that the calls belong to (traceparent of W3C Trace Context), for the daemon's logs; empty: none.
   std::string traceparent;
+  // Once it is asked to stop, from any thread, calls that run are cancelled, and these and all later ones end with
+  // SHUTTING_DOWN; connecting does, too. Not for watches, which have WatchOptions::stopped.
+  std::stop_token stop = {};
   // Called with the canonical proto3 JSON of each message received, in order, by the calling thread; of events of the
   // map with what they carry of a session or closure only.
   std::function<void(const std::string& json)> on_reply;
@@ -54,6 +58,8 @@ class Client {
   // Connects to the same server with the same options again, since a restarted daemon may use another port. Fails as
   // connect() does.
   Result<std::unique_ptr<Client>> connect_again() const;
+  // The same connection, with another deadline of each call.
+  std::unique_ptr<Client> with_deadline(std::chrono::milliseconds deadline) const;
 
   Result<DaemonStatus> status();
   // Returns when the daemon has applied, looked up and relaxed all keyframes that it has.

@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <stop_token>
+#include <thread>
 
 #include "client/channel.h"
 #include "client/server_address.h"
@@ -40,6 +43,14 @@ class FakeMap final : public v1::Map::Service {
     reply->set_storage_message("disk full");
     return grpc::Status::OK;
   }
+  // Until its caller gives up.
+  grpc::Status FindLabels(grpc::ServerContext* context, const v1::FindLabelsRequest*, v1::FindLabelsReply*) override {
+    ++waiting;
+    while (!context->IsCancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    return grpc::Status::CANCELLED;
+  }
+  std::atomic<int> waiting{0};
+
   grpc::Status Localise(grpc::ServerContext*, const v1::LocaliseRequest* request, v1::LocaliseReply* reply) override {
     if (request->view().calibration_case() == v1::View::CALIBRATION_NOT_SET)
       return refusal(Reason::NO_CALIBRATION, "which camera?");
@@ -318,6 +329,31 @@ TEST_F(ClientTest, SaysWhyNoDaemonCanBeReached) {
   EXPECT_EQ(Client::connect("host:99999", hasty).status().reason(), Reason::INVALID_ARGUMENT);
   std::ofstream(folder_ / "endpoint") << "nonsense";
   EXPECT_EQ(Client::connect(folder_.string(), hasty).status().reason(), Reason::CORRUPT);
+}
+
+// Both would last for ten minutes otherwise.
+TEST_F(ClientTest, EndsWhatItWaitsForOnceItIsToStop) {
+  std::stop_source stop;
+  ClientOptions options;
+  options.connect_timeout = options.deadline = std::chrono::minutes(10);
+  options.stop = stop.get_token();
+  const auto waiting = client(options);
+  // A call of the same connection with another deadline.
+  const auto other = waiting->with_deadline(std::chrono::minutes(9));
+  Status ended, other_ended, connected;
+  std::thread call([&] { ended = waiting->labels().status(); }),
+      call_again([&] { other_ended = other->labels().status(); });
+  std::thread connecting([&] { connected = Client::connect("127.0.0.1:1", options).status(); });
+  while (map_.waiting < 2) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_TRUE(waiting->status().ok());
+  stop.request_stop();
+  for (std::thread* const thread : {&call, &call_again, &connecting}) thread->join();
+  for (const Status& status : {ended, other_ended, connected, waiting->status().status()})
+    EXPECT_EQ(status.reason(), Reason::SHUTTING_DOWN) << status.to_string();
+}
+
+TEST_F(ClientTest, CallsHaveTheDeadlineThatTheyAreGiven) {
+  EXPECT_EQ(client()->with_deadline(std::chrono::milliseconds(50))->labels().reason(), Reason::DEADLINE);
 }
 
 TEST_F(ClientTest, ReachesADaemonThatListensEverywhereOverLoopback) {

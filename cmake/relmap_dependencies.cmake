@@ -4,6 +4,7 @@ find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d videoio)
 find_package(JPEG REQUIRED)
 find_package(ZLIB REQUIRED)
+find_package(Boost 1.74 REQUIRED)  # headers only: Beast and Asio
 find_package(OpenSSL 3 REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
@@ -44,7 +45,6 @@ if(RELMAP_SERVERS)
   find_package(Protobuf REQUIRED)  # module mode first: gRPC's config expects its targets
   find_package(gRPC REQUIRED)
   find_package(RocksDB REQUIRED)
-  find_package(Boost 1.74 REQUIRED)              # headers only: Beast and Asio
   find_package(prometheus-cpp REQUIRED CONFIG)  # only its core, which writes the text format
   pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
   find_program(LCM_GEN lcm-gen REQUIRED)

@@ -233,9 +233,10 @@ TEST_F(ConsoleLayout, DrawsEveryKeyframeFromNearby) {
   layout->version = 1;
   layout->zooms = 2;
   ASSERT_LT(layout->points.size(), kSessions * kFrames / 2);
-  console::KeyframeLines lines(64u << 20);
-  const auto of = lines.of(*layout, {1, 2, 3, 4}, *client).or_throw();
-  const auto again = lines.of(*layout, {2}, *client).or_throw();
+  console::KeyframeLines lines(64u << 20, std::chrono::milliseconds(0));
+  const console::ClientOf client_of = [&] { return Result(std::shared_ptr<client::Client>(daemon->client())); };
+  const auto of = lines.of(*layout, {1, 2, 3, 4}, client_of).or_throw();
+  const auto again = lines.of(*layout, {2}, client_of).or_throw();
   EXPECT_EQ(of.at(2), again.at(2)) << "kept";
 
   const console::TileIndex index(layout);

@@ -15,6 +15,9 @@ constexpr std::string_view kType = "application/grpc-web+proto";
 // What is passed on of a request's headers, as it is.
 constexpr std::array<std::string_view, 2> kPassedOn{"x-request-id", "traceparent"};
 
+// The daemon tells everyone its health.
+bool is_judged(std::string_view service) { return service.starts_with("relmap.v1."); }
+
 bool is_grpc_web(std::string_view type) {
   const std::string_view name = type.substr(0, type.find(';'));
   return name == kType || name == "application/grpc-web";
@@ -44,19 +47,22 @@ Awaitable<std::optional<Response>> forward(DaemonLink& link, Login& login, Reque
     if (!options.timeout)
       co_return error_response({Reason::INVALID_ARGUMENT, "'" + std::string(timeout) + "' is no grpc-timeout"});
   }
-  std::string asked(*message);
-  request.body = std::string();  // a stream may last for hours
+  // A stream may last for hours: the body, which is one frame, goes into the call.
+  std::string asked = std::exchange(request.body, std::string());
+  asked.erase(0, kFrameHead);
   Result<ForwardedCall> call = co_await link.call(request.path, std::move(asked), std::move(options));
   if (!call.ok()) co_return error_response(call.status());
+  // Has a name, since GCC 12 destroys what a temporary closure in such an expression holds twice (its bug 99576).
+  const std::function<bool()> gone = [&stream] { return stream.gone(); };
+  std::optional<std::string> next = co_await call->next(gone);
+  // Once the daemon has answered, gRPC does not hold what was sent any more.
   Response head;
   head.type = kType;
   stream.begin(std::move(head));
-  // Has a name, since GCC 12 destroys what a temporary closure in such an expression holds twice (its bug 99576).
-  const std::function<bool()> gone = [&stream] { return stream.gone(); };
-  for (;;) {
-    const std::optional<std::string> next = co_await call->next(gone);
-    if (!next) break;
+  if (is_judged(request.parts.at(0)) && (next || call->end().code == 0)) stream.let_in();
+  while (next) {
     co_await stream.write(message_frame(*next));
+    next = co_await call->next(gone);
   }
   co_await stream.write(trailers_frame(call->end()));
   co_return std::nullopt;

@@ -81,7 +81,7 @@ bool Login::is_operator(const Caller& caller) const {
 
 Gate Login::gate() {
   return {[this](const Request& request) { return identify(request); },
-          [this](const Caller& caller) { return authorise(caller); }};
+          [this](const Caller& caller) { return authorise(caller); }, kind_ != Kind::kNone};
 }
 
 void Login::add_routes(Router& router) {

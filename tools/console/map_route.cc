@@ -7,6 +7,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -22,8 +23,10 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr double kLongestWait = 25;  // seconds
-constexpr milliseconds kConnectWithin{5000}, kAnswerWithin{60'000}, kSampleWithin{5000};
-constexpr double kFarthest = 1000;  // metres around a closure
+constexpr milliseconds kConnectWithin{5000}, kSampleWithin{5000};
+constexpr milliseconds kSkeletonWithin{60'000};  // of the whole map
+constexpr milliseconds kAnswerWithin{10'000};    // while a browser waits
+constexpr double kFarthest = 1000;               // metres around a closure
 
 Status no_number(const std::string& name, const std::string& text) {
   return {Reason::INVALID_ARGUMENT, "'" + name + "' is no number that can be: " + text};
@@ -98,14 +101,29 @@ struct TellSamples {
   }
 };
 
-// What takes more than some milliseconds: it is made on a thread for that.
-struct MakeAnswer {
-  Server* http;
-  std::function<Response(const Request&)> make;
-  Awaitable<Response> operator()(const Request& request) const {
-    co_return co_await http->on_worker([this, &request] { return make(request); });
+TileRequest tile_request(const Request& request) {
+  TileRequest wanted;
+  if (!read_number(request.parts.at(0), wanted.version) || !read_number(request.parts.at(1), wanted.tile.zoom) ||
+      !read_number(request.parts.at(2), wanted.tile.x) || !read_number(request.parts.at(3), wanted.tile.y))
+    throw StatusError({Reason::INVALID_ARGUMENT, "a tile is /map/tiles/VERSION/Z/X/Y"});
+  wanted.from = number_of(request, "from");
+  if (const std::string root = request.parameter("root"); !root.empty()) {
+    wanted.root = FrameId::parse(root);
+    if (!wanted.root) throw StatusError({Reason::INVALID_ARGUMENT, "'" + root + "' is no frame: SESSION:INDEX"});
   }
-};
+  return wanted;
+}
+
+LocalRequest local_request(const Request& request) {
+  LocalRequest wanted;
+  const std::string edge = request.parameter("edge");
+  const auto parsed = EdgeId::parse(edge);
+  if (!parsed) throw StatusError({Reason::INVALID_ARGUMENT, "'" + edge + "' is no closure: SESSION:INDEX/ORDINAL"});
+  wanted.edge = *parsed;
+  wanted.metres = std::min(decimal_of(request, "metres", wanted.metres), kFarthest);
+  if (request.query.contains("goes")) wanted.goes_with = edges_in(request.parameter("goes"));
+  return wanted;
+}
 
 }  // namespace
 
@@ -116,10 +134,13 @@ MapRoutes::MapRoutes(std::string server, std::string authorities, std::string ca
       link_(link),
       login_(login),
       http_(http),
-      keeper_({.connect = [this] { return connect_for_all(kAnswerWithin); },
+      keeper_({.connect = [this] { return connect_for_all(kSkeletonWithin); },
                .credentials = [&login] { return token_of(login); },
                .cache_folder = std::move(cache),
-               .log = [](const std::string& line) { std::cerr << line << std::endl; }}),
+               .log =
+                   [this](const std::string& line) {
+                     if (!stop_.stop_requested()) std::cerr << line << std::endl;
+                   }}),
       samples_({.connect = [this] { return connect_for_all(kSampleWithin); },
                 .credentials = [&login] { return token_of(login); }}) {}
 
@@ -130,6 +151,7 @@ Result<std::unique_ptr<client::Client>> MapRoutes::connect(const Caller& caller,
   options.deadline = deadline;
   options.token = caller.token;
   options.authorities = authorities_;
+  options.stop = stop_.get_token();
   auto client = client::Client::connect(server_, std::move(options));
   // What the folder names may have become another kind of address meanwhile.
   if (const auto where = link_.where(); where.reason() == Reason::NEEDS_RESTART) return where.status();
@@ -150,36 +172,37 @@ Result<std::unique_ptr<client::Client>> MapRoutes::connect_for_all(milliseconds 
 
 void MapRoutes::add_to(Router& router) {
   const auto add = [&](const char* method, const char* pattern, Handler handler,
-                       std::size_t body_limit = std::size_t{64} << 10) {
+                       std::size_t body_limit = kMaxUnjudgedBody) {
     Route route{method, pattern, Access::kAuthorised, std::move(handler)};
     route.body_limit = body_limit;
     router.add(std::move(route));
   };
   add("GET", "/map/layout", TellState{&keeper_});
-  add("GET", "/map/tiles/*/*/*/*", MakeAnswer{&http_, [this](const Request& request) { return tile(request); }});
-  add("POST", "/map/places", MakeAnswer{&http_, [this](const Request& request) { return places(request); }},
-      std::size_t{1} << 20);
-  add("GET", "/map/local", MakeAnswer{&http_, [this](const Request& request) { return around(request); }});
+  add("GET", "/map/tiles/*/*/*/*", [this](const Request& request) { return tile(request); });
+  add(
+      "POST", "/map/places", [this](const Request& request) { return places(request); }, std::size_t{1} << 20);
+  add("GET", "/map/local", [this](const Request& request) { return around(request); });
   add("GET", "/health/samples", TellSamples{&samples_, &login_});
 }
 
 void MapRoutes::stop() {
+  stop_.request_stop();
   keeper_.stop();
   samples_.stop();
 }
 
-Response MapRoutes::tile(const Request& request) {
-  TileRequest wanted;
-  if (!read_number(request.parts.at(0), wanted.version) || !read_number(request.parts.at(1), wanted.tile.zoom) ||
-      !read_number(request.parts.at(2), wanted.tile.x) || !read_number(request.parts.at(3), wanted.tile.y))
-    return error_response({Reason::INVALID_ARGUMENT, "a tile is /map/tiles/VERSION/Z/X/Y"});
-  wanted.from = number_of(request, "from");
-  if (const std::string root = request.parameter("root"); !root.empty()) {
-    wanted.root = FrameId::parse(root);
-    if (!wanted.root) return error_response({Reason::INVALID_ARGUMENT, "'" + root + "' is no frame: SESSION:INDEX"});
+// Closures in these have names, since GCC 12 destroys what a temporary one in such an expression holds twice (its bug
+// 99576).
+
+Awaitable<Response> MapRoutes::tile(const Request& request) {
+  const TileRequest wanted = tile_request(request);
+  std::optional<TileSource::TileBytes> made;
+  const std::function<void()> make = [&] { made = keeper_.tile_at_once(wanted).or_throw(); };
+  co_await http_.work(Work::kComputes, request, make);
+  if (!made) {
+    const std::function<void()> ask = [&] { made = keeper_.tile(wanted).or_throw(); };
+    co_await http_.work(Work::kAsksDaemon, request, ask);
   }
-  const auto made = keeper_.tile(wanted);
-  if (!made.ok()) return error_response(made.status());
   Response response;
   response.type = "application/vnd.relmap.tile";
   if (*made)
@@ -188,28 +211,31 @@ Response MapRoutes::tile(const Request& request) {
     response.status = 204;
   // The layout of a version never changes. What tiles have beyond its points, from the daemon, may.
   response.cache = "private, max-age=600";
-  return response;
+  co_return response;
 }
 
-Response MapRoutes::places(const Request& request) {
-  auto found = keeper_.places_json(request.body);
-  return found.ok() ? json(std::move(*found)) : error_response(found.status());
+Awaitable<Response> MapRoutes::places(const Request& request) {
+  std::string found;
+  const std::function<void()> find = [&] { found = keeper_.places_json(request.body).or_throw(); };
+  co_await http_.work(Work::kComputes, request, find);
+  co_return json(std::move(found));
 }
 
-Response MapRoutes::around(const Request& request) const {
-  LocalRequest wanted;
-  const auto edge = EdgeId::parse(request.parameter("edge"));
-  if (!edge)
-    return error_response(
-        {Reason::INVALID_ARGUMENT, "'" + request.parameter("edge") + "' is no closure: SESSION:INDEX/ORDINAL"});
-  wanted.edge = *edge;
-  wanted.metres = std::min(decimal_of(request, "metres", wanted.metres), kFarthest);
-  if (request.query.contains("goes")) wanted.goes_with = edges_in(request.parameter("goes"));
+Awaitable<Response> MapRoutes::around(const Request& request) {
+  const LocalRequest wanted = local_request(request);
   // With the caller's own credentials, since what a removal would do is told to operators only.
-  const auto client = connect(request.caller, kAnswerWithin);
-  if (!client.ok()) return error_response(client.status());
-  const auto laid = local_layout(wanted, **client);
-  return laid.ok() ? json(json_of(*laid)) : error_response(laid.status());
+  const std::string key = request.caller.token + '\n' + wanted.edge.to_string() + '\n' + request.parameter("metres") +
+                          '\n' + (wanted.goes_with ? "goes:" + request.parameter("goes") : "");
+  const std::function<Response()> ask = [&] {
+    const auto client = connect(request.caller, kAnswerWithin);
+    if (!client.ok()) return error_response(client.status());
+    const auto laid = local_layout(wanted, **client);
+    return laid.ok() ? json(json_of(*laid)) : error_response(laid.status());
+  };
+  Response response;
+  const std::function<void()> make = [&] { response = around_.get(key, ask); };
+  co_await http_.work(Work::kAsksDaemon, request, make);
+  co_return response;
 }
 
 }  // namespace relmap::console

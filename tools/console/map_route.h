@@ -2,7 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "tools/console/forward/daemon_link.h"
@@ -10,6 +12,7 @@
 #include "tools/console/http/server.h"
 #include "tools/console/layout/health_samples.h"
 #include "tools/console/layout/layout_keeper.h"
+#include "tools/console/layout/single_flight.h"
 #include "tools/console/login.h"
 
 namespace relmap::console {
@@ -24,21 +27,23 @@ class MapRoutes {
 
   // The routes use this object.
   void add_to(Router& router);
-  // Nothing is kept up any more.
+  // Nothing is kept up any more, and nothing waits for the daemon: calls that run are cancelled.
   void stop();
 
  private:
   Result<std::unique_ptr<client::Client>> connect(const Caller& caller, std::chrono::milliseconds deadline) const;
   // With the console's own credentials. A token that the daemon refuses is not used again.
   Result<std::unique_ptr<client::Client>> connect_for_all(std::chrono::milliseconds deadline) const;
-  Response tile(const Request& request);
-  Response places(const Request& request);
-  Response around(const Request& request) const;
+  Awaitable<Response> tile(const Request& request);
+  Awaitable<Response> places(const Request& request);
+  Awaitable<Response> around(const Request& request);
 
   const std::string server_, authorities_;
   const DaemonLink& link_;
   Login& login_;
   Server& http_;
+  std::stop_source stop_;  // of calls to the daemon
+  SingleFlight<std::string, Response> around_;
   LayoutKeeper keeper_;
   HealthSamples samples_;
 };

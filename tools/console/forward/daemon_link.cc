@@ -134,6 +134,8 @@ class ForwardedCall::Reactor final : public grpc::ClientBidiReactor<grpc::ByteBu
     if (release) RemoveHold();
   }
 
+  void OnWriteDone(bool) override { request_.Clear(); }
+
   void OnDone(const grpc::Status& status) override {
     if (status.error_code() == grpc::StatusCode::UNAVAILABLE) running_->unreachable = true;
     const bool refused = status.error_code() == grpc::StatusCode::UNAUTHENTICATED && !token_.empty();

@@ -5,8 +5,10 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -42,28 +44,55 @@ struct Served {
   std::atomic<std::size_t> body_bytes{0};
 };
 
+// An address of IPv4 as such, where a socket of both kinds has it as one of IPv6.
+inline asio::ip::address plain(const asio::ip::address& address) {
+  return address.is_v6() && address.to_v6().is_v4_mapped()
+             ? asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6())
+             : address;
+}
+
 class OpenConnection {
  public:
+  explicit OpenConnection(const asio::ip::address& peer) : peer_(plain(peer)) {}
   virtual ~OpenConnection() = default;
   virtual void close() = 0;  // from any thread
   // Whether it waits for a request, or for the rest of a request's header. From any thread.
   bool idle() const { return idle_; }
+  // Whether the last caller who was judged was let in. From any thread.
+  bool proven() const { return proven_; }
+  const asio::ip::address& peer() const { return peer_; }
+  // What counts as one address: whoever has one of IPv6 has 64 bits of them.
+  std::string peer_group() const {
+    if (peer_.is_v4()) return peer_.to_string();
+    auto bytes = peer_.to_v6().to_bytes();
+    std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
+    return asio::ip::address_v6(bytes).to_string();
+  }
 
  protected:
-  std::atomic<bool> idle_{true};
+  std::atomic<bool> idle_{true}, proven_{false};
+
+ private:
+  const asio::ip::address peer_;
 };
 
-// The bytes of a body that is being received and handled, within ServerOptions::max_bodies.
+// The bytes of a body that have come and are held, within ServerOptions::max_bodies.
 class BodyCharge {
  public:
   explicit BodyCharge(Served& served) : served_(served) {}
-  ~BodyCharge() { served_.body_bytes -= bytes_; }
+  ~BodyCharge() { give_back(); }
   BodyCharge(const BodyCharge&) = delete;
   BodyCharge& operator=(const BodyCharge&) = delete;
-  bool take(std::size_t bytes) {
-    bytes_ = bytes;
-    return (served_.body_bytes += bytes) <= served_.options.max_bodies;
+  // False, and nothing is added, if they do not fit.
+  bool add(std::size_t bytes) {
+    if ((served_.body_bytes += bytes) > served_.options.max_bodies) {
+      served_.body_bytes -= bytes;
+      return false;
+    }
+    bytes_ += bytes;
+    return true;
   }
+  void give_back() { served_.body_bytes -= std::exchange(bytes_, 0); }
 
  private:
   Served& served_;
@@ -79,8 +108,13 @@ class Connection final : public OpenConnection,
   static constexpr bool kTls = !std::is_same_v<Stream, beast::tcp_stream>;
 
   template <typename... Arguments>
-  Connection(Served& served, std::shared_ptr<asio::ssl::context> context, Arguments&&... arguments)
-      : served_(served), context_(std::move(context)), stream_(std::forward<Arguments>(arguments)...) {}
+  Connection(Served& served, std::shared_ptr<asio::ssl::context> context, const asio::ip::address& peer,
+             Arguments&&... arguments)
+      : OpenConnection(peer),
+        served_(served),
+        context_(std::move(context)),
+        stream_(std::forward<Arguments>(arguments)...),
+        charge_(served) {}
 
   auto executor() { return stream_.get_executor(); }
 
@@ -100,10 +134,15 @@ class Connection final : public OpenConnection,
     asio::post(stream_.get_executor(), [self = this->shared_from_this()] { self->lowest().close(); });
   }
 
-  void begin(Response head) override { head_ = std::move(head); }
+  void begin(Response head) override {
+    head_ = std::move(head);
+    charge_.give_back();
+  }
+
+  void let_in() override { proven_ = served_.gate.proves; }
 
   Awaitable<void> write(std::string bytes) override {
-    lowest().expires_after(served_.options.write_patience);
+    lowest().expires_after(write_patience());
     if (!begun_) {
       begun_ = true;
       web::response<web::empty_body> message;
@@ -132,9 +171,12 @@ class Connection final : public OpenConnection,
   }
 
  private:
-  using Parser = web::request_parser<web::string_body>;
+  using Parser = web::request_parser<web::buffer_body>;
 
   beast::tcp_stream& lowest() { return beast::get_lowest_layer(stream_); }
+  std::chrono::milliseconds write_patience() const {
+    return proven_ ? served_.options.write_patience : served_.options.unproven_write_patience;
+  }
 
   Awaitable<void> handshake() {
     if constexpr (kTls) {
@@ -185,34 +227,32 @@ class Connection final : public OpenConnection,
 
     Request request;
     Router::Match match;
-    BodyCharge charge(served_);
-    Status status = admit(parser, request, match, charge);
-    if (status.ok()) status = co_await guard(authorise(*match.route, request));
+    charge_.give_back();
+    Status status = admit(parser, request, match);
+    if (status.ok() && match.route->access == Access::kAuthorised) status = co_await judge(request);
+    if (status.ok() && !parser.is_done()) status = co_await read_body(parser, *match.route, request);
     if (!status.ok()) {
       // What may follow of the body is not read.
       if (!parser.is_done()) keep_alive_ = false;
+      release_body(request);
       const Response refused = error_response(status);
       co_return co_await answer(refused, request);
     }
-    if (!parser.is_done()) {
-      if (beast::iequals(header[web::field::expect], "100-continue")) {
-        static constexpr std::string_view kGoOn = "HTTP/1.1 100 Continue\r\n\r\n";
-        co_await asio::async_write(stream_, asio::const_buffer(kGoOn.data(), kGoOn.size()), asio::use_awaitable);
-      }
-      parser.body_limit(match.route->body_limit);
-      lowest().expires_after(served_.options.body_patience);
-      co_await web::async_read(stream_, buffer_, parser, asio::redirect_error(asio::use_awaitable, error));
-      if (error) co_return co_await refuse_body(error, request, *match.route);
-    }
-    request.body = std::move(parser.get().body());
     lowest().expires_never();
     co_return co_await handle(*match.route, request);
   }
 
   // All that can be judged before the body is read.
-  Status admit(const Parser& parser, Request& request, Router::Match& match, BodyCharge& charge) {
+  Status admit(const Parser& parser, Request& request, Router::Match& match) {
     const auto& header = parser.get();
     if (version_ != 10 && version_ != 11) return {Reason::INVALID_ARGUMENT, "this is not HTTP/1.1"};
+    // Whoever frames a body in another way than we do could hide a request in it.
+    if (header.count(web::field::transfer_encoding) > 0 &&
+        (version_ != 11 || header.count(web::field::transfer_encoding) > 1 ||
+         !beast::iequals(header[web::field::transfer_encoding], "chunked"))) {
+      keep_alive_ = false;
+      return {Reason::INVALID_ARGUMENT, "Transfer-Encoding may only be: chunked"};
+    }
     for (const auto& field : header) {
       std::string name(field.name_string().data(), field.name_string().size());
       for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -220,9 +260,10 @@ class Connection final : public OpenConnection,
       if (!added) entry->second += ", " + std::string(field.value());
     }
     beast::error_code ignored;
-    request.peer = lowest().socket().remote_endpoint(ignored).address().to_string();
+    request.peer = peer().to_string();
     request.tls = kTls;
-    const std::string own = lowest().socket().local_endpoint(ignored).address().to_string();
+    request.gone = [this] { return gone(); };
+    const std::string own = plain(lowest().socket().local_endpoint(ignored).address()).to_string();
     const std::string_view host = request.header("host");
     if (Status known = served_.names.check_host(host, own); !known.ok()) return known;
     if (Status sound = parse_target(view(header.target()), request.path, request.query); !sound.ok()) return sound;
@@ -231,6 +272,8 @@ class Connection final : public OpenConnection,
     if (!found.ok()) return found.status();
     match = std::move(*found);
     request.parts = std::move(match.parts);
+    if (!match.route->linked)
+      if (Status own_site = check_fetch_site(request.header("sec-fetch-site")); !own_site.ok()) return own_site;
     if (request.method == "POST")
       if (Status own_page = served_.names.check_origin(request.header("origin"), host, kTls); !own_page.ok())
         return own_page;
@@ -239,27 +282,77 @@ class Connection final : public OpenConnection,
       if (!caller.ok()) return caller.status();
       request.caller = std::move(*caller);
     }
-    const std::size_t limit = match.route->body_limit;
+    const std::size_t limit = body_limit(*match.route);
     const auto length = parser.content_length();
     if (length && *length > limit)
       return {Reason::BAD_SIZE,
               "the body has " + std::to_string(*length) + " bytes, and may have " + std::to_string(limit)};
-    if (!charge.take(parser.is_done() ? 0 : length ? static_cast<std::size_t>(*length) : limit))
-      return {Reason::BUDGET_EXCEEDED, "the console has no room for more requests of this size: try again"};
     return {};
   }
 
-  Awaitable<Status> authorise(const Route& route, const Request& request) {
-    if (route.access != Access::kAuthorised) co_return Status();
-    co_return co_await served_.gate.authorise(request.caller);
+  static std::size_t body_limit(const Route& route) {
+    return route.access == Access::kAnyone ? std::min(route.body_limit, kMaxUnjudgedBody) : route.body_limit;
   }
 
-  static Awaitable<Status> guard(Awaitable<Status> checked) {
+  // Whether the gate lets the request's caller in.
+  Awaitable<Status> judge(const Request& request) {
+    Status status;
     try {
-      co_return co_await std::move(checked);
+      status = co_await served_.gate.authorise(request.caller);
     } catch (const std::exception&) {
-      co_return caught_status();
+      status = caught_status();
     }
+    if (status.ok()) let_in();
+    if (status.reason() == Reason::UNAUTHENTICATED || status.reason() == Reason::NOT_ALLOWED) proven_ = false;
+    co_return status;
+  }
+
+  // Reads the body as it comes, and counts what has come. Throws if nothing more comes.
+  Awaitable<Status> read_body(Parser& parser, const Route& route, Request& request) {
+    constexpr std::size_t kStep = 16 * 1024;
+    const std::size_t limit = body_limit(route);
+    // Of callers whom only the handler's call will show to be let in, no more is read than strangers may send.
+    bool judged = route.access != Access::kCaller || limit <= kMaxUnjudgedBody;
+    const bool known = proven_ || route.access == Access::kAuthorised;
+    lowest().expires_after(known ? served_.options.body_patience : served_.options.unproven_body_patience);
+    parser.body_limit(limit);
+    const auto announced = static_cast<std::size_t>(parser.content_length().value_or(0));
+    bool is_waiting = beast::iequals(parser.get()[web::field::expect], "100-continue");
+    while (!parser.is_done()) {
+      const std::size_t had = request.body.size();
+      if (!judged && std::max(had + 1, announced) > kMaxUnjudgedBody) {
+        if (Status let = co_await judge(request); !let.ok()) co_return let;
+        judged = true;
+        lowest().expires_after(served_.options.body_patience);
+      }
+      if (std::exchange(is_waiting, false)) {
+        static constexpr std::string_view kGoOn = "HTTP/1.1 100 Continue\r\n\r\n";
+        co_await asio::async_write(stream_, asio::const_buffer(kGoOn.data(), kGoOn.size()), asio::use_awaitable);
+      }
+      const std::size_t room = judged ? kStep : std::min(kStep, kMaxUnjudgedBody - had);
+      request.body.resize(had + room);
+      auto& into = parser.get().body();
+      into.data = request.body.data() + had;
+      into.size = room;
+      beast::error_code error;
+      co_await web::async_read_some(stream_, buffer_, parser, asio::redirect_error(asio::use_awaitable, error));
+      const std::size_t got = room - parser.get().body().size;
+      request.body.resize(had + got);
+      if (error == web::error::body_limit)
+        co_return Status(Reason::BAD_SIZE, "the body has more than " + std::to_string(limit) + " bytes");
+      if (error && error != web::error::need_buffer) {
+        if (nobody_is_there(error)) throw beast::system_error(error);
+        co_return Status(Reason::INVALID_ARGUMENT, "the body cannot be read: " + error.message());
+      }
+      if (!charge_.add(got))
+        co_return Status(Reason::BUDGET_EXCEEDED, "the console has no room for more requests of this size: try again");
+    }
+    co_return Status();
+  }
+
+  void release_body(Request& request) {
+    request.body = std::string();
+    charge_.give_back();
   }
 
   Awaitable<bool> handle(const Route& route, Request& request) {
@@ -273,6 +366,8 @@ class Connection final : public OpenConnection,
       if (begun_) throw;  // the reader sees that the answer is cut off
       response = error_response(caught_status());
     }
+    release_body(request);
+    if (response && response->status < 400 && route.access == Access::kCaller) let_in();
     if (response) co_return co_await answer(*response, request);
     if (!begun_) co_await write("");
     if (version_ < 11) co_return false;
@@ -298,7 +393,7 @@ class Connection final : public OpenConnection,
       message.prepare_payload();
     }
     message.keep_alive(keep_alive_);
-    lowest().expires_after(served_.options.write_patience);
+    lowest().expires_after(write_patience());
     if (head_only_) {
       web::response_serializer<web::string_body> serializer(message);
       co_await web::async_write_header(stream_, serializer, asio::use_awaitable);
@@ -308,12 +403,16 @@ class Connection final : public OpenConnection,
     co_return keep_alive_;
   }
 
+  // Whether the error says that the other end has gone or says no more, so that nobody would read an answer.
+  static bool nobody_is_there(const beast::error_code& error) {
+    return error == web::error::end_of_stream || error == web::error::partial_message ||
+           error == beast::error::timeout || error.category() == asio::error::get_system_category() ||
+           error.category() == asio::error::get_misc_category();
+  }
+
   // A header that cannot be read.
   Awaitable<bool> refuse_header(beast::error_code error) {
-    if (error == web::error::end_of_stream || error == beast::error::timeout ||
-        error.category() == asio::error::get_system_category() ||
-        error.category() == asio::error::get_misc_category() || error == web::error::partial_message)
-      co_return false;  // nobody is there to read an answer
+    if (nobody_is_there(error)) co_return false;
     const bool large = error == web::error::header_limit || error == web::error::buffer_overflow;
     Response response =
         error_response({large ? Reason::BAD_SIZE : Reason::INVALID_ARGUMENT,
@@ -323,20 +422,6 @@ class Connection final : public OpenConnection,
     version_ = 11;
     const Request none;
     co_return co_await answer(response, none);
-  }
-
-  Awaitable<bool> refuse_body(beast::error_code error, const Request& request, const Route& route) {
-    keep_alive_ = false;
-    if (error == web::error::body_limit) {
-      const Response large =
-          error_response({Reason::BAD_SIZE, "the body has more than " + std::to_string(route.body_limit) + " bytes"});
-      co_return co_await answer(large, request);
-    }
-    if (error == beast::error::timeout || error == web::error::partial_message ||
-        error.category() == asio::error::get_system_category() || error.category() == asio::error::get_misc_category())
-      co_return false;
-    const Response bad = error_response({Reason::INVALID_ARGUMENT, "the body cannot be read: " + error.message()});
-    co_return co_await answer(bad, request);
   }
 
   template <typename Message>
@@ -372,6 +457,7 @@ class Connection final : public OpenConnection,
   // Of the present request.
   unsigned version_ = 11;
   bool keep_alive_ = true, head_only_ = false, accepts_gzip_ = false, begun_ = false;
+  BodyCharge charge_;
   Response head_;
 };
 

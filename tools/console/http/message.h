@@ -36,6 +36,8 @@ struct Request {
   std::string peer;    // the address that it came from, without a port
   bool tls = false;    // whether this connection is of TLS
   Caller caller = {};  // for routes whose access is not kAnyone
+  // Whether the browser has closed the connection. For the handler's own coroutine; empty: nobody knows.
+  std::function<bool()> gone = {};
 
   std::string_view header(std::string_view name) const {
     const auto found = headers.find(name);
@@ -67,23 +69,30 @@ unsigned http_status_of(Reason reason);
 class ResponseStream {
  public:
   virtual ~ResponseStream() = default;
-  // The head of the answer goes out with the first bytes.
+  // The head of the answer goes out with the first bytes. The request's body is not counted any more
+  // (ServerOptions::max_bodies), so the handler must hold none of it by then.
   virtual void begin(Response head) = 0;
+  // The daemon has let the caller in: to be said by handlers of Access::kCaller once they know.
+  virtual void let_in() = 0;
   // Returns when the connection has taken the bytes, and so waits for a slow reader. Throws if the reader has gone.
   virtual Awaitable<void> write(std::string bytes) = 0;
   // Whether the reader has closed the connection; to be asked now and then by who waits for something to write.
   virtual bool gone() = 0;
 };
 
-// Handlers run on a thread of the server, and must not block it: what takes more than some milliseconds belongs on
-// Server::on_worker(). A StatusError that they throw is answered as error_response().
+// Handlers run on a thread of the server, and must not block it: what takes more than some milliseconds belongs into
+// Server::work(). A StatusError that they throw is answered as error_response().
 using Handler = std::function<Awaitable<Response>(const Request&)>;
 // Answers by the stream, or returns an answer without having begun it. `request` lives until it ends.
 using StreamHandler = std::function<Awaitable<std::optional<Response>>(Request& request, ResponseStream& stream)>;
 
+// So much of a body is read of callers whom nobody has let in yet.
+inline constexpr std::size_t kMaxUnjudgedBody = std::size_t{64} << 10;
+
 enum class Access : std::uint8_t {
   kAnyone,      // no credentials are looked at
-  kCaller,      // they are there; the daemon judges them with the call that the handler makes
+  kCaller,      // they are there; the daemon judges them with the call that the handler makes, so an answer below 400
+                // says that it has let the caller in (for streams: ResponseStream::let_in())
   kAuthorised,  // the daemon has let the caller in within the last 15 seconds, for answers from the console's own
                 // memory
 };
@@ -94,7 +103,8 @@ struct Route {
   Access access = Access::kCaller;
   Handler handler = {};
   StreamHandler stream = {};  // instead of `handler`
-  std::size_t body_limit = std::size_t{64} << 10;
+  std::size_t body_limit = kMaxUnjudgedBody;
+  bool linked = false;  // a document of the page: links of other sites may lead to it
 };
 
 }  // namespace relmap::console

@@ -57,6 +57,11 @@ Result<HostName> parse_host(std::string_view text) {
   return host;
 }
 
+Status check_fetch_site(std::string_view site) {
+  if (site.empty() || site == "same-origin" || site == "none") return {};
+  return {Reason::NOT_ALLOWED, "a page of another site asked for it"};
+}
+
 Status OwnNames::check_host(std::string_view text, std::string_view own_address) const {
   const auto host = parse_host(text);
   if (!host.ok()) return host.status();

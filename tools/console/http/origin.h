@@ -19,6 +19,11 @@ struct HostName {
 // INVALID_ARGUMENT.
 Result<HostName> parse_host(std::string_view text);
 
+// Whether a request may come from where Sec-Fetch-Site says, for all but documents of the page: from a page of the
+// console, from the browser itself, or from a program that says nothing. (A page at another port of this machine is
+// "same-site".) NOT_ALLOWED.
+Status check_fetch_site(std::string_view site);
+
 class OwnNames {
  public:
   // `names`: at any port. `proxied`: names of --host, by which browsers know the console, perhaps through a proxy that

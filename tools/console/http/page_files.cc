@@ -80,8 +80,12 @@ void add_page(std::span<const PageFile> files, Router& router) {
       prepared->by_brotli.etag = "\"" + mark + "-br\"";
     }
     const ServeFile serve{std::move(prepared)};
-    router.add({"GET", "/" + std::string(file.name), Access::kAnyone, serve});
-    if (file.name == "index.html") router.add({"GET", "/", Access::kAnyone, serve});
+    Route route{"GET", "/" + std::string(file.name), Access::kAnyone, serve};
+    route.linked = file.name.ends_with(".html");
+    router.add(route);
+    if (file.name != "index.html") continue;
+    route.pattern = "/";
+    router.add(std::move(route));
   }
 }
 

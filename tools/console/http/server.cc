@@ -2,12 +2,17 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
 #include <boost/asio/this_coro.hpp>
@@ -15,6 +20,8 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <cctype>
 #include <deque>
+#include <exception>
+#include <map>
 #include <thread>
 
 #include "proto/base/mutex.h"
@@ -29,8 +36,9 @@ using tcp = asio::ip::tcp;
 using Error = boost::system::error_code;
 
 constexpr int kThreads = 3;
-constexpr int kWorkers = 2;
+constexpr int kComputing = 2, kAsking = 8;        // threads for work
 constexpr std::chrono::milliseconds kPause{100};  // where nothing can be accepted
+constexpr std::chrono::milliseconds kLook{500};   // between looks whether a browser that waits for work is still there
 
 // The names by which a browser may ask a server that listens at this host.
 std::vector<std::string> names_of(const std::string& host, bool any) {
@@ -46,30 +54,89 @@ std::vector<std::string> names_of(const std::string& host, bool any) {
   return names;
 }
 
+// Which of them is closed where there is no room; null: none. `open`: the oldest first.
+std::shared_ptr<OpenConnection> least_wanted(const std::vector<std::shared_ptr<OpenConnection>>& open) {
+  std::map<std::string, std::size_t> strangers;  // by address
+  for (const auto& one : open)
+    if (!one->proven()) ++strangers[one->peer_group()];
+  std::size_t most = 0;
+  for (const auto& [address, count] : strangers) most = std::max(most, count);
+  const auto found = std::find_if(open.begin(), open.end(), [&](const auto& one) {
+    if (most == 0) return one->idle();
+    // It may have been proven since they were counted.
+    const auto counted = one->proven() ? strangers.end() : strangers.find(one->peer_group());
+    return counted != strangers.end() && counted->second == most;
+  });
+  return found == open.end() ? nullptr : *found;
+}
+
 }  // namespace
 
 struct Server::Impl {
+  // Work that a handler waits for.
+  struct Job {
+    Job(asio::any_io_executor executor, std::function<void()> w) : wake(std::move(executor)), what(std::move(w)) {}
+
+    asio::steady_timer wake;  // of the handler
+    const std::function<void()> what;
+    std::atomic<bool> taken{false};  // by the thread that begins it, or by the handler that gives it up
+    // Touched by the handler's executor only.
+    bool done = false;
+    std::exception_ptr failed;
+  };
+
+  // Runs it on a thread for work, unless it was given up.
+  static void run_job(const std::shared_ptr<Job>& job) {
+    if (job->taken.exchange(true)) return;
+    std::exception_ptr failed;
+    try {
+      job->what();
+    } catch (...) {
+      failed = std::current_exception();
+    }
+    asio::post(job->wake.get_executor(), [job, failed] {
+      job->failed = failed;
+      job->done = true;
+      job->wake.cancel();
+    });
+  }
+
+  // An acceptor, and the timer of its pauses.
+  struct Listener {
+    explicit Listener(asio::io_context& io) : acceptor(io), pause(io) {}
+
+    tcp::acceptor acceptor;
+    asio::steady_timer pause;
+  };
+
   explicit Impl(ServerOptions given) : options(std::move(given)) {}
 
-  void accept(tcp::acceptor& acceptor) {
-    acceptor.async_accept(asio::make_strand(io), [this, &acceptor](Error error, tcp::socket socket) {
+  void accept(Listener& listener) {
+    listener.acceptor.async_accept(asio::make_strand(io), [this, &listener](Error error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error) take(std::move(socket));
-      if (error) std::this_thread::sleep_for(kPause);  // no file is free, for example
-      accept(acceptor);
+      if (!error) {
+        take(std::move(socket));
+        accept(listener);
+        return;
+      }
+      listener.pause.expires_after(kPause);  // no file is free, for example
+      listener.pause.async_wait([this, &listener](Error ended) {
+        if (!ended) accept(listener);
+      });
     });
   }
 
   void take(tcp::socket socket) try {
     Error ignored;
+    const auto peer = socket.remote_endpoint(ignored).address();
     (void)socket.set_option(tcp::no_delay(true), ignored);
     (void)socket.set_option(asio::socket_base::keep_alive(true), ignored);
     if (tls) {
       auto context = tls->now();
-      start(std::make_shared<Connection<asio::ssl::stream<beast::tcp_stream>>>(*served, context, std::move(socket),
-                                                                               *context));
+      start(std::make_shared<Connection<asio::ssl::stream<beast::tcp_stream>>>(*served, context, peer,
+                                                                               std::move(socket), *context));
     } else {
-      start(std::make_shared<Connection<beast::tcp_stream>>(*served, nullptr, std::move(socket)));
+      start(std::make_shared<Connection<beast::tcp_stream>>(*served, nullptr, peer, std::move(socket)));
     }
   } catch (const std::exception&) {  // memory ran out: the browser sees a closed connection
   }
@@ -81,25 +148,23 @@ struct Server::Impl {
     asio::co_spawn(executor, One::run(std::move(connection)), asio::detached);
   }
 
-  // Makes room for it; false: every other one is being answered.
+  // Makes room for it; false: every other one is proven and being answered.
   bool admit(const std::shared_ptr<OpenConnection>& connection) {
-    std::shared_ptr<OpenConnection> oldest;
+    std::vector<std::shared_ptr<OpenConnection>> held;  // until the mutex is free: some may end here
+    std::shared_ptr<OpenConnection> leaves;
     {
       const MutexLock lock(mutex);
       std::erase_if(open, [](const auto& one) { return one.expired(); });
       if (open.size() >= options.max_connections) {
-        for (auto one = open.begin(); one != open.end() && !oldest; ++one) {
-          auto held = one->lock();
-          if (!held || !held->idle()) continue;
-          oldest = std::move(held);
-          open.erase(one);
-          break;
-        }
-        if (!oldest) return false;
+        for (const auto& one : open)
+          if (auto there = one.lock()) held.push_back(std::move(there));
+        leaves = least_wanted(held);
+        if (!leaves && held.size() >= options.max_connections) return false;
+        std::erase_if(open, [&](const auto& one) { return one.lock() == leaves; });
       }
       open.push_back(connection);
     }
-    if (oldest) oldest->close();
+    if (leaves) leaves->close();
     return true;
   }
 
@@ -125,8 +190,8 @@ struct Server::Impl {
   std::deque<std::weak_ptr<OpenConnection>> open RELMAP_GUARDED_BY(mutex);  // the oldest first
   // After what connections use: they are destroyed with it.
   asio::io_context io{kThreads};
-  std::vector<std::unique_ptr<tcp::acceptor>> acceptors;
-  asio::thread_pool workers{kWorkers};
+  std::vector<std::unique_ptr<Listener>> listeners;
+  asio::thread_pool computing{kComputing}, asking{kAsking};
   std::array<std::thread, kThreads> threads;
 };
 
@@ -152,24 +217,24 @@ Result<std::unique_ptr<Server>> Server::listen(const ServerOptions& options) {
   for (const auto& entry : found) {
     tcp::endpoint at = entry.endpoint();
     at.port(impl.port);
-    auto acceptor = std::make_unique<tcp::acceptor>(impl.io);
-    (void)acceptor->open(at.protocol(), error);
+    auto listener = std::make_unique<Impl::Listener>(impl.io);
+    tcp::acceptor& acceptor = listener->acceptor;
+    (void)acceptor.open(at.protocol(), error);
     if (error) continue;  // no IPv6 on this machine, for example
-    (void)acceptor->set_option(asio::socket_base::reuse_address(true), error);
-    if (at.protocol() == tcp::v6())
-      (void)acceptor->set_option(asio::ip::v6_only(!at.address().is_unspecified()), error);
-    (void)acceptor->bind(at, error);
+    (void)acceptor.set_option(asio::socket_base::reuse_address(true), error);
+    if (at.protocol() == tcp::v6()) (void)acceptor.set_option(asio::ip::v6_only(!at.address().is_unspecified()), error);
+    (void)acceptor.bind(at, error);
     if (error == boost::system::errc::address_not_available ||
         (error == asio::error::address_in_use && impl.port != options.port))
       continue;  // IPv6 is switched off; or the port that the system chose for one address is taken at another
-    if (!error) (void)acceptor->listen(asio::socket_base::max_listen_connections, error);
+    if (!error) (void)acceptor.listen(asio::socket_base::max_listen_connections, error);
     if (error) return failed(error);
-    impl.port = acceptor->local_endpoint(error).port();
+    impl.port = acceptor.local_endpoint(error).port();
     impl.local = impl.local && at.address().is_loopback();
     any = any || at.address().is_unspecified();
-    impl.acceptors.push_back(std::move(acceptor));
+    impl.listeners.push_back(std::move(listener));
   }
-  if (impl.acceptors.empty()) return failed(make_error_code(boost::system::errc::address_not_available));
+  if (impl.listeners.empty()) return failed(make_error_code(boost::system::errc::address_not_available));
   impl.names = std::make_unique<OwnNames>(names_of(options.host, any), options.proxied);
   return server;
 }
@@ -180,21 +245,25 @@ std::uint16_t Server::port() const { return impl_->port; }
 bool Server::is_local() const { return impl_->local; }
 bool Server::uses_tls() const { return impl_->tls != nullptr; }
 
-namespace {
-
-Awaitable<Response> answer_of(std::function<Response()> work) { co_return work(); }
-
-}  // namespace
-
-Awaitable<Response> Server::on_worker(std::function<Response()> work) {
-  co_return co_await asio::co_spawn(impl_->workers, answer_of(std::move(work)), asio::use_awaitable);
+Awaitable<void> Server::work(Work kind, const Request& request, std::function<void()> what) {
+  const auto executor = co_await asio::this_coro::executor;
+  const auto job = std::make_shared<Impl::Job>(executor, std::move(what));
+  asio::post(kind == Work::kComputes ? impl_->computing : impl_->asking, [job] { Impl::run_job(job); });
+  Error ignored;
+  while (!job->done) {
+    job->wake.expires_after(kLook);
+    co_await job->wake.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+    if (!job->done && request.gone && request.gone() && !job->taken.exchange(true))
+      throw StatusError({Reason::DEADLINE, "the browser has gone"});
+  }
+  if (job->failed) std::rethrow_exception(job->failed);
 }
 
 void Server::serve(Router router, Gate gate) {
   impl_->router = std::move(router);
   impl_->gate = std::move(gate);
   impl_->served.reset(new Served{impl_->options, impl_->router, impl_->gate, *impl_->names});
-  for (const auto& acceptor : impl_->acceptors) impl_->accept(*acceptor);
+  for (const auto& listener : impl_->listeners) impl_->accept(*listener);
   for (std::thread& thread : impl_->threads) thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
@@ -202,8 +271,8 @@ void Server::stop() {
   impl_->io.stop();
   for (std::thread& thread : impl_->threads)
     if (thread.joinable()) thread.join();
-  impl_->workers.stop();
-  impl_->workers.join();
+  for (asio::thread_pool* const pool : {&impl_->computing, &impl_->asking}) pool->stop();
+  for (asio::thread_pool* const pool : {&impl_->computing, &impl_->asking}) pool->join();
 }
 
 Awaitable<bool> wait_until(std::function<bool()> done, std::chrono::steady_clock::time_point until) {

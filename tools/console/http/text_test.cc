@@ -113,6 +113,11 @@ TEST(Page, IsPartOfTheProgram) {
     index = index || (file.name == "index.html" && file.bytes.find("</html>") != std::string_view::npos);
   }
   EXPECT_TRUE(index);
+  Router router;
+  add_page(built_in_page(), router);
+  for (const char* const document : {"/", "/index.html", "/runbook.html"})
+    EXPECT_TRUE(router.find("GET", document)->route->linked) << document;
+  EXPECT_FALSE(router.find("GET", "/console.js")->route->linked);
   EXPECT_EQ(type_of("console.js"), "text/javascript; charset=utf-8");
   EXPECT_EQ(type_of("what"), "application/octet-stream");
 }

@@ -7,6 +7,7 @@ namespace relmap::console {
 namespace {
 
 constexpr std::uint64_t kReadAtOnce = 100'000;  // keyframes, about 20 MB
+constexpr std::chrono::seconds kAnswerWithin{10};
 
 using Point = client::Skeleton::Point;
 
@@ -54,20 +55,42 @@ KeyframeLine bend_onto(const MapLayout& layout, SessionNumber session, const cli
   return line;
 }
 
-Result<KeyframeLines::Lines> KeyframeLines::of(const MapLayout& layout, const std::vector<SessionNumber>& sessions,
-                                               client::Client& client) {
+KeyframeLines::Lines KeyframeLines::kept(const MapLayout& layout, const std::vector<SessionNumber>& sessions) {
   Lines lines;
+  for (const SessionNumber session : sessions)
+    if (auto kept = kept_.find({layout.version, session})) lines[session] = std::move(kept);
+  return lines;
+}
+
+Result<KeyframeLines::Lines> KeyframeLines::of(const MapLayout& layout, const std::vector<SessionNumber>& sessions,
+                                               const ClientOf& client) {
+  if (Lines lines = kept(layout, sessions); lines.size() == sessions.size()) return lines;
+  const MutexLock lock(reading_);
+  Lines lines = kept(layout, sessions);  // another thread may have read them meanwhile
   std::vector<SessionNumber> missing;
-  for (const SessionNumber session : sessions) {
-    if (auto kept = kept_.find({layout.version, session}))
-      lines[session] = std::move(kept);
-    else
-      missing.push_back(session);
+  for (const SessionNumber session : sessions)
+    if (!lines.contains(session)) missing.push_back(session);
+  if (missing.empty()) return lines;
+  if (Clock::now() < asked_again_) return failure_;
+  const auto connected = client();
+  Status status = connected.status();
+  if (status.ok()) {
+    const auto hasty = (*connected)->with_deadline(kAnswerWithin);
+    status = read(layout, missing, *hasty, lines);
   }
+  if (status.ok()) return lines;
+  if (status.reason() == Reason::UNREACHABLE || status.reason() == Reason::DEADLINE) {
+    failure_ = status;
+    asked_again_ = Clock::now() + away_;
+  }
+  return status;
+}
+
+Status KeyframeLines::read(const MapLayout& layout, const std::vector<SessionNumber>& missing, client::Client& client,
+                           Lines& lines) {
   std::map<SessionNumber, std::uint64_t> keyframes;
-  if (!missing.empty())
-    for (const MapLayout::Run& run : layout.runs)
-      keyframes[run.session] += layout.points[run.end - 1].index - layout.points[run.first].index + 1;
+  for (const MapLayout::Run& run : layout.runs)
+    keyframes[run.session] += layout.points[run.end - 1].index - layout.points[run.first].index + 1;
   for (std::size_t next = 0; next < missing.size();) {
     client::SkeletonOptions options{.level = 3};
     for (std::uint64_t read = 0; next < missing.size() && (options.sessions.empty() || read < kReadAtOnce); ++next) {
@@ -82,7 +105,7 @@ Result<KeyframeLines::Lines> KeyframeLines::of(const MapLayout& layout, const st
       lines[session] = std::move(line);
     }
   }
-  return lines;
+  return {};
 }
 
 }  // namespace relmap::console

@@ -1,12 +1,15 @@
 // Every keyframe of some sessions, bent onto the points of a layout: for a closer look than the layout itself has.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
 
 #include "client/relmap_client.h"
+#include "proto/base/mutex.h"
 #include "tools/console/layout/lru_cache.h"
 #include "tools/console/layout/map_layout.h"
 
@@ -29,18 +32,32 @@ struct KeyframeLine {
 // out.
 KeyframeLine bend_onto(const MapLayout& layout, SessionNumber session, const client::Skeleton& skeleton);
 
+// A client, or why there is none now.
+using ClientOf = std::function<Result<std::shared_ptr<client::Client>>()>;
+
 // Keeps the lines that were used last. Thread-safe.
 class KeyframeLines {
  public:
-  explicit KeyframeLines(std::size_t max_bytes) : kept_(max_bytes) {}
+  // `away`: for so long a daemon that did not answer is not asked again.
+  KeyframeLines(std::size_t max_bytes, std::chrono::milliseconds away) : away_(away), kept_(max_bytes) {}
 
-  // Reads what it does not have through the client. The reasons of Client::skeleton().
   using Lines = std::map<SessionNumber, std::shared_ptr<const KeyframeLine>>;
-  Result<Lines> of(const MapLayout& layout, const std::vector<SessionNumber>& sessions, client::Client& client);
+  // Those that are kept.
+  Lines kept(const MapLayout& layout, const std::vector<SessionNumber>& sessions);
+  // Reads what it does not have through the client, for ten seconds at most. One thread at a time does: the others wait
+  // for it, since most of them want the same lines, and share its failure. The reasons of Client::skeleton().
+  Result<Lines> of(const MapLayout& layout, const std::vector<SessionNumber>& sessions, const ClientOf& client);
 
  private:
+  using Clock = std::chrono::steady_clock;
   using Key = std::pair<std::uint64_t, SessionNumber>;  // version of the layout
+  Status read(const MapLayout& layout, const std::vector<SessionNumber>& missing, client::Client& client, Lines& lines);
+
+  const std::chrono::milliseconds away_;
   LruCache<Key, KeyframeLine> kept_;
+  Mutex reading_;                               // held by the thread that asks the daemon
+  Status failure_ RELMAP_GUARDED_BY(reading_);  // to reach it, not ok until `asked_again_`
+  Clock::time_point asked_again_ RELMAP_GUARDED_BY(reading_){};
 };
 
 }  // namespace relmap::console

@@ -53,19 +53,33 @@ std::uint64_t LayoutKeeper::changes() const {
 
 std::string LayoutKeeper::state_json() const { return json_of(state()); }
 
-Result<TileSource::TileBytes> LayoutKeeper::tile(const TileRequest& request) {
-  std::shared_ptr<const TileIndex> index, old;
+Result<LayoutKeeper::Versions> LayoutKeeper::versions_of(const TileRequest& request) const {
+  Versions versions;
   {
     const MutexLock lock(mutex_);
     for (const auto& kept : kept_) {
-      if (kept->layout().version == request.version) index = kept;
-      if (kept->layout().version == request.from) old = kept;
+      if (kept->layout().version == request.version) versions.wanted = kept;
+      if (kept->layout().version == request.from) versions.old = kept;
     }
   }
-  if (!index || (request.from != 0 && !old))
-    return {Reason::VIEW_EXPIRED, "the layout of version " + std::to_string(index ? request.from : request.version) +
+  if (!versions.wanted || (request.from != 0 && !versions.old))
+    return {Reason::VIEW_EXPIRED, "the layout of version " +
+                                      std::to_string(versions.wanted ? request.from : request.version) +
                                       " is gone; ask for the newest one"};
-  return source_.tile(*index, old ? &old->layout() : nullptr, request, [this] { return client_.get(); });
+  return versions;
+}
+
+Result<TileSource::TileBytes> LayoutKeeper::tile(const TileRequest& request) {
+  const auto versions = versions_of(request);
+  if (!versions.ok()) return versions.status();
+  return source_.tile(*versions->wanted, versions->old ? &versions->old->layout() : nullptr, request,
+                      [this] { return client_.get(); });
+}
+
+Result<std::optional<TileSource::TileBytes>> LayoutKeeper::tile_at_once(const TileRequest& request) {
+  const auto versions = versions_of(request);
+  if (!versions.ok()) return versions.status();
+  return source_.tile_at_once(*versions->wanted, versions->old ? &versions->old->layout() : nullptr, request);
 }
 
 Result<std::string> LayoutKeeper::places_json(std::string_view request) const {

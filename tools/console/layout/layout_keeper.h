@@ -66,6 +66,8 @@ class LayoutKeeper {
   // The answer to /map/tiles; null: nothing is there. VIEW_EXPIRED: the layout of this version, or of `from`, is gone.
   // The reasons of TileSource::tile().
   Result<TileSource::TileBytes> tile(const TileRequest& request);
+  // The same, but nullopt where the daemon would be asked for something, which tile() waits for.
+  Result<std::optional<TileSource::TileBytes>> tile_at_once(const TileRequest& request);
   // The answer to /map/places, given what was sent: JSON with `frames`, at most kMaxPlaces. INVALID_ARGUMENT: it is
   // not. VIEW_EXPIRED: there is no layout yet.
   static constexpr std::size_t kMaxPlaces = 10'000;
@@ -74,6 +76,11 @@ class LayoutKeeper {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kVersionsKept = 3;
+
+  struct Versions {
+    std::shared_ptr<const TileIndex> wanted, old;  // null: without positions in an older layout
+  };
+  Result<Versions> versions_of(const TileRequest& request) const;
 
   void run();
   Status round();

@@ -7,6 +7,19 @@ namespace relmap::console {
 namespace {
 
 constexpr double kPixels = 1024;  // of a tile, where lines are simplified
+// A segment over more columns and rows is listed once for all tiles.
+constexpr std::uint32_t kMostTiles = 64;
+constexpr double kEdge = 1e-3;  // of a tile
+
+// The columns or rows of places, which are relative to the layout's corner.
+struct Cells {
+  Cells(double tile_size, std::uint32_t tiles) : side(tile_size), last(static_cast<double>(tiles - 1)) {}
+
+  std::uint32_t operator()(double metres) const {
+    return static_cast<std::uint32_t>(std::clamp(std::floor(metres / side), 0.0, last));
+  }
+  const double side, last;
+};
 
 }  // namespace
 
@@ -56,7 +69,7 @@ TileIndex::TileIndex(std::shared_ptr<const MapLayout> layout) : layout_(std::mov
   closures_.resize(layout_->zooms + 1);
   for (std::uint32_t zoom = 0; zoom <= layout_->zooms; ++zoom) {
     add_lines(zoom, segments_[zoom]);
-    segments_[zoom].finish();
+    segments_[zoom].short_ones.finish();
     add_closures(zoom, closures_[zoom]);
     closures_[zoom].finish();
   }
@@ -72,66 +85,78 @@ LayoutBox TileIndex::box(const TileId& tile) const {
   return {low, low + Vector2::Constant(side)};
 }
 
-void TileIndex::add_lines(std::uint32_t zoom, TileLists& lists) const {
+void TileIndex::add_lines(std::uint32_t zoom, Lines& lines) const {
   const double side = tile_size(zoom), off = tolerance(zoom);
-  const double last = static_cast<double>(tiles(zoom) - 1);
-  const auto tile_of = [&](double metres) {
-    return static_cast<std::uint32_t>(std::clamp(std::floor(metres / side), 0.0, last));
-  };
+  TileLists& lists = lines.short_ones;
+  const Cells tile_of(side, tiles(zoom));
   for (const MapLayout::Run& run : layout_->runs) {
-    Vector2 before;
+    std::uint32_t from_point = run.first;
     for (std::uint32_t k = run.first; k < run.end; ++k) {
       if (!is_drawn(k, off)) continue;
-      const Vector2 at = layout_->points[k].position.head<2>() - layout_->corner;
-      if (k == run.first) {
-        lists.add(tile_of(at.x()), tile_of(at.y()), k);
+      const Vector2 before = place_of(from_point), at = place_of(k);
+      const std::uint32_t x0 = tile_of(std::min(before.x(), at.x())), x1 = tile_of(std::max(before.x(), at.x()));
+      const std::uint32_t y0 = tile_of(std::min(before.y(), at.y())), y1 = tile_of(std::max(before.y(), at.y()));
+      if (x1 - x0 + y1 - y0 >= kMostTiles) {
+        lines.long_ones.push_back({from_point, k});
+      } else if (x0 == x1 || y0 == y1) {
+        for (std::uint32_t x = x0; x <= x1; ++x)
+          for (std::uint32_t y = y0; y <= y1; ++y) lists.add(x, y, k);
       } else {
-        const std::uint32_t x0 = tile_of(std::min(before.x(), at.x())), x1 = tile_of(std::max(before.x(), at.x()));
-        const std::uint32_t y0 = tile_of(std::min(before.y(), at.y())), y1 = tile_of(std::max(before.y(), at.y()));
-        if (x0 == x1 || y0 == y1) {
-          for (std::uint32_t x = x0; x <= x1; ++x)
-            for (std::uint32_t y = y0; y <= y1; ++y) lists.add(x, y, k);
-        } else {
-          lists.add(tile_of(before.x()), tile_of(before.y()), k);  // which rounding could miss
-          lists.add(tile_of(at.x()), tile_of(at.y()), k);
-          // Column by column, the tiles between where the segment enters and leaves it.
-          for (std::uint32_t x = x0; x <= x1; ++x) {
-            const LayoutBox column{{x * side, std::min(before.y(), at.y())},
-                                   {(x + 1) * side, std::max(before.y(), at.y())}};
-            double from = 0, to = 1;
-            if (!clip_segment(before, at, column, from, to)) continue;
-            const double enters = before.y() + from * (at.y() - before.y());
-            const double leaves = before.y() + to * (at.y() - before.y());
-            for (std::uint32_t y = tile_of(std::min(enters, leaves)); y <= tile_of(std::max(enters, leaves)); ++y)
-              lists.add(x, y, k);
-          }
+        lists.add(tile_of(before.x()), tile_of(before.y()), k);  // which rounding could miss
+        lists.add(tile_of(at.x()), tile_of(at.y()), k);
+        // Column by column, the tiles between where the segment enters and leaves it.
+        for (std::uint32_t x = x0; x <= x1; ++x) {
+          const LayoutBox column{{x * side, std::min(before.y(), at.y())},
+                                 {(x + 1) * side, std::max(before.y(), at.y())}};
+          double from = 0, to = 1;
+          if (!clip_segment(before, at, column, from, to)) continue;
+          const double enters = before.y() + from * (at.y() - before.y());
+          const double leaves = before.y() + to * (at.y() - before.y());
+          for (std::uint32_t y = tile_of(std::min(enters, leaves)); y <= tile_of(std::max(enters, leaves)); ++y)
+            lists.add(x, y, k);
         }
       }
-      before = at;
+      from_point = k;
     }
   }
 }
 
 void TileIndex::add_closures(std::uint32_t zoom, TileLists& lists) const {
-  const double side = tile_size(zoom);
-  const double last = static_cast<double>(tiles(zoom) - 1);
+  const Cells tile_of(tile_size(zoom), tiles(zoom));
   for (std::size_t c = 0; c < layout_->closures.size(); ++c) {
     const MapLayout::Closure& closure = layout_->closures[c];
     for (const std::uint32_t end : {closure.at_a, closure.at_b}) {
-      const Vector2 at = layout_->points[end].position.head<2>() - layout_->corner;
-      const auto tile_of = [&](double metres) {
-        return static_cast<std::uint32_t>(std::clamp(std::floor(metres / side), 0.0, last));
-      };
+      const Vector2 at = place_of(end);
       lists.add(tile_of(at.x()), tile_of(at.y()), static_cast<std::uint32_t>(c));
     }
   }
 }
 
-std::span<const std::uint32_t> TileIndex::segments(const TileId& tile) const {
-  return segments_[tile.zoom].at(tile.x, tile.y);
+std::vector<std::uint32_t> TileIndex::segments(const TileId& tile) const {
+  const Lines& lines = segments_[tile.zoom];
+  const std::span<const std::uint32_t> found = lines.short_ones.at(tile.x, tile.y);
+  std::vector<std::uint32_t> all(found.begin(), found.end());
+  // A little more than the tile, for what rounding could miss.
+  const double side = tile_size(tile.zoom);
+  const Vector2 low = side * Vector2(tile.x, tile.y), edge = Vector2::Constant(kEdge * side);
+  const LayoutBox box{low - edge, low + Vector2::Constant(side) + edge};
+  for (const Long& one : lines.long_ones) {
+    double from = 0, to = 1;
+    if (clip_segment(place_of(one.from), place_of(one.to), box, from, to)) all.push_back(one.to);
+  }
+  std::inplace_merge(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(found.size()), all.end());
+  return all;
 }
+
 std::span<const std::uint32_t> TileIndex::closures(const TileId& tile) const {
   return closures_[tile.zoom].at(tile.x, tile.y);
+}
+
+std::size_t TileIndex::size() const {
+  std::size_t all = 0;
+  for (const Lines& lines : segments_) all += lines.short_ones.size() + lines.long_ones.size();
+  for (const TileLists& lists : closures_) all += lists.size();
+  return all;
 }
 
 std::uint32_t TileIndex::run_of(std::uint32_t point) const {

@@ -1,5 +1,5 @@
 // Which lines and closures of a layout are in which tile, for each zoom to MapLayout::zooms. Immutable, of about 12
-// bytes for each point and zoom.
+// bytes for each point and zoom: a segment that goes over very many tiles is listed once, and looked at for each tile.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +25,7 @@ class TileLists {
   void add(std::uint32_t x, std::uint32_t y, std::uint32_t number) { added_.push_back({key(x, y), number}); }
   void finish();                                                              // before at()
   std::span<const std::uint32_t> at(std::uint32_t x, std::uint32_t y) const;  // ascending, each once
+  std::size_t size() const { return numbers_.size(); }
 
  private:
   struct Added {
@@ -57,19 +58,30 @@ class TileIndex {
   bool is_drawn(std::uint32_t point, double tolerance) const {
     return layout_->points[point].importance > tolerance || tolerance == 0;
   }
-  // The points at the newer ends of the drawn segments that are in the tile, and the first points of runs that are.
-  // `zoom` at most MapLayout::zooms.
-  std::span<const std::uint32_t> segments(const TileId& tile) const;
+  // The points at the newer ends of the drawn segments that are in the tile, and the first points of runs that are;
+  // ascending. `zoom` at most MapLayout::zooms.
+  std::vector<std::uint32_t> segments(const TileId& tile) const;
   // Those with an end in the tile.
   std::span<const std::uint32_t> closures(const TileId& tile) const;
   std::uint32_t run_of(std::uint32_t point) const;  // the run that a point belongs to
+  std::size_t size() const;                         // numbers in all lists
 
  private:
-  void add_lines(std::uint32_t zoom, TileLists& lists) const;
+  // A drawn segment that goes over more than kMostTiles tiles.
+  struct Long {
+    std::uint32_t from = 0, to = 0;  // points
+  };
+  struct Lines {
+    TileLists short_ones;
+    std::vector<Long> long_ones;  // ascending
+  };
+  void add_lines(std::uint32_t zoom, Lines& lines) const;
   void add_closures(std::uint32_t zoom, TileLists& lists) const;
+  Vector2 place_of(std::uint32_t point) const { return layout_->points[point].position.head<2>() - layout_->corner; }
 
   std::shared_ptr<const MapLayout> layout_;
-  std::vector<TileLists> segments_, closures_;  // by zoom
+  std::vector<Lines> segments_;  // by zoom
+  std::vector<TileLists> closures_;
 };
 
 // The part of a segment that lies in a box: shares of the way from a to b; false if none does.

@@ -43,7 +43,7 @@ class TileMaker {
 
   void add_lines(double tolerance, std::size_t stride, Tile& tile) {
     TileLines lines(index_.box(id_), tile);
-    const std::span<const std::uint32_t> ends = index_.segments(found_in_);
+    const std::vector<std::uint32_t> ends = index_.segments(found_in_);
     const double found_with = index_.tolerance(found_in_.zoom);
     // Segments that follow each other are one line, which is simplified further if it must.
     std::size_t k = 0;

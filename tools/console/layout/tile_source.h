@@ -1,7 +1,7 @@
 // Tiles of layouts by request: kept as long as they are asked for, with what they need from the daemon.
 #pragma once
 
-#include <functional>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +11,7 @@
 #include "client/relmap_client.h"
 #include "tools/console/layout/keyframe_lines.h"
 #include "tools/console/layout/lru_cache.h"
+#include "tools/console/layout/single_flight.h"
 #include "tools/console/layout/tile_index.h"
 
 namespace relmap::console {
@@ -22,15 +23,13 @@ struct TileRequest {
   std::optional<FrameId> root{};  // with standard deviations relative to this frame
 };
 
-// Null, or a status: there is no connection now.
-using ClientOf = std::function<Result<std::shared_ptr<client::Client>>()>;
-
 // Thread-safe.
 class TileSource {
  public:
   struct Limits {
     std::size_t tile_bytes = 64u << 20, keyframe_bytes = 96u << 20;
     std::size_t roots = 4;
+    std::chrono::milliseconds away{2000};  // for so long a daemon that did not answer is not asked for keyframes again
   };
   explicit TileSource(Limits limits);
   TileSource() : TileSource(Limits()) {}
@@ -41,17 +40,25 @@ class TileSource {
   using TileBytes = std::shared_ptr<const std::string>;
   Result<TileBytes> tile(const TileIndex& index, const MapLayout* old, const TileRequest& request,
                          const ClientOf& client);
+  // The same, but nullopt where the daemon would be asked.
+  Result<std::optional<TileBytes>> tile_at_once(const TileIndex& index, const MapLayout* old,
+                                                const TileRequest& request);
 
   std::size_t bytes() const { return tiles_.bytes() + sigmas_.bytes(); }
 
  private:
   using Sigmas = std::vector<float>;
+  using SigmasOf = std::pair<std::uint64_t, FrameId>;  // version of the layout, root
   Result<std::shared_ptr<const Sigmas>> sigmas_of(const MapLayout& layout, FrameId root);
+  // `client`: null where the daemon must not be asked.
+  Result<std::optional<TileBytes>> made(const TileIndex& index, const MapLayout* old, const TileRequest& request,
+                                        const ClientOf* client);
 
   const Limits limits_;
   using TileKey = std::tuple<std::uint64_t, TileId, std::uint64_t, FrameId>;
   LruCache<TileKey, std::string> tiles_;
-  LruCache<std::pair<std::uint64_t, FrameId>, Sigmas> sigmas_;
+  LruCache<SigmasOf, Sigmas> sigmas_;
+  SingleFlight<SigmasOf, Result<std::shared_ptr<const Sigmas>>> sigmas_made_;
   KeyframeLines keyframes_;
 };
 

@@ -1,8 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <future>
 #include <map>
+#include <random>
 #include <set>
+#include <thread>
 
 #include "tools/console/layout/line_importance.h"
 #include "tools/console/layout/testing/decode_tile.h"
@@ -225,9 +231,138 @@ TEST_F(Tiles, AreServedByRequest) {
   // Without the daemon, points are drawn where keyframes would be.
   const Vector2 cell = (layout->points[20].position.head<2>() - layout->corner) / index.tile_size(layout->zooms + 1);
   const TileId fine{layout->zooms + 1, static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y())};
+  EXPECT_FALSE(source.tile_at_once(index, nullptr, {layout->version, fine}).or_throw());
   const auto drawn = source.tile(index, nullptr, {layout->version, fine}, nobody).or_throw();
   ASSERT_TRUE(drawn);
   EXPECT_TRUE(decode_tile(*drawn));
+  // Whatever needs no daemon is there at once.
+  EXPECT_EQ(source.tile_at_once(index, nullptr, {layout->version, {0, 0, 0}}).or_throw(), first);
+  EXPECT_TRUE(source.tile_at_once(index, nullptr, {layout->version, {1, 0, 0}}).or_throw());
+  EXPECT_TRUE(source.tile_at_once(index, nullptr, {layout->version, {0, 0, 0}, 0, FrameId{2, 50}}).or_throw());
+}
+
+// A picture has many tiles, and asks for them all at once.
+TEST_F(Tiles, AskADaemonThatDoesNotAnswerOnlyOnce) {
+  TileSource::Limits limits;
+  limits.away = std::chrono::hours(1);
+  TileSource source(limits);
+  std::vector<TileId> fine;
+  const std::uint32_t zoom = layout->zooms + 1;
+  for (std::uint32_t k = 0; k < layout->points.size() && fine.size() < 12; k += 30) {
+    const Vector2 cell = (layout->points[k].position.head<2>() - layout->corner) / index.tile_size(zoom);
+    fine.push_back({zoom, static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y())});
+  }
+  std::atomic<int> asked{0}, drawn{0};
+  std::promise<void> release;
+  const std::shared_future<void> released = release.get_future().share();
+  const ClientOf hangs = [&]() -> Result<std::shared_ptr<client::Client>> {
+    ++asked;
+    released.wait();
+    return {Reason::UNREACHABLE, "no daemon"};
+  };
+  std::vector<std::thread> threads;
+  for (const TileId& id : fine)
+    threads.emplace_back([&, id] {
+      if (source.tile(index, nullptr, {layout->version, id}, hangs).or_throw()) ++drawn;
+    });
+  while (asked == 0) std::this_thread::yield();
+  // Meanwhile others do not wait.
+  EXPECT_TRUE(source.tile_at_once(index, nullptr, {layout->version, {0, 0, 0}}).or_throw());
+  release.set_value();
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(drawn, static_cast<int>(fine.size()));
+  // It is asked again once that is a while ago, and at once where the failure does not say that it is away.
+  limits.away = std::chrono::milliseconds(0);
+  TileSource hasty(limits);
+  const ClientOf refuses = [&]() -> Result<std::shared_ptr<client::Client>> {
+    ++asked;
+    return {Reason::UNAUTHENTICATED, "nobody has logged in"};
+  };
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(hasty.tile(index, nullptr, {layout->version, fine[0]}, hangs).or_throw());
+    EXPECT_EQ(asked, 2 + i);
+  }
+  TileSource other;
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(other.tile(index, nullptr, {layout->version, fine[0]}, refuses).or_throw());
+    EXPECT_EQ(asked, 4 + i);
+  }
+}
+
+// Two robots far apart, that a guess joins: the segment goes over every column of the finest tiles.
+TEST(TileIndex, ListsALongSegmentOnce) {
+  MapLayout far;
+  far.zooms = 16;
+  far.size = 1 << 20;
+  far.corner = Vector2(-7, -11);
+  const std::vector<Vector2> places{{0, 0}, {1, 2}, {900'000, 400'000}, {900'001, 400'003}, {900'001, 17}, {13, 17}};
+  for (const Vector2& at : places) {
+    MapLayout::Point point;
+    point.position.head<2>() = at;
+    point.importance = 1e9f;
+    point.index = static_cast<std::uint32_t>(far.points.size());
+    far.points.push_back(point);
+  }
+  far.runs = {{1, 0, 3, 0}, {2, 3, 6, 0}};
+  const TileIndex index(std::make_shared<MapLayout>(far));
+  EXPECT_LT(index.size(), far.points.size() * 64 * 17);
+  const auto has = [&](const TileId& tile, std::uint32_t point) {
+    const auto found = index.segments(tile);
+    EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+    EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+    return std::binary_search(found.begin(), found.end(), point);
+  };
+  for (std::uint32_t zoom = 0; zoom <= far.zooms; ++zoom) {
+    const double side = index.tile_size(zoom);
+    std::mt19937 random(zoom);
+    for (const std::uint32_t to : {1u, 2u, 4u, 5u}) {
+      for (int i = 0; i < 100; ++i) {
+        const double share = i < 2 ? i : std::generate_canonical<double, 32>(random);
+        const Vector2 cell = ((1 - share) * places[to - 1] + share * places[to] - far.corner) / side;
+        const TileId on{zoom, static_cast<std::uint32_t>(cell.x()), static_cast<std::uint32_t>(cell.y())};
+        EXPECT_TRUE(has(on, to)) << zoom << " " << to << " " << share;
+        if (zoom < 8) continue;
+        // Neither the tile well beside it, across, nor one of the corner where nothing is.
+        const Vector2 along = (places[to] - places[to - 1]).normalized(),
+                      beside = cell + 3 * Vector2(-along.y(), along.x());
+        if (beside.minCoeff() < 0 || share == 0 || share == 1) continue;
+        EXPECT_FALSE(has({zoom, static_cast<std::uint32_t>(beside.x()), static_cast<std::uint32_t>(beside.y())}, to));
+      }
+    }
+  }
+}
+
+TEST(SingleFlight, MakesOnceWhatManyAskForAtATime) {
+  SingleFlight<int, std::string> flights;
+  std::atomic<int> made{0}, waiting{0};
+  std::promise<void> release;
+  const std::shared_future<void> released = release.get_future().share();
+  const auto make = [&](const std::string& what) {
+    return [&, what]() -> std::string {
+      ++made;
+      released.wait();
+      if (what.empty()) throw StatusError({Reason::UNREACHABLE, "nobody"});
+      return what;
+    };
+  };
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 6; ++i)
+    threads.emplace_back([&, i] {
+      ++waiting;
+      if (i % 2 == 0)
+        EXPECT_EQ(flights.get(0, make("even")), "even");
+      else
+        EXPECT_THROW(flights.get(1, make("")), StatusError);
+    });
+  // Those of the other key do not wait for the first; its own do, or they come so late that they make it themselves.
+  while (waiting < 6 || made < 2) std::this_thread::yield();
+  EXPECT_EQ(made, 2);
+  release.set_value();
+  for (std::thread& thread : threads) thread.join();
+  const int before = made;
+  EXPECT_EQ(flights.get(0, make("later")), "later") << "nothing is kept";
+  EXPECT_EQ(made, before + 1);
 }
 
 }  // namespace

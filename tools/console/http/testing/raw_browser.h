@@ -29,12 +29,12 @@ struct Answer {
 
 class RawBrowser {
  public:
-  explicit RawBrowser(std::uint16_t port) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+  // All of 127.0.0.0/8 is this machine.
+  explicit RawBrowser(std::uint16_t port, const char* to = "127.0.0.1", const char* from = "127.0.0.1")
+      : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const sockaddr_in own = address_of(from, 0), other = address_of(to, port);
+    if (::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0 ||
+        ::connect(socket_, reinterpret_cast<const sockaddr*>(&other), sizeof other) != 0)
       throw std::runtime_error("nobody listens");
   }
   ~RawBrowser() { close(); }
@@ -131,6 +131,14 @@ class RawBrowser {
   }
 
  private:
+  static sockaddr_in address_of(const char* host, std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    if (::inet_pton(AF_INET, host, &address.sin_addr) != 1) throw std::runtime_error("no address");
+    return address;
+  }
+
   std::string take(std::size_t size) {
     std::string taken = unread_.substr(0, size);
     unread_.erase(0, size);
