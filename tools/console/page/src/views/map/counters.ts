@@ -6,6 +6,7 @@
 //   scriptMs: { last, median, worst }   script of a frame, of the last 240 frames
 //   pickMs                    the last search for what lies under the pointer
 //   fetchedBytes, heldBytes   tiles that came; tiles held, with their copies on the graphics card
+//   routePoints               places through which routes are drawn
 //   camera                    { x, y, mpp, turn }
 import type { Camera } from '../../map/camera';
 import type { Stage } from '../../map/stage';
@@ -21,6 +22,7 @@ export interface Counters {
   readonly pickMs: number;
   readonly fetchedBytes: number;
   readonly heldBytes: number;
+  readonly routePoints: number;
   readonly camera: Camera;
 }
 declare global {
@@ -64,6 +66,9 @@ export function publishCounters(stage: Stage): () => void {
     },
     get heldBytes() {
       return stage.held;
+    },
+    get routePoints() {
+      return stage.marks.routes.reduce((sum, { points }) => sum + points, 0);
     },
     get camera() {
       return { ...stage.camera };

@@ -31,12 +31,12 @@ export class Places {
     if (more) void this.run();
   }
 
-  // Another version is drawn. What was known stays until its places have come.
+  // Another version is drawn, and these are needed of it. What was known of them stays until their places have come;
+  // all others are forgotten.
   renew(version: number, frames: Iterable<string>) {
     this.version = version;
-    this.wanted = new Set([...this.known.keys(), ...frames].filter((frame) => frame));
-    // Of what was asked long ago, not all forever.
-    if (this.wanted.size > 2 * atOnce) this.wanted = new Set(frames);
+    this.wanted = new Set(frames);
+    for (const frame of this.known.keys()) if (!this.wanted.has(frame)) this.known.delete(frame);
     void this.run(true);
   }
 
