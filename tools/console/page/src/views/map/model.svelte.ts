@@ -2,6 +2,7 @@
 // what is shown, so all that somebody chooses is written there first.
 import { untrack } from 'svelte';
 import { address } from '../../lib/address.svelte';
+import { plain } from '../../lib/format';
 import { parseEdge, parseFrame } from '../../lib/ids';
 import { live } from '../../lib/live.svelte';
 import { allPages, seldom } from '../../lib/pages';
@@ -9,7 +10,7 @@ import { Poll } from '../../lib/poll.svelte';
 import { map, problemOf, type Problem } from '../../lib/rpc';
 import { sessions } from '../../lib/sessions.svelte';
 import { theme } from '../../lib/theme.svelte';
-import { around, cameraText, corners, fit, fromRelative, headingUp, parseCamera, relativeTo, type Camera } from '../../map/camera';
+import { around, cameraText, corners, fit, fromRelative, headingUp, pan, parseCamera, relativeTo, type Camera } from '../../map/camera';
 import { inView, type InView } from '../../map/in_view';
 import { drawable, type FramePlace, type Torn } from '../../map/layout';
 import { palette } from '../../map/palette';
@@ -227,7 +228,7 @@ export class MapModel {
 
   private layRoutes() {
     const { frames, chosen } = this.route;
-    this.routes = routeMarks(frames, chosen, (frame) => this.places.get(frame) ?? null);
+    this.routes = routeMarks(frames, chosen, (frame) => this.places.shown(frame));
   }
 
   private headFrame(session: number): string {
@@ -285,6 +286,8 @@ export class MapModel {
     for (const [edge, { since }] of this.loose) if (now - since > looseMs) this.loose.delete(edge);
     const loose = [...this.loose.values()].flatMap(({ a, b }) => [a, b]);
     this.places.renew(version, [...this.needed(), ...loose, ...this.trails.asked()]);
+    // As long as nobody has moved it, the picture shows all of a map that grows.
+    if (this.arrived && !this.byHand && !this.pending && this.stage && !this.stage.showsAll) this.stage.all(easeMs);
     this.arrive();
   }
 
@@ -301,10 +304,21 @@ export class MapModel {
     this.arrive();
   }
 
+  // What is marked moves with the lines.
+  private ease() {
+    const before = this.places.share;
+    const { stage } = this;
+    this.places.share = stage ? stage.easing(performance.now()) : 1;
+    if (this.places.share === before) return;
+    this.layRoutes();
+    if (this.places.share < 1) this.markSoon();
+  }
+
   markSoon = () => {
     if (!this.marking)
       this.marking = requestAnimationFrame(() => {
         this.marking = 0;
+        this.ease();
         this.mark();
       });
   };
@@ -323,7 +337,7 @@ export class MapModel {
     }
     const past = Number.isFinite(this.until);
     stage.marks = makeMarks({
-      place: (frame) => this.places.get(frame) ?? null,
+      place: (frame) => this.places.shown(frame),
       layers: this.layers,
       past,
       rows: this.rows,
@@ -414,7 +428,7 @@ export class MapModel {
         if (head) return near(head);
         if (this.places.get(this.headFrame(robot.session)) === undefined && this.headFrame(robot.session)) return 'wait';
       }
-      return missing(`The robot ${this.robot}`);
+      return missing(`The robot ${plain(this.robot, 60)}`);
     }
     if (this.session) {
       const session = sessions.byNumber.get(this.session);
@@ -436,7 +450,10 @@ export class MapModel {
       const found = frames.map((frame) => this.places.get(frame));
       if (this.route.busy || found.some((place) => place === undefined)) return 'wait';
       const known = found.filter((place) => !!place);
-      return known.length ? fit(around(known), stage.size, Math.min(90, stage.size.width / 6), turn, 0.01) : missing('The route');
+      if (!known.length) return missing('The route');
+      // Beside what is said of it.
+      const beside = stage.size.width > 900 ? 350 : 0;
+      return pan(fit(around(known), { ...stage.size, width: stage.size.width - beside }, 50, turn, 0.01), -beside / 2, 0);
     }
     if (this.root) return rootPlace ? near(rootPlace) : missing(`Frame ${this.root}`);
     return 'all';
