@@ -212,7 +212,9 @@ test('whoever looks at a closure is told who removes it meanwhile, and why', asy
   await anna.getByRole('dialog').getByLabel(/^Note/).fill('that is\nthe other hall');
   await anna.getByRole('dialog').getByRole('button', { name: /^Remove/ }).click();
   await anna.getByText('Your edits in this tab (1)').waitFor();
-  await ben.getByText(/anna changed it: it is now removed, “that is the other hall”/).first().waitFor();
+  const told = ben.locator('p[role=status]').filter({ hasText: 'changed it: it is now removed' });
+  await told.waitFor();
+  assert.match((await told.innerText()).replace(/\s+/g, ' '), /anna changed it: it is now removed, “that is the other hall”/);
   // What he was about to do is refused, and nothing is done twice.
   await ben.getByRole('dialog').getByRole('button', { name: /^Remove/ }).click();
   await ben.getByRole('dialog').getByRole('alert').first().waitFor();
