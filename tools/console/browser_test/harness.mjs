@@ -13,7 +13,7 @@ const { chromium } = require('playwright-core');
 const axe = readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
 
 export const bin = (name) => join(root, 'build/release/bin', name);
-const maps = join(root, 'build/console-test');
+export const maps = join(root, 'build/console-test');
 export const shots = resolve(root, process.env.RELMAP_SHOTS ?? 'build/console-test/shots');
 // However busy the machine is.
 export const patience = Number(process.env.RELMAP_PATIENCE_MS ?? 600_000);
@@ -92,17 +92,23 @@ export async function run(program, args) {
   return out;
 }
 
-let browser = null;
-// A page of a new visitor. It fails the test if the page throws, or breaks its own security policy.
-export async function open(test, address, { width = 1400, height = 860, dark = false } = {}) {
-  browser ??= await chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--no-sandbox', '--disable-dev-shm-usage'],
-  });
+const drawing = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+const notDrawing = ['--disable-gpu', '--disable-webgl', '--disable-webgl2', '--disable-3d-apis'];
+const browsers = new Map();
+// A page of a new visitor. It fails the test if the page throws, breaks its own security policy, or opens a dialog of
+// the browser. `moving`: what moves is eased; `webgl` false: a browser that draws no map.
+export async function open(test, address, { width = 1400, height = 860, dark = false, moving = false, touch = false, webgl = true } = {}) {
+  if (!browsers.has(webgl))
+    browsers.set(webgl, chromium.launch({
+      executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+      args: [...(webgl ? drawing : notDrawing), '--no-sandbox', '--disable-dev-shm-usage'],
+    }));
+  const browser = await browsers.get(webgl);
   const context = await browser.newContext({
     viewport: { width, height },
     colorScheme: dark ? 'dark' : 'light',
-    reducedMotion: 'reduce',
+    reducedMotion: moving ? 'no-preference' : 'reduce',
+    hasTouch: touch,
     ignoreHTTPSErrors: true,
   });
   const page = await context.newPage();
@@ -111,6 +117,10 @@ export async function open(test, address, { width = 1400, height = 860, dark = f
   page.on('pageerror', (error) => wrong.push(String(error)));
   page.on('console', (message) => {
     if (/Content Security Policy/.test(message.text())) wrong.push(message.text());
+  });
+  page.on('dialog', (dialog) => {
+    wrong.push(`a dialog: ${dialog.message()}`);
+    void dialog.dismiss();
   });
   test.after(async () => {
     await context.close();
@@ -121,8 +131,8 @@ export async function open(test, address, { width = 1400, height = 860, dark = f
 }
 // Called once all tests of a file are done.
 export async function closeBrowser() {
-  await browser?.close();
-  browser = null;
+  for (const browser of browsers.values()) await (await browser).close();
+  browsers.clear();
 }
 
 // Goes to a view by the bar, as a person does.

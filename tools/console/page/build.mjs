@@ -30,7 +30,7 @@ const options = {
   logLevel: 'warning',
   mainFields: ['svelte', 'browser', 'module', 'main'],
   conditions: ['svelte', 'browser'],
-  plugins: [sveltePlugin({ compilerOptions: { css: 'external', runes: true, modernAst: true } })],
+  plugins: [plainDescriptors(), sveltePlugin({ compilerOptions: { css: 'external', runes: true, modernAst: true } })],
 };
 
 for (const file of ['index.html', 'icon.svg', 'runbook.css']) copyFileSync(join('src', file), join(out, file));
@@ -47,6 +47,17 @@ if (watching) {
   const limit = 150_000;
   console.error(`build: ${scripts.join(', ')}: ${size} bytes compressed (Brotli), of ${limit} at most`);
   if (size > limit) process.exit(1);
+}
+
+// The stubs hold descriptions of their messages in base64, in which a compressor finds none of the names that repeat. As
+// plain text they are 5 kB smaller on the wire.
+function plainDescriptors() {
+  const plain = (stubs) => stubs.replace(/fileDesc\("([^"]*)"/, (_, text) => `fileDesc(btoa(${JSON.stringify(atob(text))})`);
+  return {
+    name: 'plain-descriptors',
+    setup: (build) =>
+      build.onLoad({ filter: /_pb\.ts$/ }, ({ path }) => ({ loader: 'ts', contents: plain(readFileSync(path, 'utf8')) })),
+  };
 }
 
 // The licences of what becomes part of the page, by package.

@@ -5,7 +5,7 @@ import { EdgeState } from '../src/proto/relmap/v1/graph_pb';
 import { EditEffectSchema } from '../src/proto/relmap/v1/map_pb';
 import { Reason } from '../src/proto/relmap/v1/reason_pb';
 import {
-  conflictOf, isOld, lastToUndo, possible, readList, requestOf, undoOf, withDone, withUndone, type Done,
+  conflictOf, isOld, lastToUndo, onlyItself, possible, readList, requestOf, undoOf, withDone, withStepUndone, type Done,
 } from '../src/views/review/edits';
 
 const done = (id: string): Done => ({
@@ -36,12 +36,30 @@ test('only what the state allows is offered', () => {
 test('the history takes back the newest edit that stands', () => {
   let list = withDone(withDone([], done('1')), done('2'));
   assert.equal(lastToUndo(list)!.id, '2');
-  list = withDone(withUndone(list, '2'), { ...done('3'), byUndo: true });
+  list = withDone(withStepUndone(list, '2', '71'), { ...done('3'), byUndo: true });
   assert.equal(lastToUndo(list)!.id, '1');
-  assert.equal(lastToUndo(withUndone(list, '1')), null);
+  assert.equal(lastToUndo(withStepUndone(list, '1', '72')), null);
   assert.deepEqual(readList(JSON.stringify(list)), list);
   assert.deepEqual(readList('{"x":'), []);
   assert.deepEqual(readList('[null, {"name": 3}]'), []);
+});
+
+test('an edit that takes two steps to undo stays, with the step that is left, until both are done', () => {
+  const proposed: Done = { ...done('1'), what: 'proposeAccepted', undo: ['withdraw', 'removeAlone'] };
+  const half = withStepUndone([proposed], '1', '80');
+  assert.deepEqual(half, [{ ...proposed, undo: ['removeAlone'], sequence: '80' }]);
+  assert.equal(lastToUndo(half)!.id, '1');
+  assert.equal(lastToUndo(withStepUndone(half, '1', '81')), null);
+});
+
+test('a step that changes more than the closure itself is told from one that does not', () => {
+  const change = (index: number) => ({ id: { frame: { session: 2, index }, ordinal: 1 } });
+  const effect = (...indices: number[]) => create(EditEffectSchema, { closures: indices.map(change) });
+  assert.equal(onlyItself('2:5/1', effect(5), []), true);
+  assert.equal(onlyItself('2:5/1', effect(5, 6), []), false);
+  assert.equal(onlyItself('2:5/1', effect(5), [change(6).id]), false);
+  const stretch = { first: { session: 2, index: 1 }, last: { session: 2, index: 4 } };
+  assert.equal(onlyItself('2:5/1', create(EditEffectSchema, { carried: [stretch] }), []), false);
 });
 
 test('what this tab did itself is no news', () => {

@@ -28,7 +28,9 @@ test('what to avoid is in the address, whatever the labels are', () => {
   const request = routeRequest({}, {}, how);
   assert.equal(request.by, RouteBy.TIME);
   assert.deepEqual(request.filter!.avoidFrames, [{ session: 6, index: 1 }]);
-  assert.equal(mapParameters({ session: 1, index: 2 }, { session: 1, index: 9 }, how).by, 'time');
+  const parameters = mapParameters({ session: 1, index: 2 }, { session: 1, index: 9 }, how, 1);
+  assert.deepEqual([parameters.route, parameters.by, parameters.way], ['1:2,1:9', 'time', '2']);
+  assert.deepEqual(readHow((name) => parameters[name] ?? null), how);
 });
 
 test('photographs are reduced only where it is needed', () => {

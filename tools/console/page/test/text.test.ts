@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { href, parseAddress } from '../src/lib/address_text';
-import { ago, bytes, count, counted, metres, plain, seconds, time } from '../src/lib/format';
+import { ago, bytes, count, counted, line, metres, plain, seconds, time } from '../src/lib/format';
 import { edgeText, frameText, parseEdge, parseFrame } from '../src/lib/ids';
 
 test('frames and closures are read as they are written', () => {
@@ -38,6 +38,7 @@ test('whatever is no address shows the map', () => {
 });
 
 test('hostile text is shown as codes and cut, never within a character', () => {
+  assert.equal(line(' the other\n hall \n'), 'the other hall');
   assert.equal(plain('cart'), 'cart');
   assert.equal(plain('a\u0000b\nc\td\u007f'), 'a\\u0000b\\u000ac\\u0009d\\u007f');
   assert.equal(plain('evil\u202egnp.exe'), 'evil\\u202egnp.exe');

@@ -23,7 +23,8 @@ class Caller {
   // How often the daemon has come back after it did not answer: what could not be read then is worth asking for again.
   returns = $state(0);
 
-  private asking = false;
+  private asking: Promise<void> | null = null;
+  private refusal: unknown = null; // with which the daemon asks for a login
 
   async start() {
     const key = /[#&]key=([^&]+)/.exec(location.hash)?.[1];
@@ -37,10 +38,12 @@ class Caller {
     document.addEventListener('visibilitychange', () => void this.ask());
   }
 
-  // Throws what the console says against it.
+  // Throws what the console or the daemon says against it.
   async login(token: string) {
     await postJson('/login', { token });
+    await this.asking; // which was without it
     await this.ask();
+    if (this.state === 'login') throw this.refusal;
   }
 
   async logout() {
@@ -50,11 +53,20 @@ class Caller {
 
   // Asks now, for instance after a call of one's own failed.
   async ask() {
-    if (this.asking || (document.hidden && this.state === 'ready')) return;
-    this.asking = true;
+    if (document.hidden && this.state === 'ready') return;
+    await (this.asking ??= this.askNow());
+  }
+
+  private async askNow() {
     try {
-      this.about ??= await getJson<About>('/about');
-      this.status = await map.getStatus({}, { timeoutMs: 5000 });
+      const [about, status] = await Promise.allSettled([
+        this.about ?? getJson<About>('/about'),
+        map.getStatus({}, { timeoutMs: 5000 }),
+      ]);
+      if (about.status === 'rejected') throw about.reason;
+      this.about = about.value;
+      if (status.status === 'rejected') throw status.reason;
+      this.status = status.value;
       if (this.state === 'unreachable') ++this.returns;
       this.state = 'ready';
       this.problem = null;
@@ -64,12 +76,13 @@ class Caller {
       if (problem.reason === 'UNAUTHENTICATED') {
         this.problem = this.state === 'ready' || this.state === 'unreachable' ? problem : null;
         this.state = 'login';
+        this.refusal = error;
       } else {
         this.problem = problem;
         this.state = 'unreachable';
       }
     } finally {
-      this.asking = false;
+      this.asking = null;
     }
   }
 }

@@ -50,6 +50,11 @@ export function ago(us: bigint | number, now = Date.now()): string {
   return passed < 1 ? 'just now' : `${seconds(passed)} ago`;
 }
 
+// What somebody wrote into a field of several lines, as the one line that the daemon takes.
+export function line(text: string): string {
+  return text.trim().replace(/\s+/g, ' ');
+}
+
 // A text that somebody else chose, harmless: control characters, those that cannot be seen and those that change the
 // direction of writing are shown as their codes, and a long text is cut, never within a character.
 export function plain(text: string, most = 200): string {

@@ -2,7 +2,7 @@
 // second canvas, which has text.
 import { toScreen, type Camera, type Size } from './camera';
 import { metres, plain } from '../lib/format';
-import { css, sessionColour, type Palette } from './palette';
+import { css, sessionColour, type Palette, type Rgb } from './palette';
 import { clipped, Placement, scaleBar } from './placement';
 
 interface At {
@@ -26,6 +26,11 @@ export interface Trail extends At {
   path: Path2D; // metres from x, y
   session: number;
 }
+export interface RouteMark extends At {
+  path: Path2D;
+  chosen: boolean;
+  points: number;
+}
 export interface Line {
   ax: number;
   ay: number;
@@ -40,6 +45,8 @@ export interface Marks {
   labels: LabelMark[];
   captions: Caption[];
   trails: Trail[];
+  routes: RouteMark[]; // the chosen one last
+  ends: LabelMark[]; // of the route
   closures: LooseClosure[]; // newer than the tiles
   torn: (Line & { edge: string | null; text: string })[];
   frame: At | null; // selected
@@ -48,12 +55,13 @@ export interface Marks {
   crosshair: boolean;
 }
 export const noMarks: Marks = {
-  robots: [], labels: [], captions: [], trails: [], closures: [], torn: [],
+  robots: [], labels: [], captions: [], trails: [], routes: [], ends: [], closures: [], torn: [],
   frame: null, closure: null, root: null, crosshair: false,
 };
 
 const font = "13px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
 const line = 17; // pixels
+type Stroke = [colour: Rgb, width: number, dashes?: number[]];
 
 export class Overlay {
   private context: CanvasRenderingContext2D;
@@ -78,7 +86,10 @@ export class Overlay {
     context.textBaseline = 'top';
     context.lineJoin = context.lineCap = 'round';
 
-    this.trails(camera, size, pixel, marks.trails, palette);
+    for (const route of marks.routes)
+      this.path(camera, size, pixel, route, route.chosen ? [[palette.text, 8], [palette.route, 4.5]] : [[palette.ground, 6], [palette.text, 2.5, [9, 6]]]);
+    for (const trail of marks.trails)
+      this.path(camera, size, pixel, trail, [[palette.ground, 7], [sessionColour(palette, trail.session), 4]]);
     for (const closure of marks.closures) this.closure(camera, size, closure, css(palette[closure.state]), 2, true);
     if (marks.closure) {
       this.closure(camera, size, marks.closure, css(palette.selected, 0.22), 16, false);
@@ -112,6 +123,11 @@ export class Overlay {
       const at = toScreen(camera, size, caption.x, caption.y);
       if (near(...at, 200)) this.text(caption.text, at, 6, palette.text, palette, placement, true);
     }
+    for (const { x, y, text } of marks.ends) {
+      const at = toScreen(camera, size, x, y);
+      this.ring(...at, 6, palette.text, palette.route);
+      this.text(text, at, 9, palette.text, palette, placement, true);
+    }
     for (const label of marks.labels) {
       const at = toScreen(camera, size, label.x, label.y);
       if (near(...at, 10)) this.label(label.text, at, palette, placement);
@@ -129,19 +145,20 @@ export class Overlay {
     }
   }
 
-  private trails(camera: Camera, size: Size, pixel: number, trails: Trail[], palette: Palette) {
+  // A path is made once and drawn from wherever it is looked at. Strokes are in pixels: colour, width, dashes.
+  private path(camera: Camera, size: Size, pixel: number, { x, y, path }: At & { path: Path2D }, strokes: Stroke[]) {
     const { context } = this;
     const cos = Math.cos(camera.turn) / camera.mpp;
     const sin = Math.sin(camera.turn) / camera.mpp;
-    for (const { x, y, path, session } of trails) {
-      const [px, py] = toScreen(camera, size, x, y);
-      context.setTransform(cos * pixel, -sin * pixel, -sin * pixel, -cos * pixel, px * pixel, py * pixel);
-      for (const [colour, width] of [[palette.ground, 7], [sessionColour(palette, session), 4]] as const) {
-        context.strokeStyle = css(colour);
-        context.lineWidth = width * camera.mpp;
-        context.stroke(path);
-      }
+    const [px, py] = toScreen(camera, size, x, y);
+    context.setTransform(cos * pixel, -sin * pixel, -sin * pixel, -cos * pixel, px * pixel, py * pixel);
+    for (const [colour, width, dashes = []] of strokes) {
+      context.strokeStyle = css(colour);
+      context.lineWidth = width * camera.mpp;
+      context.setLineDash(dashes.map((length) => length * camera.mpp));
+      context.stroke(path);
     }
+    context.setLineDash([]);
     context.setTransform(pixel, 0, 0, pixel, 0, 0);
   }
 

@@ -27,6 +27,7 @@ export interface Palette {
   suspicious: Rgb;
   torn: Rgb;
   selected: Rgb;
+  route: Rgb; // on a casing of the text's colour
 }
 
 export function rgb(hex: string): Rgb {
@@ -52,6 +53,7 @@ const light: Palette = {
   suspicious: rgb('#c25e00'),
   torn: rgb('#d1003f'),
   selected: rgb('#111820'),
+  route: rgb('#ffcf33'),
 };
 const dark: Palette = {
   ground: rgb('#10161d'),
@@ -69,6 +71,7 @@ const dark: Palette = {
   suspicious: rgb('#ffa040'),
   torn: rgb('#ff4f74'),
   selected: rgb('#ffffff'),
+  route: rgb('#b3520a'),
 };
 export function palette(darkTheme: boolean): Palette {
   return darkTheme ? dark : light;

@@ -40,6 +40,7 @@ export class Stage {
     drawCalls: 0,
     tiles: 0,
     pickMs: 0, // the last pick
+    ease: 1, // 0..1, from the places in the layout before
     fetched: 0, // bytes of tiles, in all
   };
   // The picture has all that belongs to it.
@@ -188,6 +189,15 @@ export class Stage {
   all(ms = 350) {
     if (this.scene) this.gotoBox(whole(this.scene.layout), 0.004, ms);
   }
+  get showsAll(): boolean {
+    if (!this.scene) return true;
+    const [left, bottom, right, top] = whole(this.scene.layout);
+    const { width, height } = this.size;
+    return [[left, bottom], [left, top], [right, bottom], [right, top]].every(([x, y]) => {
+      const [px, py] = toScreen(this.aim, this.size, x!, y!);
+      return px >= 0 && py >= 0 && px <= width && py <= height;
+    });
+  }
   zoom(factor: number) {
     this.goto(zoomAt(this.aim, this.size, this.size.width / 2, this.size.height / 2, factor), 180, true);
   }
@@ -219,10 +229,12 @@ export class Stage {
     this.overlay.draw(this.camera, this.size, pixel, this.marks, this.look.palette, drawn);
     const { counters } = this;
     counters.frames++;
+    counters.ease = this.easing(begin);
     counters.drawCalls = this.renderer.drawCalls;
     counters.scriptMs.push(performance.now() - begin);
     if (counters.scriptMs.length > 240) counters.scriptMs.shift();
-    if (this.flight || this.easing(performance.now()) < 1) this.redraw();
+    // However long a frame takes, the last one shows where it ends.
+    if (this.flight || counters.ease < 1) this.redraw();
   };
 
   private fly(now: number) {
@@ -232,7 +244,8 @@ export class Stage {
     this.camera = share >= 1 ? to : between(from, to, share);
     if (share >= 1) this.flight = null;
   }
-  private easing(now: number): number {
+  // How far the lines are on their way from the layout before.
+  easing(now: number): number {
     const since = this.scene?.easedFrom;
     return since == null ? 1 : smooth((now - since) / easeMs);
   }

@@ -6,9 +6,13 @@
 //   scriptMs: { last, median, worst }   script of a frame, of the last 240 frames
 //   pickMs                    the last search for what lies under the pointer
 //   fetchedBytes, heldBytes   tiles that came; tiles held, with their copies on the graphics card
+//   ease                      how far the lines of the last frame were from the layout before to this one, 0..1
+//   routePoints               places through which routes are drawn
+//   robots, trailPoints       robots drawn; frames of theirs that are newer than the tiles
 //   camera                    { x, y, mpp, turn }
 import type { Camera } from '../../map/camera';
 import type { Stage } from '../../map/stage';
+import type { Trails } from '../../map/trails';
 
 export interface Counters {
   readonly version: number | null;
@@ -21,6 +25,10 @@ export interface Counters {
   readonly pickMs: number;
   readonly fetchedBytes: number;
   readonly heldBytes: number;
+  readonly ease: number;
+  readonly routePoints: number;
+  readonly robots: number;
+  readonly trailPoints: number;
   readonly camera: Camera;
 }
 declare global {
@@ -30,7 +38,7 @@ declare global {
 }
 
 // Returns what takes them away.
-export function publishCounters(stage: Stage): () => void {
+export function publishCounters(stage: Stage, trails: Trails): () => void {
   const { counters } = stage;
   window.relmapMap = Object.freeze({
     get version() {
@@ -64,6 +72,18 @@ export function publishCounters(stage: Stage): () => void {
     },
     get heldBytes() {
       return stage.held;
+    },
+    get ease() {
+      return counters.ease;
+    },
+    get routePoints() {
+      return stage.marks.routes.reduce((sum, { points }) => sum + points, 0);
+    },
+    get robots() {
+      return stage.marks.robots.length;
+    },
+    get trailPoints() {
+      return trails.fresh;
     },
     get camera() {
       return { ...stage.camera };

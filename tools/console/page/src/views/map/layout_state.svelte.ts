@@ -2,7 +2,9 @@
 import { getJson, isAborted, problemOf, type Problem } from '../../lib/rpc';
 import type { Layout } from '../../map/layout';
 
-const leastMs = 250; // between questions, should the console not wait
+// Between questions: the layout's progress is news several times a second. Whoever waits for the first picture asks on.
+const leastMs = 250;
+const firstMs = 30;
 
 export class LayoutState {
   now = $state.raw<Layout | null>(null);
@@ -28,7 +30,7 @@ export class LayoutState {
           this.now = layout;
           this.problem = null;
           after = layout.version;
-          wait = leastMs;
+          wait = layout.version ? leastMs : firstMs;
         } catch (error) {
           if (ended) return;
           if (!isAborted(error)) {

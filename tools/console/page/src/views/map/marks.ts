@@ -1,7 +1,7 @@
 // What lies over the lines, put together from what is known.
 import { count } from '../../lib/format';
 import type { FramePlace, Part, Torn } from '../../map/layout';
-import type { Caption, LooseClosure, Marks, Trail } from '../../map/overlay';
+import type { Caption, LabelMark, LooseClosure, Marks, RouteMark, Trail } from '../../map/overlay';
 import type { Pose, Trails } from '../../map/trails';
 import type { Edge } from '../../proto/relmap/v1/graph_pb';
 import type { RobotRow } from '../fleet/trouble';
@@ -23,6 +23,8 @@ export interface Known {
   frame: string;
   edge: Edge | null;
   root: string;
+  routes: RouteMark[];
+  ends: [from: string, to: string] | null; // of the route
   crosshair: boolean;
 }
 
@@ -64,6 +66,8 @@ export function makeMarks(known: Known): Marks {
     frame,
     closure: closure(known),
     root: root ? { ...root, text: `drawn from ${known.root}` } : null,
+    routes: known.routes,
+    ends: ends(known),
     crosshair: known.crosshair,
   };
 }
@@ -73,6 +77,14 @@ function closure({ edge, place }: Known): Marks['closure'] {
   const a = place(`${edge.a.session}:${edge.a.index}`);
   const b = place(`${edge.b.session}:${edge.b.index}`);
   return a && b ? { ax: a.x, ay: a.y, bx: b.x, by: b.y } : null;
+}
+
+function ends({ ends, routes, place }: Known): LabelMark[] {
+  if (!routes.length || !ends) return [];
+  return ends.flatMap((frame, i) => {
+    const at = place(frame);
+    return at ? [{ x: at.x, y: at.y, text: i ? 'goal' : 'start' }] : [];
+  });
 }
 
 const stateNames = ['', 'candidate', 'accepted', 'quarantined', 'removed'] as const;

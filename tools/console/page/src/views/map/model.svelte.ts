@@ -2,6 +2,7 @@
 // what is shown, so all that somebody chooses is written there first.
 import { untrack } from 'svelte';
 import { address } from '../../lib/address.svelte';
+import { plain } from '../../lib/format';
 import { parseEdge, parseFrame } from '../../lib/ids';
 import { live } from '../../lib/live.svelte';
 import { allPages, seldom } from '../../lib/pages';
@@ -9,11 +10,11 @@ import { Poll } from '../../lib/poll.svelte';
 import { map, problemOf, type Problem } from '../../lib/rpc';
 import { sessions } from '../../lib/sessions.svelte';
 import { theme } from '../../lib/theme.svelte';
-import { around, cameraText, corners, fit, fromRelative, headingUp, parseCamera, relativeTo, type Camera } from '../../map/camera';
+import { around, cameraText, corners, fit, fromRelative, headingUp, pan, parseCamera, relativeTo, type Camera } from '../../map/camera';
 import { inView, type InView } from '../../map/in_view';
 import { drawable, type FramePlace, type Torn } from '../../map/layout';
 import { palette } from '../../map/palette';
-import { noMarks } from '../../map/overlay';
+import { noMarks, type RouteMark } from '../../map/overlay';
 import type { Picked } from '../../map/pick';
 import type { Look } from '../../map/renderer';
 import { easeMs, type Stage } from '../../map/stage';
@@ -25,6 +26,8 @@ import { freshOf, looseStates, type Loose } from './events';
 import { LayoutState } from './layout_state.svelte';
 import { makeMarks } from './marks';
 import { Places } from './places';
+import { routeMarks } from './route_lines';
+import { RouteState } from './route_state.svelte';
 import { layersText, parseColour, parseLayers, parseSessions, parseTime, timeText, type AllLayers } from './shown';
 
 const tornNamed = 60; // of which the number of standard deviations stands on the map
@@ -39,6 +42,7 @@ export interface Hover {
 
 export class MapModel {
   layout = new LayoutState();
+  route = new RouteState();
   robots = new Poll(async () => (await map.listRobots({})).robots, 2000);
   stage = $state.raw<Stage | null>(null);
   lost = $state(false);
@@ -76,6 +80,7 @@ export class MapModel {
     (again) => this.placesKnown(again),
     (error) => (this.trouble = problemOf(error)),
   );
+  private routes: RouteMark[] = [];
   private written: string | null = null; // the camera as it was last written to the address
   private pending = true; // the picture is to go where the address says
   private arrived = false;
@@ -200,8 +205,8 @@ export class MapModel {
     return this.colour === 'sd' ? this.root || this.layout.now?.parts[0]?.root || null : null;
   }
 
-  // Frames whose places are needed, as far as effects know them.
-  needPlaces() {
+  // Frames whose places are needed.
+  private needed(): string[] {
     const frames = [this.root, this.frame];
     if (this.edge?.a && this.edge.b) for (const { session, index } of [this.edge.a, this.edge.b]) frames.push(`${session}:${index}`);
     if (this.layers.torn) for (const { a, b } of this.torn.slice(0, tornNamed)) frames.push(a, b);
@@ -209,9 +214,21 @@ export class MapModel {
     for (const { robot } of this.rows) frames.push(this.headFrame(robot.session));
     const session = sessions.byNumber.get(this.session);
     if (session) frames.push(...along(session));
-    this.places.want(frames);
+    for (const route of this.route.frames) for (const frame of route) frames.push(frame);
+    return frames.filter((frame) => frame);
+  }
+
+  // For an effect, which runs again when others are needed.
+  needPlaces() {
+    this.places.want(this.needed());
+    this.layRoutes();
     this.markSoon();
     this.arrive();
+  }
+
+  private layRoutes() {
+    const { frames, chosen } = this.route;
+    this.routes = routeMarks(frames, chosen, (frame) => this.places.shown(frame));
   }
 
   private headFrame(session: number): string {
@@ -267,7 +284,10 @@ export class MapModel {
     this.trouble = null;
     const now = Date.now();
     for (const [edge, { since }] of this.loose) if (now - since > looseMs) this.loose.delete(edge);
-    this.places.renew(version, this.trails.asked());
+    const loose = [...this.loose.values()].flatMap(({ a, b }) => [a, b]);
+    this.places.renew(version, [...this.needed(), ...loose, ...this.trails.asked()]);
+    // As long as nobody has moved it, the picture shows all of a map that grows.
+    if (this.arrived && !this.byHand && !this.pending && this.stage && !this.stage.showsAll) this.stage.all(easeMs);
     this.arrive();
   }
 
@@ -279,14 +299,26 @@ export class MapModel {
       // The root stays where it is in the picture, and the map moves around it.
       this.stage.goto(fromRelative(this.rootPlace, relativeTo(before, this.stage.aim)), easeMs);
     }
+    this.layRoutes();
     this.markSoon();
     this.arrive();
+  }
+
+  // What is marked moves with the lines.
+  private ease() {
+    const before = this.places.share;
+    const { stage } = this;
+    this.places.share = stage ? stage.easing(performance.now()) : 1;
+    if (this.places.share === before) return;
+    this.layRoutes();
+    if (this.places.share < 1) this.markSoon();
   }
 
   markSoon = () => {
     if (!this.marking)
       this.marking = requestAnimationFrame(() => {
         this.marking = 0;
+        this.ease();
         this.mark();
       });
   };
@@ -305,7 +337,7 @@ export class MapModel {
     }
     const past = Number.isFinite(this.until);
     stage.marks = makeMarks({
-      place: (frame) => this.places.get(frame) ?? null,
+      place: (frame) => this.places.shown(frame),
       layers: this.layers,
       past,
       rows: this.rows,
@@ -319,6 +351,8 @@ export class MapModel {
       frame: this.frame,
       edge: this.edgeName ? this.edge : null,
       root: this.root,
+      routes: this.routes,
+      ends: this.route.ends,
       crosshair: stage.marks.crosshair,
     });
     if (this.robot && !this.pending) this.followRobot();
@@ -394,7 +428,7 @@ export class MapModel {
         if (head) return near(head);
         if (this.places.get(this.headFrame(robot.session)) === undefined && this.headFrame(robot.session)) return 'wait';
       }
-      return missing(`The robot ${this.robot}`);
+      return missing(`The robot ${plain(this.robot, 60)}`);
     }
     if (this.session) {
       const session = sessions.byNumber.get(this.session);
@@ -409,6 +443,17 @@ export class MapModel {
       if (!known.length) return missing(`Session ${this.session}`);
       address.set({ session: null, sessions: String(this.session) });
       return fit(around(known), stage.size, 60, turn, 0.01);
+    }
+    const { ends } = this.route;
+    if (ends && !this.route.problem) {
+      const frames = this.route.frames.flat();
+      const found = frames.map((frame) => this.places.get(frame));
+      if (this.route.busy || found.some((place) => place === undefined)) return 'wait';
+      const known = found.filter((place) => !!place);
+      if (!known.length) return missing('The route');
+      // Beside what is said of it.
+      const beside = stage.size.width > 900 ? 350 : 0;
+      return pan(fit(around(known), { ...stage.size, width: stage.size.width - beside }, 50, turn, 0.01), -beside / 2, 0);
     }
     if (this.root) return rootPlace ? near(rootPlace) : missing(`Frame ${this.root}`);
     return 'all';

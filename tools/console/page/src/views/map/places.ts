@@ -1,11 +1,14 @@
 // Where frames lie in the layout that is drawn, asked for once each.
 import { postJson } from '../../lib/rpc';
+import { wrapped } from '../../map/camera';
 import type { FramePlace } from '../../map/layout';
 
 const atOnce = 10_000;
 
 export class Places {
   private known = new Map<string, FramePlace | null>();
+  private before = new Map<string, FramePlace>(); // in the version before, while marks are eased
+  share = 1; // 0..1 of the way from there
   private version: number | null = null;
   private running = false;
   private wanted = new Set<string>();
@@ -21,6 +24,15 @@ export class Places {
     return this.known.get(frame);
   }
 
+  // Where to draw what is marked there: on its way from the version before to this one, as the lines are.
+  shown(frame: string): FramePlace | null {
+    const to = this.known.get(frame) ?? null;
+    const from = this.share < 1 && to ? this.before.get(frame) : undefined;
+    if (!from || from.part !== to!.part) return to;
+    const at = (one: number, other: number) => one + (other - one) * this.share;
+    return { ...to!, x: at(from.x, to!.x), y: at(from.y, to!.y), heading: from.heading + wrapped(to!.heading - from.heading) * this.share };
+  }
+
   want(frames: Iterable<string>) {
     let more = false;
     for (const frame of frames)
@@ -31,12 +43,13 @@ export class Places {
     if (more) void this.run();
   }
 
-  // Another version is drawn. What was known stays until its places have come.
+  // Another version is drawn, and these are needed of it. What was known of them stays until their places have come;
+  // all others are forgotten.
   renew(version: number, frames: Iterable<string>) {
     this.version = version;
-    this.wanted = new Set([...this.known.keys(), ...frames].filter((frame) => frame));
-    // Of what was asked long ago, not all forever.
-    if (this.wanted.size > 2 * atOnce) this.wanted = new Set(frames);
+    this.wanted = new Set(frames);
+    this.before = new Map([...this.known].filter((each): each is [string, FramePlace] => each[1] !== null));
+    for (const frame of this.known.keys()) if (!this.wanted.has(frame)) this.known.delete(frame);
     void this.run(true);
   }
 

@@ -127,9 +127,11 @@ export function routeRequest(
   };
 }
 
-// The parameters of the map for this route: it goes to the start, and has the ends.
-export function mapParameters(first: Parameters<typeof frameText>[0], last: Parameters<typeof frameText>[0], how: How): Record<string, string> {
-  const parameters: Record<string, string> = { frame: frameText(first), from: frameText(first), to: frameText(last) };
-  for (const [name, value] of Object.entries(writeHow(how))) if (value && name !== 'alternatives') parameters[name] = value;
+// The parameters of the map for this route: its ends as they were found, and which of the alternatives stands out.
+type Found = Parameters<typeof frameText>[0];
+export function mapParameters(first: Found, last: Found, how: How, chosen = 0): Record<string, string> {
+  const parameters: Record<string, string> = { route: `${frameText(first)},${frameText(last)}` };
+  for (const [name, value] of Object.entries(writeHow(how))) if (value) parameters[name] = value;
+  if (chosen) parameters.way = String(chosen + 1);
   return parameters;
 }

@@ -18,7 +18,7 @@ export interface Done {
   sequence: string; // of the journal
   state: EdgeState; // of the closure afterwards
   changed: number; // closures that it changed, this one included
-  undo: What[]; // steps, in their order
+  undo: What[]; // steps, in their order; those that are left, if somebody began
   undone: boolean;
   byUndo: boolean; // it took back another one
 }
@@ -113,8 +113,19 @@ export function withDone(list: Done[], done: Done): Done[] {
   return [done, ...list].slice(0, kMost);
 }
 
-export function withUndone(list: Done[], id: string): Done[] {
-  return list.map((done) => (done.id === id ? { ...done, undone: true } : done));
+// The first step that undoes it is done. It is undone with the last one.
+export function withStepUndone(list: Done[], id: string, sequence: string): Done[] {
+  return list.map((done) => {
+    if (done.id !== id) return done;
+    const undo = done.undo.slice(1);
+    return undo.length ? { ...done, undo, sequence } : { ...done, undone: true };
+  });
+}
+
+// Whether an edit of this closure changes nothing but its own state.
+export function onlyItself(name: string, effect: EditEffect | undefined, alsoChanged: readonly unknown[]): boolean {
+  const { closures = [], carried = [], notCarried = [] } = effect ?? {};
+  return !alsoChanged.length && !carried.length && !notCarried.length && closures.every(({ id }) => edgeText(id) === name);
 }
 
 // The edit that "undo" takes back: going back, not to and fro.

@@ -2,7 +2,7 @@
 import type { SetEdgeStateReply } from '../../proto/relmap/v1/map_pb';
 import { edgeId, type Edge as EdgeName } from '../../lib/ids';
 import { map } from '../../lib/rpc';
-import { readList, requestOf, withDone, withUndone, type Done, type What } from './edits';
+import { readList, requestOf, withDone, withStepUndone, type Done, type What } from './edits';
 
 const kKey = 'relmap-closure-edits';
 
@@ -12,8 +12,8 @@ class MyEdits {
   add(done: Done) {
     this.keep(withDone(this.list, done));
   }
-  undone(id: string) {
-    this.keep(withUndone(this.list, id));
+  stepUndone(id: string, sequence: string) {
+    this.keep(withStepUndone(this.list, id, sequence));
   }
   private keep(list: Done[]) {
     this.list = list;
