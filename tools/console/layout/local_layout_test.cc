@@ -87,8 +87,9 @@ TEST(LocalLayout, WithoutAClosureInForceIsMadeOfWhatWasMeasured) {
   for (const client::Spring& spring : client::springs_of(edges)) pulling.push_back(spring.relaxed);
   const auto refined = client::relax(street.frames, pulling).or_throw();
   const auto pose = [&](FrameId frame) {
-    return refined.poses[static_cast<std::size_t>(
-                             std::lower_bound(street.frames.begin(), street.frames.end(), frame) - street.frames.begin())]
+    return refined
+        .poses[static_cast<std::size_t>(std::lower_bound(street.frames.begin(), street.frames.end(), frame) -
+                                        street.frames.begin())]
         .T_component_frame;
   };
   for (client::Edge& edge : edges) {
