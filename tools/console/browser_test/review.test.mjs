@@ -57,3 +57,36 @@ test('two operators see what the other does', async (t) => {
   await one.getByText('Your edits in this tab (1)').waitFor();
   await other.getByText(/changed it: it is now removed/).waitFor();
 });
+
+test('what was proposed and accepted is undone in two steps, both of which are told before', async (t) => {
+  const folder = copyOfMap(t, 'drive');
+  await startDaemon(t, folder);
+  const console = await startConsole(t, folder);
+  const page = await open(t, console.value);
+  await goTo(page, 'Review');
+  await page.getByRole('heading', { name: /^Closure / }).waitFor();
+  await page.keyboard.press('p');
+  const dialog = page.getByRole('dialog');
+  await dialog.getByLabel('Put it into force at once').check();
+  // Frames beside those that a closure joins.
+  const joined = (await structure(folder)).map(([id]) => id);
+  for (const other of ['1:54', '1:58', '1:53', '1:59']) {
+    await dialog.getByLabel('Frame', { exact: true }).fill('1:0');
+    await dialog.getByLabel('Other frame').fill(other);
+    await dialog.getByRole('button', { name: 'Compare the two' }).click();
+    await dialog.getByText(/Geometry confirms it|No closure between the two/).first().waitFor();
+    if (await dialog.getByText('Geometry confirms it').count()) break;
+  }
+  await dialog.getByRole('button', { name: 'Propose and accept' }).click();
+  await page.getByText('Your edits in this tab (1)').waitFor();
+  const made = async () => (await structure(folder)).find(([id]) => !joined.includes(id));
+  const [, state] = await made();
+  await page.keyboard.press('z');
+  await dialog.getByText(/in two steps: withdraw the decision, then remove alone/).waitFor();
+  await dialog.getByText('Then: remove alone.').waitFor();
+  await dialog.getByRole('button', { name: /^Undo/ }).click();
+  await page.getByText('Your edits in this tab (3)').waitFor();
+  await dialog.waitFor({ state: 'detached' });
+  await page.getByText('undone').waitFor();
+  assert.notEqual((await made())[1], state);
+});
