@@ -5,6 +5,9 @@
 // than one alone even if it does nothing for them. What it does for them is told by two daemons with equal fleets of
 // which one is watched at a time, in turn: the load of the machine is always the same, and only whose worker is
 // concerned differs.
+//
+// With --through-console the watchers are pages of a relmap-console beside the daemon, which asks it besides for what
+// it draws.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -24,11 +27,12 @@
 #include "client/relmap_client.h"
 #include "client/server_address.h"
 #include "proto/base/clock.h"
-#include "proto/base/mutex.h"
 #include "proto/base/quantile.h"
 #include "relmap/v1/map.grpc.pb.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/running_daemon.h"
+#include "tools/bench/console_pages.h"
+#include "tools/bench/heard.h"
 #include "tools/bench/stopwatch.h"
 #include "tools/bench/streaming_robots.h"
 #include "tools/bench/subcommand.h"
@@ -49,6 +53,7 @@ struct WatchBenchOptions {
   double seconds = 3;  // of a phase
   std::uint32_t rounds = 12;
   std::size_t memory_budget_mb = 1024;
+  bool through_console = false;
 };
 
 // A daemon to which robots send all the time.
@@ -72,6 +77,7 @@ class WatchedFleet {
   }
 
   RunningDaemon& daemon() { return daemon_; }
+  const std::string& folder() const { return folder_; }
   std::string data() const { return folder_ + "/map"; }
 
   // Processor time of each thread so far, by its number.
@@ -94,7 +100,7 @@ class WatchedFleet {
 // Watchers who read, each in a thread of its own, and others who do not.
 class Onlookers {
  public:
-  Onlookers(const std::string& server, const WatchBenchOptions& options) {
+  Onlookers(const std::string& server, const WatchBenchOptions& options, Heard& heard) : heard_(heard) {
     const auto address = client::resolve_server(server).or_throw().address;
     for (std::uint32_t i = 0; i < options.stalled; ++i) {
       grpc::ChannelArguments arguments;
@@ -120,13 +126,6 @@ class Onlookers {
     for (const auto& one : asleep_) one->context.TryCancel();
   }
 
-  // Milliseconds from each commit until each watcher had all of it.
-  std::vector<double> latencies_ms() {
-    const MutexLock lock(mutex_);
-    return latencies_ms_;
-  }
-  std::uint64_t events() const { return events_; }
-
  private:
   struct Asleep {
     grpc::ClientContext context;
@@ -138,30 +137,23 @@ class Onlookers {
     const auto client = client::Client::connect(server).or_throw();
     client::WatchOptions options;
     options.stopped = [this] { return stop_.load(); };
-    std::uint64_t known = 0;
+    HeardByOne heard(heard_);
     const Status watched = client->watch(options, [&](const client::WatchEvent& event) {
       const auto* caught_up = std::get_if<client::CaughtUp>(&event.what);
       if (!caught_up) {
-        ++events_;
+        heard.event();
         return Status();
       }
-      const std::int64_t us = now_us() - caught_up->time_us;
-      if (known == 0) ++begun_;
-      if (known != 0 && caught_up->journal_sequence > known) {
-        const MutexLock lock(mutex_);
-        latencies_ms_.push_back(1e-3 * static_cast<double>(us));
-      }
-      known = caught_up->journal_sequence;
+      if (!heard.has_caught_up()) ++begun_;
+      heard.caught_up(caught_up->journal_sequence, caught_up->time_us, now_us());
       return Status();
     });
     if (!watched.ok()) std::fprintf(stderr, "a watch failed: %s\n", watched.to_string().c_str());
   }
 
+  Heard& heard_;
   std::atomic<bool> stop_{false};
   std::atomic<std::size_t> begun_{0};
-  std::atomic<std::uint64_t> events_{0};
-  Mutex mutex_;
-  std::vector<double> latencies_ms_ RELMAP_GUARDED_BY(mutex_);
   std::vector<std::unique_ptr<Asleep>> asleep_;
   std::vector<std::thread> threads_;
 };
@@ -242,18 +234,33 @@ void run(const WatchBenchOptions& options, Report& report) {
   Record records[2];
   constexpr int kNobody = 2;
   std::vector<double> ms;
-  double share = 0, resident_bytes = 0, watched_s = 0;
-  std::uint64_t events = 0, frames = 0;
+  double share = 0, resident_bytes = 0, watched_s = 0, console_s = 0;
+  std::size_t console_bytes = 0;
+  std::uint64_t events = 0, frames = 0, requests = 0;
   const auto phase = [&](int watched) {
     const auto resident = [&] {
       return static_cast<double>(daemons[watched].client().status().or_throw().resident_bytes);
     };
     const double before = watched == kNobody ? 0 : resident();
+    Heard heard;
     std::optional<Onlookers> onlookers;
-    if (watched != kNobody) onlookers.emplace(fleets[watched].data(), options);
+    std::optional<ConsolePages> pages;
+    if (watched != kNobody && options.through_console)
+      pages.emplace(fleets[watched].folder(), fleets[watched].data(), options.watchers, options.stalled, heard);
+    else if (watched != kNobody)
+      onlookers.emplace(fleets[watched].data(), options, heard);
     std::this_thread::sleep_for(std::chrono::duration<double>(kSettle_s));
     for (Measured& daemon : daemons) daemon.begin();
+    const double console_before = pages ? pages->console_cpu_seconds() : 0;
+    const std::uint64_t requests_before = pages ? pages->requests() : 0;
+    const std::uint64_t events_before = heard.events();
     std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));
+    if (pages) {
+      console_s += pages->console_cpu_seconds() - console_before;
+      requests += pages->requests() - requests_before;
+      console_bytes = std::max(console_bytes, pages->console_peak_bytes());
+    }
+    events += heard.events() - events_before;
     for (int d = 0; d < 2; ++d) {
       const Phase told = daemons[d].end();
       (watched == kNobody ? records[d].alone
@@ -264,12 +271,12 @@ void run(const WatchBenchOptions& options, Report& report) {
       watched_s += told.seconds;
       frames += told.frames;
     }
-    if (!onlookers) return;
+    if (watched == kNobody) return;
+    if (pages) pages->throw_if_one_failed();
     share = std::max(share, replies_share(daemons[watched].client()));
     resident_bytes = std::max(resident_bytes, resident() - before);
-    const auto more = onlookers->latencies_ms();
+    const auto more = heard.latencies_ms();
     ms.insert(ms.end(), more.begin(), more.end());
-    events += onlookers->events();
   };
   for (std::uint32_t round = 0; round < options.rounds; ++round) {
     // In turn, since a map that grows costs more.
@@ -278,7 +285,7 @@ void run(const WatchBenchOptions& options, Report& report) {
   }
   if (ms.empty()) throw std::runtime_error("nobody heard of a commit");
 
-  std::vector<double> alone_us, other_us, watched_us, ratios, daemon_us, daemon_watched_us;
+  std::vector<double> alone_us, other_us, watched_us, ratios, daemon_us, daemon_watched_us, daemon_ratios;
   for (const Record& record : records) {
     const std::string worker = worker_of(record);
     for (std::uint32_t round = 0; round < options.rounds; ++round) {
@@ -288,6 +295,7 @@ void run(const WatchBenchOptions& options, Report& report) {
       ratios.push_back(watched_us.back() / other_us.back());
       daemon_us.push_back(record.other_watched[round].per_frame_us(record.other_watched[round].process_s));
       daemon_watched_us.push_back(record.watched[round].per_frame_us(record.watched[round].process_s));
+      daemon_ratios.push_back(daemon_watched_us.back() / daemon_us.back());
     }
   }
   report.add("watchers", options.watchers, "of the map, and");
@@ -310,8 +318,15 @@ void run(const WatchBenchOptions& options, Report& report) {
   report.add("daemon_us", quantile(daemon_us, 0.5),
              "the daemon's processor time of a keyframe, while the other map is watched");
   report.add("daemon_watched_us", quantile(daemon_watched_us, 0.5), "while its own is");
+  report.add("daemon_ratio", quantile(daemon_ratios, 0.5), "of these two, round by round: the median,");
+  report.add("daemon_ratio_p25", quantile(daemon_ratios, 0.25), "and the middle half");
+  report.add("daemon_ratio_p75", quantile(daemon_ratios, 0.75), "");
   report.add("replies_share", share, "of the memory for replies that is used, all watches and calls together");
   report.add("resident_growth_mb", 1e-6 * resident_bytes, "while they watch");
+  if (!options.through_console) return;
+  report.add("console_cores", console_s / watched_s, "the console's processor time of a second");
+  report.add("console_requests_per_s", static_cast<double>(requests) / watched_s, "of all pages, beside the streams");
+  report.add("console_peak_mb", 1e-6 * static_cast<double>(console_bytes), "of its resident memory");
 }
 
 }  // namespace
@@ -326,6 +341,8 @@ Run declare_watch(CLI::App& app) {
   app.add_option("--seconds", options->seconds, "of a phase: nobody watches, one map is watched, the other is")
       ->capture_default_str();
   app.add_option("--rounds", options->rounds, "of the three phases")->capture_default_str();
+  app.add_flag("--through-console", options->through_console,
+               "Watchers are pages of a relmap-console, which ask what the Map view asks, as often");
   app.add_option("--memory-budget-mb", options->memory_budget_mb, "of the daemon")->capture_default_str();
   return [options](Report& report) { run(*options, report); };
 }
