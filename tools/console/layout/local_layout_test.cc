@@ -115,7 +115,7 @@ TEST(LocalLayout, WithoutAClosureInForceIsMadeOfWhatWasMeasured) {
     EXPECT_LT((candidate.without.at[k] - layout.with.at[k]).norm(), 1e-3);
     bent = std::max(bent, (candidate.without.at[k] - raw.without.at[k]).norm());
   }
-  EXPECT_GT(bent, 0.2);
+  EXPECT_GT(bent, 0.1);
 }
 
 TEST(LocalLayout, LeavesOutWhatGoesWithIt) {
