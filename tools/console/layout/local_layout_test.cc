@@ -45,11 +45,13 @@ struct Street {
 // It says that the second robot was three frames, and two metres to the left, from where it was.
 client::Edge wrong_closure() { return edge_of({{2, 20}, 2}, {1, 23}, {2, 20}, {-2, 0, 0}, 0.05); }
 
+// Of a frame among others, ascending.
+std::size_t position(const std::vector<FrameId>& frames, FrameId frame) {
+  return static_cast<std::size_t>(std::lower_bound(frames.begin(), frames.end(), frame) - frames.begin());
+}
+
 double distance(const LocalLayout& layout, const LocalLayout::Laid& laid, FrameId a, FrameId b) {
-  const auto at = [&](FrameId frame) {
-    return laid.at[static_cast<std::size_t>(std::lower_bound(layout.frames.begin(), layout.frames.end(), frame) -
-                                            layout.frames.begin())];
-  };
+  const auto at = [&](FrameId frame) { return laid.at[position(layout.frames, frame)]; };
   return (at(a) - at(b)).norm();
 }
 
@@ -60,8 +62,7 @@ TEST(LocalLayout, ShowsWhatAWrongClosureBends) {
   EXPECT_TRUE(layout.with.joined && layout.without.joined);
   EXPECT_NEAR(distance(layout, layout.without, {1, 20}, {2, 20}), 1, 0.05);
   // It pulls the newer end towards where it says that this was, and others hold against it.
-  const auto newer = static_cast<std::size_t>(
-      std::lower_bound(layout.frames.begin(), layout.frames.end(), FrameId{2, 20}) - layout.frames.begin());
+  const std::size_t newer = position(layout.frames, {2, 20});
   const Vector2 pulled = layout.with.at[newer] - layout.without.at[newer];
   EXPECT_GT(pulled.dot(Vector2(-2, 0) - layout.without.at[newer]), 0.2);
   EXPECT_LT(pulled.norm(), layout.metres);
@@ -70,10 +71,7 @@ TEST(LocalLayout, ShowsWhatAWrongClosureBends) {
   // Far from it nothing changes.
   EXPECT_NEAR(distance(layout, layout.with, {1, 2}, {1, 12}), distance(layout, layout.without, {1, 2}, {1, 12}), 0.1);
   // The root's axes: on is up, and what is to its right lies to its right.
-  const auto at = [&](FrameId frame) {
-    return layout.without.at[static_cast<std::size_t>(
-        std::lower_bound(layout.frames.begin(), layout.frames.end(), frame) - layout.frames.begin())];
-  };
+  const auto at = [&](FrameId frame) { return layout.without.at[position(layout.frames, frame)]; };
   EXPECT_LT(at({1, 23}).norm(), 1e-9);
   EXPECT_NEAR(at({1, 30}).y(), 7, 0.2);
   EXPECT_NEAR(at({2, 23}).x(), 1, 0.2);
@@ -87,12 +85,7 @@ TEST(LocalLayout, WithoutAClosureInForceIsMadeOfWhatWasMeasured) {
   std::vector<client::RelaxationEdge> pulling;
   for (const client::Spring& spring : client::springs_of(edges)) pulling.push_back(spring.relaxed);
   const auto refined = client::relax(street.frames, pulling).or_throw();
-  const auto pose = [&](FrameId frame) {
-    return refined
-        .poses[static_cast<std::size_t>(std::lower_bound(street.frames.begin(), street.frames.end(), frame) -
-                                        street.frames.begin())]
-        .T_component_frame;
-  };
+  const auto pose = [&](FrameId frame) { return refined.poses[position(street.frames, frame)].T_component_frame; };
   for (client::Edge& edge : edges) {
     edge.measured = {edge.T_ab, edge.covariance};
     edge.T_ab = pose(edge.a).inverse() * pose(edge.b);
